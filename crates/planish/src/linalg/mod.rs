@@ -1,0 +1,5 @@
+//! Ground floor: linear algebra.
+
+mod sparse;
+
+pub use sparse::{SparseCholesky, SparseError};

@@ -1,0 +1,29 @@
+//! Places on a mesh.
+
+use super::TriMesh;
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// A place on a mesh: a face and barycentric coordinates that are not negative and sum to one.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FacePoint {
+    /// Index of the triangle.
+    pub face: u32,
+    /// Weights of its three corners.
+    pub bary: [f64; 3],
+}
+
+impl FacePoint {
+    /// Corner `k` of `face`.
+    pub fn corner(face: u32, k: usize) -> FacePoint {
+        let mut bary = [0.0; 3];
+        bary[k] = 1.0;
+        FacePoint { face, bary }
+    }
+
+    /// World position.
+    pub fn position(&self, mesh: &TriMesh) -> DVec3 {
+        let [a, b, c] = mesh.corners(self.face as usize);
+        a * self.bary[0] + b * self.bary[1] + c * self.bary[2]
+    }
+}

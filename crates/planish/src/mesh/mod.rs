@@ -1,0 +1,78 @@
+//! Triangle meshes: flat arrays, adjacency, places on the surface.
+
+mod adjacency;
+mod face_point;
+
+pub use adjacency::{Adjacency, NONE, next, previous};
+pub use face_point::FacePoint;
+
+use crate::geom::Aabb;
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// A triangle mesh with flat arrays. Triangles run counter-clockwise seen from outside.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TriMesh {
+    /// Vertex positions, world units.
+    pub points: Vec<DVec3>,
+    /// Vertex indices of each triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// Named scalars or vectors per vertex (colour, normal, confidence ...), carried through.
+    pub attributes: Vec<Attribute>,
+}
+
+/// One named quantity per vertex.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Attribute {
+    /// `"normal"` (width 3), `"color"` (width 3 or 4, 0 to 1), or the name found in the file.
+    pub name: String,
+    /// Numbers per vertex.
+    pub width: usize,
+    /// `width` numbers per vertex, vertex after vertex.
+    pub values: Vec<f32>,
+}
+
+impl TriMesh {
+    /// A mesh without attributes.
+    pub fn new(points: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> TriMesh {
+        TriMesh { points, triangles, attributes: Vec::new() }
+    }
+
+    /// Bounding box of all vertices.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::of(&self.points)
+    }
+
+    /// The three corner positions of triangle `t`.
+    pub fn corners(&self, t: usize) -> [DVec3; 3] {
+        self.triangles[t].map(|v| self.points[v as usize])
+    }
+
+    /// Twice the area vector of triangle `t`: its length is twice the area, its direction the normal.
+    pub fn area_vector(&self, t: usize) -> DVec3 {
+        let [a, b, c] = self.corners(t);
+        (b - a).cross(c - a)
+    }
+
+    /// Unit normal of triangle `t`; zero for a degenerate one.
+    pub fn normal(&self, t: usize) -> DVec3 {
+        self.area_vector(t).normalize_or_zero()
+    }
+
+    /// Area of triangle `t`.
+    pub fn area(&self, t: usize) -> f64 {
+        self.area_vector(t).length() / 2.0
+    }
+
+    /// Unit vertex normals, weighted by the area of the triangles around.
+    pub fn vertex_normals(&self) -> Vec<DVec3> {
+        let mut sum = vec![DVec3::ZERO; self.points.len()];
+        for (t, triangle) in self.triangles.iter().enumerate() {
+            let n = self.area_vector(t);
+            for &v in triangle {
+                sum[v as usize] += n;
+            }
+        }
+        sum.into_iter().map(DVec3::normalize_or_zero).collect()
+    }
+}

@@ -1,0 +1,119 @@
+//! Networks: corners, curves and four-sided patches on a mesh.
+
+use crate::mesh::{FacePoint, TriMesh};
+use serde::{Deserialize, Serialize};
+
+/// A conforming network of four-sided patches.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Network {
+    /// Places where curves end.
+    pub corners: Vec<Corner>,
+    /// Boundary curves between corners.
+    pub curves: Vec<Curve>,
+    /// Four-sided patches.
+    pub patches: Vec<Patch>,
+}
+
+/// A place where curves end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Corner {
+    /// Its place on the mesh.
+    pub place: FacePoint,
+}
+
+/// What a curve follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CurveKind {
+    /// Runs over smooth surface; the seam along it is to be smooth.
+    Smooth,
+    /// Follows a sharp edge; the seam along it is C0 on purpose.
+    Feature,
+    /// Follows the boundary of the mesh; it has one patch only.
+    Boundary,
+}
+
+/// A boundary curve between two corners.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Curve {
+    /// Corners at the start and at the end.
+    pub corners: [u32; 2],
+    /// What it follows.
+    pub kind: CurveKind,
+    /// Face points from corner to corner, both included; neighbours share a face.
+    pub points: Vec<FacePoint>,
+}
+
+/// One side of a patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Side {
+    /// Index of the curve.
+    pub curve: u32,
+    /// True if the side runs against the curve's own direction.
+    pub reversed: bool,
+}
+
+/// A four-sided patch.
+///
+/// Its sides run counter-clockwise seen from outside. With `u` along side 0 and `v` along side 1: side 0 is
+/// `v = 0` with `u` rising, side 1 `u = 1` with `v` rising, side 2 `v = 1` with `u` falling, side 3 `u = 0`
+/// with `v` falling. So the surface normal `S_u x S_v` points outside.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Patch {
+    /// The four sides.
+    pub sides: [Side; 4],
+}
+
+/// The exact sub-mesh of a patch: a disk, cut out of the mesh along the curves.
+#[derive(Clone, Debug)]
+pub struct PatchMesh {
+    /// Its own triangles over its own vertices (no attributes).
+    pub mesh: TriMesh,
+    /// For each vertex its place on the input mesh.
+    pub origin: Vec<FacePoint>,
+    /// For each triangle the face of the input mesh that it is a part of.
+    pub face_origin: Vec<u32>,
+    /// For each side (order and direction of [`Patch`]) its vertices from corner to corner, both included.
+    pub sides: [Vec<u32>; 4],
+}
+
+impl Network {
+    /// Corner at the start of side `k` of `patch`.
+    pub fn corner(&self, patch: usize, k: usize) -> u32 {
+        let side = self.patches[patch].sides[k];
+        self.curves[side.curve as usize].corners[side.reversed as usize]
+    }
+
+    /// For each curve the patch sides that use it, as `(patch, side)`.
+    pub fn uses(&self) -> Vec<Vec<(u32, u8)>> {
+        let mut uses = vec![Vec::new(); self.curves.len()];
+        for (p, patch) in self.patches.iter().enumerate() {
+            for (k, side) in patch.sides.iter().enumerate() {
+                uses[side.curve as usize].push((p as u32, k as u8));
+            }
+        }
+        uses
+    }
+
+    /// For each curve its chord: curves on opposite sides of a patch belong to one chord, and all curves of
+    /// a chord share their number of grid points and of control points.
+    pub fn chords(&self) -> Vec<u32> {
+        let mut parent: Vec<u32> = (0..self.curves.len() as u32).collect();
+        fn root(parent: &mut [u32], mut c: u32) -> u32 {
+            while parent[c as usize] != c {
+                parent[c as usize] = parent[parent[c as usize] as usize];
+                c = parent[c as usize];
+            }
+            c
+        }
+        for patch in &self.patches {
+            for k in 0..2 {
+                let a = root(&mut parent, patch.sides[k].curve);
+                let b = root(&mut parent, patch.sides[k + 2].curve);
+                let (low, high) = (a.min(b), a.max(b));
+                parent[high as usize] = low;
+            }
+        }
+        (0..parent.len() as u32).map(|c| root(&mut parent, c)).collect()
+    }
+}
