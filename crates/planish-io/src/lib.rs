@@ -1,1 +1,29 @@
-//! x
+//! Everything that enters or leaves planish: meshes, STEP, displacement images, the project file.
+//!
+//! One file or folder per format. Readers take the whole file into memory, believe no count that the rest of
+//! the file has no room for, and say what is wrong and where. Writers leave either the finished file or
+//! nothing ([`atomic`]).
+
+pub mod atomic;
+mod error;
+mod export;
+mod gltf;
+mod mesh_file;
+mod obj;
+mod place;
+mod ply;
+mod polygon;
+pub mod project;
+mod relief_files;
+mod step;
+mod stl;
+mod text;
+mod weld;
+
+pub use error::{ReadError, WriteError};
+pub use export::{ExportKind, export, export_kind, export_mesh};
+pub use mesh_file::{MeshFormat, Up, WriteOptions, read_mesh, write_mesh};
+pub use place::Place;
+pub use project::{ProjectError, read_model, write_model};
+pub use relief_files::{read_relief, write_relief};
+pub use step::{StepInput, StepSummary, write_step};
