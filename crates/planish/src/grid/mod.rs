@@ -11,11 +11,15 @@
 //! checked exactly for folds, instead of walking over the triangles.
 
 mod chart;
+mod even;
 mod locate;
+mod net;
 mod quality;
+mod settle;
 mod side;
 mod sizes;
 mod springs;
+mod walk;
 
 pub use quality::{GridQuality, measure};
 pub use sizes::choose_sizes;

@@ -185,8 +185,13 @@ pub fn sheets(n: usize) -> Vec<Sheet> {
             DVec3::new(s, t, 0.1 * (3.0 * s).sin() + 0.3 / n as f64 * noise(k))
         }),
         sheet("slivers 1e-6", n, n, 0.0, |s, t| {
-            let squeeze = |x: f64| if x < 0.5 { x } else { 0.5 - 0.5 / n as f64 + (x - 0.5) * 1e-6 * n as f64 };
-            let t = if t > 0.5 && t < 0.5 + 1.5 / n as f64 { squeeze(t) } else { t };
+            // One row of cells a million times flatter than the others.
+            let h = 1.0 / (n - 1) as f64;
+            let a = (n / 2) as f64 * h;
+            let t = match t - a {
+                x if x < 0.5 * h => t,
+                x => a + 1e-6 * h + (x - h) * (1.0 - a - 1e-6 * h) / (1.0 - a - h),
+            };
             DVec3::new(s, t, 0.2 * (2.0 * s * t).sin())
         }),
     ]
