@@ -1,17 +1,22 @@
 //! Gauss-Newton on a net: even spacing along every iso-curve against square cells.
 //!
-//! Energy: for every edge `(l / m - 1)²` with `m` the mean of its curve (what F_arc of [K98] eq. 5.1 strives for),
-//! and for every cell a penalty of the cotangent of its angle (in place of F_fair, which shortens curves and so
-//! pulls them off protruding parts). Unknowns are moves `(a, b)` in cells along the net's own tangents.
+//! Energy: for every edge `(l / m - 1)²` with `m` the mean of its curve, what F_arc of [K98] eq. 5.1 strives for.
+//! In place of F_fair, which shortens curves and so pulls them off protruding parts: for every cell a penalty of its
+//! angle off square that is mild up to about 45 degrees and steep beyond, and for every node one of the sideways
+//! bend of both curves. Unknowns are moves `(a, b)` in cells along the net's own tangents; points then walk over
+//! the surface (MovePointOnSurface), and a move that would turn a cell over is shortened.
 
 use super::net::{Net, cell_corners};
 use super::{Fault, GridParams};
 use glam::{DVec2, DVec3};
 
-/// Weights of the squared and of the fourth power of the cotangent: small angles off square cost little, those
-/// beyond about 45 degrees much.
-const SQUARE_WEIGHT: f64 = 0.002;
-const FOURTH_WEIGHT: f64 = 0.01;
+/// Part of the squareness weight that acts on the square of the angle, besides its sixth power: enough to tell
+/// which of two cells near square is better.
+const GENTLE_SHARE: f64 = 0.08;
+/// Angle off square at which both weights are meant.
+const MEANT_ANGLE: f64 = std::f64::consts::FRAC_PI_4;
+/// Cells along the longer side for which the weight of bends is meant.
+const MEANT_CELLS: f64 = 32.0;
 /// Damping of the moves, in cells.
 const DAMPING: f64 = 0.003;
 /// Largest move of a round, in cells.
@@ -27,12 +32,12 @@ const SETTLED: f64 = 1e-3;
 pub fn settle<'a>(
     mut net: Net<'a>,
     rounds: usize,
-    _params: &GridParams,
+    params: &GridParams,
     cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Net<'a>, Fault> {
-    let mut energy = energy_of(&net);
+    let mut energy = energy_of(&net, params);
     for _ in 0..rounds {
-        let system = System::new(&net);
+        let system = System::new(&net, params);
         let Some(moves) = system.solve(cancelled) else { return Err(Fault::Cancelled) };
         let mut scale = 1.0;
         let before = energy;
@@ -42,7 +47,7 @@ pub fn settle<'a>(
                 let [u, v] = system.tangents[k];
                 net.chart.advance(net.spots[k], u * m.x + v * m.y)
             });
-            let reached = energy_of(&trial);
+            let reached = energy_of(&trial, params);
             if reached < energy {
                 net = trial;
                 energy = reached;
@@ -60,11 +65,12 @@ pub fn settle<'a>(
     Ok(net)
 }
 
-/// Residual of a cell's angle and its derivative by the cotangent.
-fn angle_residual(cot: f64) -> (f64, f64) {
-    let square = cot * cot;
-    let root = (SQUARE_WEIGHT + FOURTH_WEIGHT * square).sqrt();
-    (cot * root, (SQUARE_WEIGHT + 2.0 * FOURTH_WEIGHT * square) / root)
+/// Residual of a cell's angle off square and its derivative by that angle.
+fn angle_residual(angle: f64, squareness: f64) -> (f64, f64) {
+    let x = angle / MEANT_ANGLE;
+    let fourth = x * x * x * x;
+    let root = (squareness * (GENTLE_SHARE + fourth)).sqrt();
+    (x * root, squareness * (GENTLE_SHARE + 3.0 * fourth) / root / MEANT_ANGLE)
 }
 
 /// Mid-lines of a cell, along u and v.
@@ -76,11 +82,11 @@ fn midlines(net: &Net, c: usize) -> (DVec3, DVec3) {
 /// Least sine that the angle of a cell is taken with: keeps the energy of a collapsed cell finite.
 const LEAST_SINE: f64 = 0.02;
 
-fn cotangent(e: DVec3, f: DVec3) -> (f64, f64, f64) {
+/// Angle off square between two mid-lines, its sine and cosine.
+fn off_square(e: DVec3, f: DVec3) -> (f64, f64, f64) {
     let lengths = (e.length() * f.length()).max(f64::MIN_POSITIVE);
-    let cos = (e.dot(f) / lengths).clamp(-1.0, 1.0);
-    let sin = (1.0 - cos * cos).sqrt().max(LEAST_SINE);
-    (cos / sin, cos, sin)
+    let sin = (e.dot(f) / lengths).clamp(-1.0, 1.0);
+    (sin.asin(), sin, (1.0 - sin * sin).sqrt().max(LEAST_SINE))
 }
 
 /// Edges of the inner curves: all lines along u, then all along v, as (first node, stride, number of edges).
@@ -90,7 +96,7 @@ fn curves(net: &Net) -> impl Iterator<Item = (usize, usize, usize)> + use<> {
     lines.chain((1..cols - 1).map(move |i| (i, cols, rows - 1)))
 }
 
-fn energy_of(net: &Net) -> f64 {
+fn energy_of(net: &Net, params: &GridParams) -> f64 {
     let mut sum = 0.0;
     let mut lengths = Vec::new();
     for (first, stride, count) in curves(net) {
@@ -100,11 +106,39 @@ fn energy_of(net: &Net) -> f64 {
         let mean = lengths.iter().sum::<f64>() / count as f64;
         sum += lengths.iter().map(|l| (l / mean - 1.0).powi(2)).sum::<f64>();
     }
+    let weight = bend_weight(net, params.fairness);
+    for (k, stride) in bends(net) {
+        sum += bend_of(net, k, stride, weight).0.powi(2);
+    }
     for c in 0..(net.cols - 1) * (net.rows - 1) {
         let (e, f) = midlines(net, c);
-        sum += angle_residual(cotangent(e, f).0).0.powi(2);
+        sum += angle_residual(off_square(e, f).0, params.squareness).0.powi(2);
     }
     sum
+}
+
+/// Inner nodes with the stride of the curve through them, for both curves.
+fn bends(net: &Net) -> impl Iterator<Item = (usize, usize)> + use<> {
+    let (cols, rows) = (net.cols, net.rows);
+    (1..rows - 1).flat_map(move |j| (1..cols - 1).flat_map(move |i| [(j * cols + i, 1), (j * cols + i, cols)]))
+}
+
+/// Weight of a bend: angles between edges shrink with the cells, so that the weight grows with their number.
+fn bend_weight(net: &Net, fairness: f64) -> f64 {
+    fairness * (net.cols - 1).max(net.rows - 1) as f64 / MEANT_CELLS
+}
+
+/// How far the curve of `stride` bends sideways at node `k`, in edges, times `weight`; and the direction it is
+/// measured in, over the edge length.
+fn bend_of(net: &Net, k: usize, stride: usize, weight: f64) -> (f64, DVec3) {
+    let other = if stride == 1 { net.cols } else { 1 };
+    let along = (net.points[k + stride] - net.points[k - stride]) / 2.0;
+    let across = net.points[k + other] - net.points[k - other];
+    let length = along.length().max(f64::MIN_POSITIVE);
+    let unit = along / length;
+    let sideways = (across - unit * across.dot(unit)).normalize_or_zero() * (weight / length);
+    let second = net.points[k + stride] + net.points[k - stride] - net.points[k] * 2.0;
+    (second.dot(sideways), sideways)
 }
 
 /// The linearised energy: residuals and their derivatives by the moves of the nodes.
@@ -119,17 +153,18 @@ struct System {
     edges: Vec<([DVec2; 2], f64)>,
     /// For each cell the same with four nodes.
     cells: Vec<([DVec2; 4], f64)>,
+    /// For each bend its node and stride, the derivatives by the node before, itself and after, and the residual.
+    bends: Vec<(usize, usize, [DVec2; 3], f64)>,
 }
 
 impl System {
-    fn new(net: &Net) -> System {
+    fn new(net: &Net, params: &GridParams) -> System {
         let (cols, rows) = (net.cols, net.rows);
         let tangents: Vec<[DVec3; 2]> = (0..cols * rows)
             .map(|k| match net.is_inner(k) {
-                true => [
-                    (net.points[k + 1] - net.points[k - 1]) / 2.0,
-                    (net.points[k + cols] - net.points[k - cols]) / 2.0,
-                ],
+                true => {
+                    [(net.points[k + 1] - net.points[k - 1]) / 2.0, (net.points[k + cols] - net.points[k - cols]) / 2.0]
+                }
                 false => [DVec3::ZERO; 2],
             })
             .collect();
@@ -156,10 +191,10 @@ impl System {
         let cells = (0..(cols - 1) * (rows - 1))
             .map(|c| {
                 let (e, f) = midlines(net, c);
-                let (cot, cos, sin) = cotangent(e, f);
-                let (residual, slope) = angle_residual(cot);
+                let (angle, cos, sin) = off_square(e, f);
+                let (residual, slope) = angle_residual(angle, params.squareness);
                 let (le, lf) = (e.length().max(f64::MIN_POSITIVE), f.length().max(f64::MIN_POSITIVE));
-                let by_cos = slope / (sin * sin * sin);
+                let by_cos = slope / sin;
                 let by_e = (f / lf - e / le * cos) * (by_cos / le / 2.0);
                 let by_f = (e / le - f / lf * cos) * (by_cos / lf / 2.0);
                 let [a, b, c, d] = cell_corners(cols, c);
@@ -167,11 +202,18 @@ impl System {
                 (g, residual)
             })
             .collect();
-        System { cols, rows, tangents, curves, edges, cells }
+        let weight = bend_weight(net, params.fairness);
+        let bends = bends(net)
+            .map(|(k, stride)| {
+                let (residual, g) = bend_of(net, k, stride, weight);
+                (k, stride, [by(k - stride, g), by(k, g * -2.0), by(k + stride, g)], residual)
+            })
+            .collect();
+        System { cols, rows, tangents, curves, edges, cells, bends }
     }
 
     /// `Jᵀ r` for residuals of edges and cells.
-    fn transpose(&self, edge: &[f64], cell: &[f64], out: &mut [DVec2]) {
+    fn transpose(&self, edge: &[f64], cell: &[f64], bend: &[f64], out: &mut [DVec2]) {
         out.fill(DVec2::ZERO);
         let mut n = 0;
         for &(first, stride, count) in &self.curves {
@@ -187,10 +229,15 @@ impl System {
                 out[k] += *g * cell[c];
             }
         }
+        for ((k, stride, g, _), r) in self.bends.iter().zip(bend) {
+            out[k - stride] += g[0] * *r;
+            out[*k] += g[1] * *r;
+            out[k + stride] += g[2] * *r;
+        }
     }
 
     /// `J x`, the edges of each curve without their mean: a curve may grow or shrink as a whole.
-    fn apply(&self, x: &[DVec2], edge: &mut [f64], cell: &mut [f64]) {
+    fn apply(&self, x: &[DVec2], edge: &mut [f64], cell: &mut [f64], bend: &mut [f64]) {
         let mut n = 0;
         for &(first, stride, count) in &self.curves {
             let mut sum = 0.0;
@@ -208,6 +255,9 @@ impl System {
             let corners = cell_corners(self.cols, c);
             cell[c] = (0..4).map(|k| g[k].dot(x[corners[k]])).sum();
         }
+        for ((k, stride, g, _), r) in self.bends.iter().zip(bend) {
+            *r = g[0].dot(x[k - stride]) + g[1].dot(x[*k]) + g[2].dot(x[k + stride]);
+        }
     }
 
     /// Moves that lower the linearised energy: conjugate gradients, preconditioned by the 2 x 2 blocks.
@@ -215,6 +265,7 @@ impl System {
         let count = self.cols * self.rows;
         let mut edge: Vec<f64> = self.edges.iter().map(|e| e.1).collect();
         let mut cell: Vec<f64> = self.cells.iter().map(|c| c.1).collect();
+        let mut bend: Vec<f64> = self.bends.iter().map(|b| b.3).collect();
         let mut blocks = vec![[DAMPING, 0.0, DAMPING]; count];
         let add = |block: &mut [f64; 3], g: DVec2| {
             block[0] += g.x * g.x;
@@ -234,6 +285,11 @@ impl System {
                 add(&mut blocks[k], *g);
             }
         }
+        for (k, stride, g, _) in &self.bends {
+            add(&mut blocks[k - stride], g[0]);
+            add(&mut blocks[*k], g[1]);
+            add(&mut blocks[k + stride], g[2]);
+        }
         let precondition = |r: &[DVec2], z: &mut [DVec2]| {
             for ((z, r), [a, b, c]) in z.iter_mut().zip(r).zip(&blocks) {
                 let det = (a * c - b * b).max(f64::MIN_POSITIVE);
@@ -242,7 +298,7 @@ impl System {
         };
         let dot = |x: &[DVec2], y: &[DVec2]| x.iter().zip(y).map(|(x, y)| x.dot(*y)).sum::<f64>();
         let mut r = vec![DVec2::ZERO; count];
-        self.transpose(&edge, &cell, &mut r);
+        self.transpose(&edge, &cell, &bend, &mut r);
         r.iter_mut().for_each(|r| *r = -*r);
         let mut x = vec![DVec2::ZERO; count];
         let mut z = vec![DVec2::ZERO; count];
@@ -255,8 +311,8 @@ impl System {
             if rz <= 1e-6 * first || cancelled() {
                 break;
             }
-            self.apply(&p, &mut edge, &mut cell);
-            self.transpose(&edge, &cell, &mut q);
+            self.apply(&p, &mut edge, &mut cell, &mut bend);
+            self.transpose(&edge, &cell, &bend, &mut q);
             q.iter_mut().zip(&p).for_each(|(q, p)| *q += DAMPING * *p);
             let alpha = rz / dot(&p, &q);
             for k in 0..count {
