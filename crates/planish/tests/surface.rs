@@ -43,6 +43,24 @@ fn fit_with_as_many_control_points_as_nodes_interpolates_within_1e_9() {
 }
 
 #[test]
+fn basis_functions_add_up_to_1_on_knots_with_double_ones_within_1e_14() {
+    let knots = [0.0, 0.0, 0.0, 0.0, 0.3, 0.3, 0.7, 1.0, 1.0, 1.0, 1.0];
+    for i in 0..=100 {
+        let (first, [value, slope, bend]) = surface::basis::basis_at(&knots, i as f64 / 100.0);
+        assert!(first <= 3);
+        assert!((value.iter().sum::<f64>() - 1.0).abs() < 1e-14 && value.iter().all(|v| *v >= 0.0));
+        assert!(slope.iter().sum::<f64>().abs() < 1e-12 && bend.iter().sum::<f64>().abs() < 1e-10);
+    }
+    let control = (0..28).map(|c| DVec3::new((c % 7) as f64, (c / 7) as f64, 0.0)).collect();
+    let knots_v = surface::basis::uniform_knots(4);
+    let s = Surface { rows: 4, cols: 7, control, knots_u: knots.to_vec(), knots_v };
+    assert_eq!(s.check(), Ok(()));
+    assert_eq!(s.point(0.0, 0.0), DVec3::ZERO);
+    assert_eq!(s.point(1.0, 1.0), DVec3::new(6.0, 3.0, 0.0));
+    assert_eq!(s.point(2.0, -1.0), DVec3::new(6.0, 0.0, 0.0));
+}
+
+#[test]
 fn jets_match_central_differences_within_1e_5() {
     let g = grid(30, 41, |u, v| DVec3::new(u + 0.2 * (5.0 * v).sin(), v, (4.0 * u * v).cos()));
     let s = surface::fit(&g.points, 30, 41, [9, 12]).unwrap();
@@ -370,6 +388,9 @@ fn stitching_bad_input_is_an_error() {
     };
     assert!(matches!(run(&before, f64::NAN), FitError::Parameter { .. }));
     assert!(matches!(run(&before[1..], 30.0), FitError::Count { .. }));
+    let mut bent = before.clone();
+    bent[4].knots_v.pop();
+    assert!(matches!(run(&bent, 30.0), FitError::Malformed { .. }));
     let mut bent = before.clone();
     bent[4].knots_u[5] += 0.1;
     assert_eq!(run(&bent, 30.0), FitError::Knots { patch: 4 });

@@ -112,8 +112,7 @@ pub(crate) fn planes(network: &Network, surfaces: &[Surface], curves: &[Vec<DVec
         w
     }
     let mut joined = vec![false; wedges.len()];
-    for (curve, ends) in network.curves.iter().zip(&around).filter(|(c, _)| is_smooth(c)) {
-        debug_assert!(is_smooth(curve));
+    for (_, ends) in network.curves.iter().zip(&around).filter(|(c, _)| is_smooth(c)) {
         for list in ends.iter().filter(|list| list.len() > 1) {
             for pair in list.windows(2) {
                 let (a, b) = (find(&root, pair[0]), find(&root, pair[1]));

@@ -1,7 +1,7 @@
 //! Points and derivatives of a surface: one place at a time, or a whole grid separably.
 
-use super::Surface;
 use super::basis::{BasisRows, basis_at};
+use super::{FitError, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -43,6 +43,32 @@ impl Jet {
 }
 
 impl Surface {
+    /// Checks what evaluation relies on: at least `4 x 4` finite control points and clamped knots that rise from
+    /// 0 to 1, as many as they must be. Surfaces that come from outside want this before anything else.
+    ///
+    /// # Errors
+    /// [`FitError::Malformed`] with the first thing that is wrong.
+    pub fn check(&self) -> Result<(), FitError> {
+        let knots_are_bad = |knots: &[f64], control: usize| {
+            knots.len() != control + 4
+                || knots[..4] != [0.0; 4]
+                || knots[control..] != [1.0; 4]
+                || !knots.windows(2).all(|k| k[0] <= k[1])
+        };
+        let what = if self.rows < 4 || self.cols < 4 {
+            "it has fewer than 4 x 4 control points"
+        } else if self.control.len() != self.rows * self.cols {
+            "its control points are not rows x columns"
+        } else if self.control.iter().any(|p| !p.is_finite()) {
+            "a control point is not finite"
+        } else if knots_are_bad(&self.knots_u, self.cols) || knots_are_bad(&self.knots_v, self.rows) {
+            "its knots are not clamped and rising from 0 to 1"
+        } else {
+            return Ok(());
+        };
+        Err(FitError::Malformed { what })
+    }
+
     /// Control point `(i, j)`, `i` along `u`.
     pub fn at(&self, i: usize, j: usize) -> DVec3 {
         self.control[j * self.cols + i]

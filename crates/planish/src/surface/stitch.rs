@@ -73,12 +73,8 @@ pub fn stitch(
     let nodes = check_grids(network, grids)?;
     let shapes: Vec<_> = surfaces.iter().map(|s| (s.rows, s.cols, s.control.len())).collect();
     let counts = check(network, "surfaces", &shapes)?;
-    let uneven = |s: &Surface| {
-        s.knots_u.len() != s.cols + 4
-            || s.knots_v.len() != s.rows + 4
-            || !is_uniform(&s.knots_u)
-            || !is_uniform(&s.knots_v)
-    };
+    surfaces.iter().try_for_each(Surface::check)?;
+    let uneven = |s: &Surface| !is_uniform(&s.knots_u) || !is_uniform(&s.knots_v);
     if let Some(patch) = surfaces.iter().position(uneven) {
         return Err(FitError::Knots { patch });
     }
