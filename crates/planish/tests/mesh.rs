@@ -373,7 +373,9 @@ fn walk_goes_through_triangles_without_area_and_ends_among_nothing_else() {
     assert!(end.position(&mesh).distance(goal) < 1e-12, "{:?}", end.position(&mesh));
 
     // Nothing but degenerate triangles, in all ways, and vectors that are no numbers.
-    for corners in [[[0.0; 3]; 3], [[0., 0., 0.], [1., 0., 0.], [2., 0., 0.]], [[0., 0., 0.], [1., 0., 0.], [1., 0., 0.]]] {
+    for corners in
+        [[[0.0; 3]; 3], [[0., 0., 0.], [1., 0., 0.], [2., 0., 0.]], [[0., 0., 0.], [1., 0., 0.], [1., 0., 0.]]]
+    {
         let flat = TriMesh::new(corners.map(DVec3::from_array).to_vec(), vec![[0, 1, 2], [2, 1, 0]]);
         let adjacency = Adjacency::new(&flat);
         for kind in 0..4 {
@@ -455,11 +457,11 @@ fn closest_place_agrees_with_brute_force_within_1e_12() {
     for (name, mesh, _) in common::closed_meshes() {
         let bvh = Bvh::new(&mesh);
         for k in 0..60 {
-            let p = DVec3::new(random::unit(5, 3 * k), random::unit(5, 3 * k + 1), random::unit(5, 3 * k + 2)) * 4.0 - 2.0;
+            let p =
+                DVec3::new(random::unit(5, 3 * k), random::unit(5, 3 * k + 1), random::unit(5, 3 * k + 2)) * 4.0 - 2.0;
             let hit = bvh.closest(p);
-            let brute = (0..mesh.triangles.len())
-                .map(|t| triangle_distance(mesh.corners(t), p))
-                .fold(f64::INFINITY, f64::min);
+            let brute =
+                (0..mesh.triangles.len()).map(|t| triangle_distance(mesh.corners(t), p)).fold(f64::INFINITY, f64::min);
             assert!((hit.distance - brute).abs() < 1e-12, "{name}: {} {brute}", hit.distance);
             assert!(hit.place.position(&mesh).distance(hit.position) < 1e-12, "{name}");
             assert_valid(hit.place);
@@ -489,16 +491,26 @@ fn no_ray_slips_through_vertices_edge_midpoints_or_faces_of_closed_meshes() {
         let bvh = Bvh::new(&mesh);
         let center = mesh.bounds().center();
         let reach = 4.0 * mesh.bounds().diagonal();
-        let mut targets: Vec<(DVec3, DVec3)> = mesh.points.iter().copied().zip(mesh.vertex_normals()).collect();
-        for t in 0..mesh.triangles.len() {
-            let ([a, b, c], n) = (mesh.corners(t), mesh.normal(t));
-            targets.extend([(a + b) / 2.0, (b + c) / 2.0, (a + b + c) / 3.0].map(|p| (p, n)));
+        let adjacency = Adjacency::new(&mesh);
+        // Targets, and the triangles around each.
+        let mut targets: Vec<(DVec3, Vec<usize>)> = (0..mesh.points.len())
+            .map(|v| (mesh.points[v], adjacency.fan(v as u32).map(|h| h as usize / 3).collect()))
+            .collect();
+        for h in 0..adjacency.opposite.len() {
+            let [a, b, c] = mesh.corners(h / 3);
+            let middle = [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0][h % 3];
+            targets.push((middle, vec![h / 3, adjacency.opposite[h] as usize / 3]));
+            targets.push(((a + b + c) / 3.0, vec![h / 3]));
         }
-        for (k, (target, normal)) in targets.iter().enumerate() {
-            // A ray that grazes the surface may pass it by.
-            if (*target - center).normalize_or(DVec3::X).dot(*normal).abs() < 0.2 {
+        let mut tried = 0;
+        for (k, (target, around)) in targets.iter().enumerate() {
+            // Where the surface turns away from the ray, the ray may pass it by.
+            let toward = (*target - center).normalize_or(DVec3::X);
+            let facing: Vec<f64> = around.iter().map(|&t| mesh.normal(t).dot(toward)).collect();
+            if !(facing.iter().all(|&f| f > 0.01) || facing.iter().all(|&f| f < -0.01)) {
                 continue;
             }
+            tried += 1;
             // From outside, aimed beyond the target from far away along the line from the middle.
             let away = (*target - center).normalize_or(DVec3::X);
             let origin = *target + away * mesh.bounds().diagonal();
@@ -509,6 +521,7 @@ fn no_ray_slips_through_vertices_edge_midpoints_or_faces_of_closed_meshes() {
             let d = (origin - away * hit.distance - mesh.corners(hit.face as usize)[0]).dot(n.normalize());
             assert!(d.abs() < 1e-9, "{name}: the face is not where the ray ends");
         }
+        assert!(tried > targets.len() / 2, "{name}: {tried} of {}", targets.len());
     }
 }
 

@@ -223,9 +223,8 @@ fn split(items: &mut [Item]) -> usize {
         *b = (b.0.min(i.min), b.1.max(i.max), b.2 + 1);
     }
     let cost = |part: &[(DVec3, DVec3, usize)]| {
-        let whole = part.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY, 0), |s, b| {
-            (s.0.min(b.0), s.1.max(b.1), s.2 + b.2)
-        });
+        let whole =
+            part.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY, 0), |s, b| (s.0.min(b.0), s.1.max(b.1), s.2 + b.2));
         let d = (whole.1 - whole.0).max(DVec3::ZERO);
         (d.x * d.y + d.y * d.z + d.z * d.x) * whole.2 as f64
     };

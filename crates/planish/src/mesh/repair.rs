@@ -118,8 +118,7 @@ const FOLDED: f64 = 0.999;
 /// that merely touch at points, and two-sided sheets, stay as they are.
 fn weld_cracks(mesh: &TriMesh, triangles: &mut [[u32; 3]]) -> usize {
     let keyed = keyed_edges(triangles);
-    let open: Vec<u32> =
-        keyed.chunk_by(|x, y| x.0 == y.0).filter(|run| run.len() == 1).map(|run| run[0].1).collect();
+    let open: Vec<u32> = keyed.chunk_by(|x, y| x.0 == y.0).filter(|run| run.len() == 1).map(|run| run[0].1).collect();
     if open.is_empty() {
         return 0;
     }

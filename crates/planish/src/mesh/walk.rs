@@ -82,8 +82,7 @@ fn inside(mesh: &TriMesh, at: FacePoint, rest: DVec3) -> Option<Step> {
     }
     // No plane: go to the nearest edge, which costs nothing as the triangle has no width.
     let p = at.position(mesh);
-    let (_, near) =
-        (0..3).map(|k| nearest_on_edge(mesh, at.face, k, p)).min_by(|x, y| x.0.total_cmp(&y.0))?;
+    let (_, near) = (0..3).map(|k| nearest_on_edge(mesh, at.face, k, p)).min_by(|x, y| x.0.total_cmp(&y.0))?;
     let from = cleaned(near);
     let k = from.bary.iter().position(|&b| b == 0.0)?;
     // Against a weight that is zero already: the step ends where it begins.

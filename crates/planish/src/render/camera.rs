@@ -27,19 +27,33 @@ impl Camera {
     /// A camera that looks at the middle of `bounds` from `toward_eye`, just so far away that the box fits a
     /// picture of `aspect` (width over height). `up` points to the top of the picture.
     pub fn fit(bounds: &Aabb, toward_eye: DVec3, up: DVec3, aspect: f64) -> Camera {
+        let corner = |k: usize| {
+            let pick = |bit: usize| if k >> bit & 1 == 1 { bounds.max } else { bounds.min };
+            DVec3::new(pick(0).x, pick(1).y, pick(2).z)
+        };
+        let corners: [DVec3; 8] = std::array::from_fn(corner);
+        Camera::around(&corners, toward_eye, up, aspect)
+    }
+
+    /// As [`Camera::fit`], but as near as the points themselves allow, and centred on what is seen of them.
+    pub fn around(points: &[DVec3], toward_eye: DVec3, up: DVec3, aspect: f64) -> Camera {
         let forward = -toward_eye.normalize_or(DVec3::Y);
         let right = forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
         let up = right.cross(forward);
-        let center = if bounds.diagonal() > 0.0 { bounds.center() } else { bounds.min };
-        let half = bounds.size() / 2.0;
+        let seen = Aabb::of(
+            &points
+                .iter()
+                .filter(|p| p.is_finite())
+                .map(|p| DVec3::new(p.dot(right), p.dot(up), p.dot(forward)))
+                .collect::<Vec<_>>(),
+        );
+        let middle = if seen.diagonal() > 0.0 { seen.center() } else { seen.min.clamp(DVec3::MIN, DVec3::MAX) };
+        let center = right * middle.x + up * middle.y + forward * middle.z;
         let inner = SLOPE * (1.0 - RIM);
-        let away = (0..8)
-            .map(|k| {
-                let sign = |bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
-                let corner = half * DVec3::new(sign(0), sign(1), sign(2));
-                let aside = (corner.dot(right).abs() / aspect).max(corner.dot(up).abs());
-                aside / inner - corner.dot(forward)
-            })
+        let away = points
+            .iter()
+            .map(|&p| p - center)
+            .map(|d| (d.dot(right).abs() / aspect).max(d.dot(up).abs()) / inner - d.dot(forward))
             .fold(f64::MIN_POSITIVE, f64::max);
         Camera { eye: center - forward * away, right, up, forward, slope: SLOPE }
     }

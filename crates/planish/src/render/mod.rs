@@ -86,7 +86,7 @@ pub struct Look<'a> {
 impl Default for Look<'_> {
     fn default() -> Self {
         Look {
-            paint: Paint::Plain([205, 200, 190]),
+            paint: Paint::Plain([222, 214, 200]),
             crease_deg: 35.0,
             hollows: 0.8,
             lines: Vec::new(),
@@ -127,13 +127,7 @@ const FINE: usize = 2;
 /// Draws `mesh` as seen by `camera`. Triangles with a corner behind the camera or not finite are left out.
 /// # Errors
 /// [`RenderError`] for impossible sizes and for paint that does not match the mesh.
-pub fn render(
-    mesh: &TriMesh,
-    look: &Look,
-    camera: &Camera,
-    width: usize,
-    height: usize,
-) -> Result<Image, RenderError> {
+pub fn render(mesh: &TriMesh, look: &Look, camera: &Camera, width: usize, height: usize) -> Result<Image, RenderError> {
     if width == 0 || height == 0 || width > LARGEST || height > LARGEST {
         return Err(RenderError::Size { width, height });
     }

@@ -98,7 +98,7 @@ pub(super) fn put(image: &mut Image, x: usize, y: usize, color: [u8; 3]) {
     }
 }
 
-/// A number with three digits that matter for a scale of this span.
+/// A number with the digits that matter for a scale of this span.
 fn written(value: f64, span: f64) -> String {
     let size = span.abs().max(value.abs());
     if value == 0.0 || value.abs() < 1e-9 * size {
@@ -107,6 +107,6 @@ fn written(value: f64, span: f64) -> String {
     if !(1e-3..1e5).contains(&size) {
         return format!("{value:.2e}");
     }
-    let digits = (2 - span.abs().max(1e-12).log10().floor() as i32).clamp(0, 6) as usize;
+    let digits = (1 - span.abs().max(1e-12).log10().floor() as i32).clamp(0, 6) as usize;
     format!("{value:.digits$}")
 }

@@ -100,9 +100,9 @@ fn studio(frame: &Frame, normal: DVec3, view: DVec3, open: f32) -> (Vec3, f32) {
     // Lamps of some size reach round the edge of shadow.
     let soft = |l: DVec3, size: f64| (((normal.dot(l) + size) / (1.0 + size)).max(0.0) as f32).powf(1.3);
     let sky = 0.5 + 0.5 * normal.dot(c.up) as f32;
-    let ambient = Vec3::new(0.20, 0.215, 0.235).lerp(Vec3::new(0.33, 0.335, 0.34), sky) * open;
-    let direct = Vec3::new(1.0, 0.97, 0.92) * (0.66 * soft(key, 0.25))
-        + Vec3::new(0.80, 0.88, 1.0) * (0.16 * soft(fill, 0.3))
+    let ambient = Vec3::new(0.10, 0.11, 0.125).lerp(Vec3::new(0.25, 0.255, 0.26), sky) * open;
+    let direct = Vec3::new(1.0, 0.97, 0.92) * (0.80 * soft(key, 0.2))
+        + Vec3::new(0.80, 0.88, 1.0) * (0.20 * soft(fill, 0.3))
         + Vec3::splat(0.10 * soft(rim, 0.1));
     let half = (key - view).normalize();
     let shine = 0.06 * (normal.dot(half).max(0.0) as f32).powf(38.0);
