@@ -304,3 +304,20 @@ fn real_meshes_have_the_counts_that_their_list_says() {
         assert_eq!((mesh.points.len(), mesh.triangles.len()), (vertices, triangles), "{name}");
     }
 }
+
+/// Set `PLANISH_PYTHON` to a Python that has trimesh to run this one.
+#[test]
+fn trimesh_reads_our_glb_as_a_watertight_cube_of_volume_1e_9_cubic_metres() {
+    let Some(python) = std::env::var_os("PLANISH_PYTHON") else {
+        println!("skipped: PLANISH_PYTHON is not set");
+        return;
+    };
+    let folder = folder();
+    let path = folder.path().join("a.glb");
+    write_mesh(&path, &coloured_cube(), &WriteOptions::default()).unwrap();
+    let script = "import trimesh,sys\nm=trimesh.load(sys.argv[1],process=False).to_geometry()\n\
+                  print(len(m.vertices),len(m.faces),m.is_watertight,'%.6e'%m.volume,m.visual.kind)";
+    let output = std::process::Command::new(python).args(["-c", script]).arg(&path).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(text.trim(), "8 12 True 1.000000e-09 vertex", "{}", String::from_utf8_lossy(&output.stderr));
+}
