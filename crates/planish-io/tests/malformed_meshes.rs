@@ -159,12 +159,12 @@ fn make_valid() -> Vec<(&'static str, Vec<u8>)> {
 #[test]
 fn files_cut_at_every_3rd_byte_never_panic_and_binary_ones_are_all_refused() {
     let folder = folder();
-    for (name, bytes) in valid() {
+    for &(name, ref bytes) in valid() {
         for length in (0..bytes.len()).step_by(3) {
             let found = read_mesh(file(&folder, name, &bytes[..length]));
             // A text format can be cut where what is left is a smaller mesh, or within the last word.
             let tail = if name == "b.stl" { 3 } else { 1 };
-            if ["a.ply", "a.stl", "a.glb", "b.stl"].contains(name) && length + tail < bytes.len() {
+            if ["a.ply", "a.stl", "a.glb", "b.stl"].contains(&name) && length + tail < bytes.len() {
                 assert!(found.is_err(), "{name} cut at {length}");
             }
         }
