@@ -172,7 +172,7 @@ fn files_cut_at_every_3rd_byte_never_panic_and_binary_ones_are_all_refused() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..Default::default() })]
 
     #[test]
     fn bytes_changed_at_random_never_panic_and_never_give_a_mesh_out_of_bounds(

@@ -302,6 +302,24 @@ fn real_meshes_have_the_counts_that_their_list_says() {
         let mesh = read_mesh(data.join(name)).unwrap();
         println!("{name}: {:.3} s", start.elapsed().as_secs_f64());
         assert_eq!((mesh.points.len(), mesh.triangles.len()), (vertices, triangles), "{name}");
+        let folder = folder();
+        for format in ["ply", "obj", "stl", "glb"] {
+            let path = folder.path().join(format!("a.{format}"));
+            let start = std::time::Instant::now();
+            write_mesh(&path, &mesh, &WriteOptions { units: Units::M, ..Default::default() }).unwrap();
+            let wrote = start.elapsed().as_secs_f64();
+            let start = std::time::Instant::now();
+            let back = read_mesh(&path).unwrap();
+            println!("{name} as {format}: write {wrote:.3} s, read {:.3} s", start.elapsed().as_secs_f64());
+            match format {
+                "ply" => assert!(back == mesh),
+                "obj" => assert!(back.points == mesh.points && back.triangles == mesh.triangles),
+                // Welded: vertices at one place become one, triangles that collapse by it go.
+                _ => assert!(back.points.len() <= vertices && back.triangles.len() > triangles * 99 / 100),
+            }
+            let scale = mesh.bounds().diagonal();
+            assert!((back.bounds().diagonal() - scale).abs() < 1e-6 * scale);
+        }
     }
 }
 

@@ -155,7 +155,7 @@ fn export_chooses_by_extension_and_lists_the_known_ones() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(150))]
+    #![proptest_config(ProptestConfig { cases: 150, failure_persistence: None, ..Default::default() })]
 
     #[test]
     fn bytes_changed_at_random_never_panic(

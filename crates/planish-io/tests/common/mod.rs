@@ -170,6 +170,22 @@ pub fn ring() -> (Network, Vec<Surface>) {
     (network, vec![surface(n, n, at)])
 }
 
+/// A globe of one patch: both its long sides are one curve, its short ones are the poles.
+pub fn globe() -> (Network, Vec<Surface>) {
+    let n = 13;
+    let mut network = network(2, &[]);
+    network.curves = vec![curve(0, 0), curve(0, 1), curve(1, 1)];
+    let side = |curve: u32, reversed: bool| Side { curve, reversed };
+    network.patches = vec![Patch { sides: [side(0, false), side(1, false), side(2, true), side(1, true)] }];
+    let at = |i: usize, j: usize| {
+        let phi = std::f64::consts::TAU * (i % (n - 1)) as f64 / (n - 1) as f64;
+        let theta = std::f64::consts::PI * (j as f64 / 8.0 - 0.5);
+        let r = if j == 0 || j == 8 { 0.0 } else { theta.cos() };
+        DVec3::new(r * phi.cos(), r * phi.sin(), theta.sin())
+    };
+    (network, vec![surface(n, 9, at)])
+}
+
 /// Two models as one.
 pub fn both(a: (Network, Vec<Surface>), b: (Network, Vec<Surface>)) -> (Network, Vec<Surface>) {
     let (mut network, mut surfaces) = a;
