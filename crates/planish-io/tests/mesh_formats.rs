@@ -1,5 +1,7 @@
 //! PLY, OBJ, STL and glTF: what is written is read back, and what other programs write is read rightly.
 
+#![allow(clippy::print_stdout)] // figures and skipped tests are told to who runs them
+
 mod common;
 
 use common::{coloured_cube, cube, data, file, folder, volume6};

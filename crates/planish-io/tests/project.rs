@@ -1,5 +1,7 @@
 //! The project file: everything comes back, and what is damaged, newer or something else is refused.
 
+#![allow(clippy::print_stdout)] // figures and skipped tests are told to who runs them
+
 mod common;
 
 use common::{coloured_cube, file, folder, torus};

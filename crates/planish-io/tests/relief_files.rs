@@ -1,5 +1,7 @@
 //! Displacement maps: what is written is read back bit for bit, and other programs read the same numbers.
 
+#![allow(clippy::print_stdout)] // figures and skipped tests are told to who runs them
+
 mod common;
 
 use common::folder;

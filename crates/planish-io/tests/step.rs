@@ -1,5 +1,7 @@
 //! STEP: topology as it was meant, bytes that do not change, and what OpenCASCADE makes of the files.
 
+#![allow(clippy::print_stdout)] // figures and skipped tests are told to who runs them
+
 mod common;
 
 use common::{ball, both, folder, globe, ring, sheet, torus, tube};

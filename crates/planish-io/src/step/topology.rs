@@ -39,7 +39,7 @@ impl Row {
     fn of(surface: &Surface, k: usize) -> Row {
         let (rows, cols) = (surface.rows, surface.cols);
         let at = |i: usize, j: usize| surface.control[j * cols + i];
-        let along_u = k % 2 == 0;
+        let along_u = k.is_multiple_of(2);
         let control = match k {
             0 => (0..cols).map(|i| at(i, 0)).collect(),
             1 => (0..rows).map(|j| at(cols - 1, j)).collect(),

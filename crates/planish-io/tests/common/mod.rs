@@ -70,8 +70,8 @@ pub fn surface(cols: usize, rows: usize, at: impl Fn(usize, usize) -> DVec3) -> 
 
 /// A network of patches over corners, each given by its four corners counter-clockwise; a curve for each pair.
 pub fn network(corners: usize, patches: &[[u32; 4]]) -> Network {
-    let mut network = Network::default();
-    network.corners = vec![Corner { place: FacePoint::corner(0, 0) }; corners];
+    let corners = vec![Corner { place: FacePoint::corner(0, 0) }; corners];
+    let mut network = Network { corners, ..Default::default() };
     for ring in patches {
         let sides = [0, 1, 2, 3].map(|k| {
             let (a, b) = (ring[k], ring[(k + 1) % 4]);
