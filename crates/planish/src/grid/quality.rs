@@ -30,7 +30,7 @@ pub struct GridQuality {
 /// Measures `grid` against its `patch`.
 ///
 /// The grid's surface has two triangles per cell, divided along the shorter diagonal. A cell counts as a fold if any
-/// of its four corner triangles points against the mean normal of its neighbourhood, the sum of the area vectors of
+/// of its four corner triangles (but the one at a corner of the patch, whose angle is given) points against the mean normal of its neighbourhood, the sum of the area vectors of
 /// the cells up to [`FOLD_REACH`] away: rough relief tilts single cells, but only a fold turns one right over. (That
 /// the grid is one-to-one on the patch is a matter of construction: `relax` checks the orientation of every cell in
 /// the chart exactly.)
@@ -88,11 +88,19 @@ fn folds(grid: &Grid) -> usize {
                 }
             }
             let q = corners(i, j);
+            // The angle at a corner of the patch is that of its curves, be it 180 degrees.
+            let given = match ((i == 0, i + 1 == m), (j == 0, j + 1 == n)) {
+                ((true, _), (true, _)) => 0,
+                ((_, true), (true, _)) => 1,
+                ((_, true), (_, true)) => 2,
+                ((true, _), (_, true)) => 3,
+                _ => 4,
+            };
             let turned = |k: usize| {
                 let (p, a, b) = (q[k], q[(k + 1) % 4], q[(k + 3) % 4]);
                 (a - p).cross(b - p).dot(normal) < 0.0
             };
-            count += (0..4).any(turned) as usize;
+            count += (0..4).filter(|&k| k != given).any(turned) as usize;
         }
     }
     count
