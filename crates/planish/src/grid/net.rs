@@ -78,13 +78,6 @@ impl<'a> Net<'a> {
         Net::new(self.chart, cols, rows, uv)
     }
 
-    /// Number of cells that are twisted on the surface, those at the corners of the patch excepted.
-    pub fn twists(&self) -> usize {
-        let (m, n) = (self.cols - 1, self.rows - 1);
-        let corners = [0, m - 1, m * (n - 1), m * n - 1];
-        (0..m * n).filter(|c| !corners.contains(c) && is_twisted(&self.points, self.cols, *c)).count()
-    }
-
     /// True for a point that may move.
     pub fn is_inner(&self, k: usize) -> bool {
         let (i, j) = (k % self.cols, k / self.cols);
@@ -164,7 +157,7 @@ pub fn turns_over(uv: &[DVec2], cols: usize, c: usize) -> bool {
 }
 
 /// True if one of the four corner triangles of a cell points against the cell's own area vector.
-pub fn is_twisted(points: &[DVec3], cols: usize, c: usize) -> bool {
+fn is_twisted(points: &[DVec3], cols: usize, c: usize) -> bool {
     let q = cell_corners(cols, c).map(|k| points[k]);
     let normal = (q[2] - q[0]).cross(q[3] - q[1]);
     (0..4).any(|k| (q[(k + 1) % 4] - q[k]).cross(q[(k + 3) % 4] - q[k]).dot(normal) <= 0.0)

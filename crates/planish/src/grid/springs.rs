@@ -6,8 +6,9 @@
 
 use super::chart::Chart;
 use super::even::{even, unevenness};
+use super::fold::{folded_cells, open_folds};
 use super::locate::Spot;
-use super::net::{Net, is_twisted};
+use super::net::Net;
 use super::settle::settle;
 use super::{Fault, GridParams};
 
@@ -23,8 +24,6 @@ const LATER_ROUNDS: [usize; 3] = [8, 5, 3];
 /// quarter, from which on the first is good enough.
 const EVEN_ROUNDS: [usize; 3] = [12, 3, 0];
 const GOOD_UNEVENNESS: f64 = 0.0625;
-/// Sweeps of smoothing around twisted cells.
-const UNTWIST_SWEEPS: usize = 40;
 
 /// The spots of `cols x rows` grid points in `chart`, row-major.
 pub fn relax(
@@ -47,7 +46,8 @@ pub fn relax(
         net = net.resampled(c, r);
         net = settle(net, LATER_ROUNDS[k.min(LATER_ROUNDS.len() - 1)], params, cancelled)?;
     }
-    Ok(untwisted(net, cancelled)?.spots)
+    open_folds(&mut net, cancelled)?;
+    Ok(net.spots)
 }
 
 /// The settled coarsest grid. Drawing it out fully suits protruding parts; where the rim of the patch runs in deep
@@ -63,7 +63,7 @@ fn coarsest<'a>(
     for rounds in EVEN_ROUNDS {
         let net = even(Net::regular(chart, cols, rows), rounds, cancelled)?;
         let net = settle(net, FIRST_ROUNDS, params, cancelled)?;
-        let score = (net.twists(), unevenness(&net));
+        let score = (folded_cells(&net.points, cols, rows).len(), unevenness(&net));
         let good = score.0 == 0 && score.1 < GOOD_UNEVENNESS;
         if best.as_ref().is_none_or(|(b, _)| score < *b) {
             best = Some((score, net));
@@ -73,43 +73,4 @@ fn coarsest<'a>(
         }
     }
     Ok(best.map_or_else(|| Net::regular(chart, cols, rows), |(_, net)| net))
-}
-
-/// Smooths around the cells that are twisted on the surface, as long as their number falls.
-fn untwisted<'a>(net: Net<'a>, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<Net<'a>, Fault> {
-    let mut best = net.twists();
-    let (mut kept, mut net) = (net.clone(), net);
-    for sweep in 0..UNTWIST_SWEEPS {
-        if best == 0 {
-            break;
-        }
-        if cancelled() {
-            return Err(Fault::Cancelled);
-        }
-        let (cols, rows) = (net.cols, net.rows);
-        let mut weak = vec![false; cols * rows];
-        let reach = 1 + sweep / 10;
-        for c in (0..(cols - 1) * (rows - 1)).filter(|&c| is_twisted(&net.points, cols, c)) {
-            let (x, y) = (c % (cols - 1), c / (cols - 1));
-            for j in (y + 1).saturating_sub(reach)..(y + 1 + reach).min(rows) {
-                for i in (x + 1).saturating_sub(reach)..(x + 1 + reach).min(cols) {
-                    weak[j * cols + i] = true;
-                }
-            }
-        }
-        net = net.moved(false, &|k, fraction| {
-            if !weak[k] {
-                return net.spots[k];
-            }
-            let p = &net.points;
-            let mean = (p[k - 1] + p[k + 1] + p[k - cols] + p[k + cols]) / 4.0;
-            net.chart.advance(net.spots[k], (mean - p[k]) * (0.7 * fraction))
-        });
-        let count = net.twists();
-        if count < best {
-            best = count;
-            kept = net.clone();
-        }
-    }
-    Ok(kept)
 }
