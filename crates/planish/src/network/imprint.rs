@@ -51,8 +51,10 @@ pub enum ImprintError {
         z: f64,
     },
     /// Two curves cross or touch between their ends.
-    #[error("curves cross at ({x:.6}, {y:.6}, {z:.6}) - hint: move one of them apart")]
+    #[error("two of the curves {curves:?} cross at ({x:.6}, {y:.6}, {z:.6}) - hint: move one of them apart")]
     Crossing {
+        /// The curves through the face where they cross.
+        curves: Vec<usize>,
         /// Place.
         x: f64,
         /// Place.
@@ -318,7 +320,7 @@ pub(crate) fn cut(mesh: &TriMesh, adjacency: &Adjacency, curves: &[&[Place]]) ->
     let mut origin: Vec<Place> = (0..points.len() as u32).map(Place::Vertex).collect();
     let mut on_edge: HashMap<u32, Vec<(f64, u32)>> = HashMap::new();
     let mut in_face: HashMap<u32, Vec<(FacePoint, u32)>> = HashMap::new();
-    let mut segments: HashMap<u32, Vec<[u32; 2]>> = HashMap::new();
+    let mut segments: HashMap<u32, Vec<Segment>> = HashMap::new();
     let mut chains = Vec::with_capacity(curves.len());
     for (c, curve) in curves.iter().enumerate() {
         let mut chain: Vec<u32> = Vec::with_capacity(curve.len());
@@ -357,7 +359,7 @@ pub(crate) fn cut(mesh: &TriMesh, adjacency: &Adjacency, curves: &[&[Place]]) ->
         }
         for (i, pair) in curve.windows(2).enumerate() {
             match shared_face(adjacency, &mesh.triangles, &pair[0], &pair[1]) {
-                Some(Shared::Face(f)) => segments.entry(f).or_default().push([chain[i], chain[i + 1]]),
+                Some(Shared::Face(f)) => segments.entry(f).or_default().push(Segment { ends: [chain[i], chain[i + 1]], curve: c }),
                 Some(Shared::Edge) => {}
                 None => {
                     let p = points[chain[i] as usize];
@@ -399,6 +401,13 @@ pub(crate) fn cut(mesh: &TriMesh, adjacency: &Adjacency, curves: &[&[Place]]) ->
     Ok(Cut { mesh: TriMesh::new(points, triangles), origin, parent, chains })
 }
 
+/// A piece of a curve across one face.
+#[derive(Clone, Copy, Debug)]
+struct Segment {
+    ends: [u32; 2],
+    curve: usize,
+}
+
 /// Triangulates one face with its new vertices and curve pieces.
 fn split_face(
     f: u32,
@@ -406,7 +415,7 @@ fn split_face(
     adjacency: &Adjacency,
     on_edge: &HashMap<u32, Vec<(f64, u32)>>,
     in_face: &HashMap<u32, Vec<(FacePoint, u32)>>,
-    segments: &HashMap<u32, Vec<[u32; 2]>>,
+    segments: &HashMap<u32, Vec<Segment>>,
     points: &[DVec3],
 ) -> Result<Vec<[u32; 3]>, ImprintError> {
     const CORNERS: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
@@ -434,9 +443,12 @@ fn split_face(
         names.push(*v);
         flat.push(Point2::new(p.bary[1], p.bary[2]));
     }
+    let pieces = segments.get(&f).map_or(&[][..], |l| &l[..]);
     let crossing = |v: u32| {
         let p = points[v as usize];
-        ImprintError::Crossing { x: p.x, y: p.y, z: p.z }
+        let mut curves: Vec<usize> = pieces.iter().map(|s| s.curve).collect();
+        curves.dedup();
+        ImprintError::Crossing { curves, x: p.x, y: p.y, z: p.z }
     };
     let mut cdt = ConstrainedDelaunayTriangulation::<Point2<f64>>::new();
     let mut handles = Vec::with_capacity(flat.len());
@@ -451,7 +463,7 @@ fn split_face(
     }
     handles.sort_by_key(|x| x.0);
     let handle_of = |v: u32| handles[handles.binary_search_by_key(&v, |x| x.0).expect("a point of the face")].1;
-    for &[a, b] in segments.get(&f).map_or(&[][..], |l| &l[..]) {
+    for &Segment { ends: [a, b], .. } in pieces {
         let (x, y) = (handle_of(a), handle_of(b));
         if cdt.try_add_constraint(x, y).is_empty() && !cdt.exists_constraint(x, y) {
             return Err(crossing(a));

@@ -6,7 +6,7 @@ use super::slide::Slide;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::CurveKind;
 use crate::network::disk::{Disk, Met};
-use crate::network::imprint::{self, Cut, Place, Shared, canonical, flood, half_edge, shared_face};
+use crate::network::imprint::{self, Cut, ImprintError, Place, Shared, canonical, flood, half_edge, shared_face};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -54,10 +54,16 @@ struct Drawn {
 
 impl Embedding {
     /// Cuts the complex into the mesh and checks that every cell is where it should be.
-    pub fn new(mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex) -> Option<Embedding> {
+    /// # Errors
+    /// The arcs that may be at fault.
+    pub fn new(mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex) -> Result<Embedding, Vec<u32>> {
         let empty: &[Place] = &[];
         let curves: Vec<&[Place]> = complex.arcs.iter().map(|a| a.as_ref().map_or(empty, |a| &a.chain[..])).collect();
-        let cut = imprint::cut(mesh, adjacency, &curves).ok()?;
+        let cut = imprint::cut(mesh, adjacency, &curves).map_err(|fault| match fault {
+            ImprintError::Crossing { curves, .. } => curves.into_iter().map(|c| c as u32).collect(),
+            ImprintError::Jump { curve, .. } => vec![curve as u32],
+            _ => Vec::new(),
+        })?;
         let cut_adjacency = Adjacency::new(&cut.mesh);
         let mut half_arc = vec![NONE; 3 * cut.mesh.triangles.len()];
         let mut first = vec![NONE; 2 * complex.arcs.len()];
@@ -71,9 +77,9 @@ impl Embedding {
                 let half = 2 * a + reversed as u32;
                 for i in 0..chain.len() - 1 {
                     let (x, y) = if reversed == 0 { (chain[i], chain[i + 1]) } else { (chain[i + 1], chain[i]) };
-                    let h = half_edge(&cut.mesh.triangles, &cut_adjacency, x, y)?;
+                    let h = half_edge(&cut.mesh.triangles, &cut_adjacency, x, y).ok_or_else(|| vec![a])?;
                     if half_arc[h as usize] != NONE {
-                        return None; // two arcs on one edge
+                        return Err(vec![a, half_arc[h as usize] / 2]); // two arcs on one edge
                     }
                     half_arc[h as usize] = half;
                     seeds.push((h, cell));
@@ -84,12 +90,14 @@ impl Embedding {
             }
         }
         let barrier: Vec<bool> = half_arc.iter().map(|&a| a != NONE).collect();
-        let label = flood(&cut, &cut_adjacency, &barrier, &seeds).ok()?;
+        let around = |c: u32| complex.loop_of(c).iter().map(|h| h / 2).collect::<Vec<u32>>();
+        let label = flood(&cut, &cut_adjacency, &barrier, &seeds)
+            .map_err(|(a, b)| around(a).into_iter().chain(around(b)).collect::<Vec<u32>>())?;
         let mut members = vec![Vec::new(); complex.cells.len()];
         for (f, &c) in label.iter().enumerate() {
-            members.get_mut(c as usize)?.push(f as u32);
+            members.get_mut(c as usize).ok_or_else(Vec::new)?.push(f as u32);
         }
-        Some(Embedding { cut, adjacency: cut_adjacency, half_arc, first, members })
+        Ok(Embedding { cut, adjacency: cut_adjacency, half_arc, first, members })
     }
 
     /// The union of a change as a disk, its outline and the position of each outline corner in the disk's
@@ -366,7 +374,7 @@ pub(super) struct Bench<'a> {
 impl<'a> Bench<'a> {
     /// `None` if the complex is not properly embedded.
     pub fn new(mesh: &'a TriMesh, adjacency: &'a Adjacency, complex: Complex) -> Option<Bench<'a>> {
-        let embedding = Embedding::new(mesh, adjacency, &complex)?;
+        let embedding = Embedding::new(mesh, adjacency, &complex).ok()?;
         Some(Bench { mesh, adjacency, complex, embedding })
     }
 
@@ -380,28 +388,34 @@ impl<'a> Bench<'a> {
             .par_iter()
             .map(|change| self.embedding.draw(self.mesh, self.adjacency, &self.complex, change))
             .collect();
+        let edits = changes.iter().zip(drawn).filter_map(|(change, drawn)| Some((change, drawn?))).collect();
+        self.commit(edits, |complex, (change, drawn)| replace(complex, change, drawn))
+    }
+
+    /// Puts `edits` into the complex; `put` makes one and returns the arcs it touched. Edits that would break
+    /// the embedding are left out. Returns how many were made.
+    fn commit<E>(&mut self, mut edits: Vec<E>, put: impl Fn(&mut Complex, &E) -> Vec<u32>) -> usize {
         let before = self.complex.clone();
-        let mut made = 0;
-        for (change, drawn) in changes.iter().zip(drawn) {
-            if let Some(drawn) = drawn {
-                replace(&mut self.complex, change, drawn);
-                made += 1;
+        while !edits.is_empty() {
+            let touched: Vec<Vec<u32>> = edits.iter().map(|e| put(&mut self.complex, e)).collect();
+            spread(&mut self.complex);
+            match Embedding::new(self.mesh, self.adjacency, &self.complex) {
+                Ok(embedding) => {
+                    self.embedding = embedding;
+                    return edits.len();
+                }
+                Err(blamed) => {
+                    self.complex = before.clone();
+                    let count = edits.len();
+                    let mut good = touched.iter().map(|arcs| !arcs.iter().any(|a| blamed.contains(a)));
+                    edits.retain(|_| good.next().expect("as many as edits"));
+                    if edits.len() == count {
+                        edits.truncate(count / 2); // nobody to blame: the fault lies in one of the halves
+                    }
+                }
             }
         }
-        if made == 0 {
-            return 0;
-        }
-        spread(&mut self.complex);
-        if let Some(embedding) = Embedding::new(self.mesh, self.adjacency, &self.complex) {
-            self.embedding = embedding;
-            return made;
-        }
-        self.complex = before;
-        if changes.len() == 1 {
-            return 0;
-        }
-        let (head, tail) = changes.split_at(changes.len() / 2);
-        self.apply(head) + self.apply(tail)
+        0
     }
 
     /// Makes slides of nodes whose cells are disjoint. Returns how many were made.
@@ -413,34 +427,24 @@ impl<'a> Bench<'a> {
             .par_iter()
             .map(|slide| self.embedding.draw_slide(self.mesh, self.adjacency, &self.complex, slide))
             .collect();
-        let before = self.complex.clone();
-        let mut made = 0;
-        for (slide, chains) in slides.iter().zip(drawn) {
-            let Some(chains) = chains else { continue };
-            made += 1;
-            self.complex.nodes[slide.node as usize].vertex = slide.vertex;
+        let edits = slides.iter().zip(drawn).filter_map(|(slide, chains)| Some((slide, chains?))).collect();
+        self.commit(edits, |complex, (slide, chains)| {
+            complex.nodes[slide.node as usize].vertex = slide.vertex;
             let at = slide.line.iter().position(|&v| v == slide.vertex).expect("a vertex of the line");
             let places: Vec<Place> = slide.line.iter().map(|&v| Place::Vertex(v)).collect();
-            let back = places[..=at].iter().rev().copied().collect();
-            let ahead = places[at..].to_vec();
-            for (h, mut chain) in chains.into_iter().chain([(slide.along[0], back), (slide.along[1], ahead)]) {
+            let back = (slide.along[0], places[..=at].iter().rev().copied().collect());
+            let ahead = (slide.along[1], places[at..].to_vec());
+            let mut touched = Vec::new();
+            for (h, chain) in chains.iter().chain([&back, &ahead]) {
+                let mut chain: Vec<Place> = chain.clone();
                 if h % 2 == 1 {
                     chain.reverse();
                 }
-                self.complex.arcs[h as usize / 2].as_mut().expect("a live arc").chain = chain;
+                complex.arcs[*h as usize / 2].as_mut().expect("a live arc").chain = chain;
+                touched.push(h / 2);
             }
-        }
-        spread(&mut self.complex);
-        if let Some(embedding) = Embedding::new(self.mesh, self.adjacency, &self.complex) {
-            self.embedding = embedding;
-            return made;
-        }
-        self.complex = before;
-        if slides.len() == 1 {
-            return 0;
-        }
-        let (head, tail) = slides.split_at(slides.len() / 2);
-        self.apply_slides(head) + self.apply_slides(tail)
+            touched
+        })
     }
 
     /// Makes `changes` in rounds of disjoint ones, each built by `plan` when its turn comes.
@@ -468,8 +472,8 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Puts a drawn change into the complex.
-fn replace(complex: &mut Complex, change: &Change, drawn: Drawn) {
+/// Puts a drawn change into the complex; returns its new arcs.
+fn replace(complex: &mut Complex, change: &Change, drawn: &Drawn) -> Vec<u32> {
     let mut free_arcs: Vec<u32> = change.removed.iter().rev().copied().collect();
     let mut free_cells: Vec<u32> = change.cells.iter().rev().copied().collect();
     for &a in &change.removed {
@@ -496,8 +500,10 @@ fn replace(complex: &mut Complex, change: &Change, drawn: Drawn) {
     // Faces as lists of (position of the start, half-arc).
     let whole: Vec<(usize, u32)> = drawn.outline.iter().enumerate().map(|(i, &h)| (i, h)).collect();
     let mut faces = vec![whole];
-    for (&(i, j), chain) in change.lines.iter().zip(drawn.lines) {
-        let a = add_arc(complex, [corner[i], corner[j]], chain);
+    let mut touched = Vec::new();
+    for (&(i, j), chain) in change.lines.iter().zip(&drawn.lines) {
+        let a = add_arc(complex, [corner[i], corner[j]], chain.clone());
+        touched.push(a);
         let k = faces
             .iter()
             .position(|f| f.iter().any(|x| x.0 == i) && f.iter().any(|x| x.0 == j))
@@ -526,9 +532,10 @@ fn replace(complex: &mut Complex, change: &Change, drawn: Drawn) {
         let arcs: Vec<u32> = change
             .spokes
             .iter()
-            .zip(drawn.spokes)
-            .map(|(&i, chain)| add_arc(complex, [center, corner[i]], chain))
+            .zip(&drawn.spokes)
+            .map(|(&i, chain)| add_arc(complex, [center, corner[i]], chain.clone()))
             .collect();
+        touched.extend_from_slice(&arcs);
         let whole = faces.pop().expect("spokes go without lines");
         for (k, &i) in change.spokes.iter().enumerate() {
             let l = (k + 1) % arcs.len();
@@ -555,6 +562,7 @@ fn replace(complex: &mut Complex, change: &Change, drawn: Drawn) {
         }
         complex.cells[c as usize] = Some(sides);
     }
+    touched
 }
 
 /// Moves the crossings of every edge apart, keeping their order.
