@@ -275,13 +275,10 @@ impl Chart {
     fn solve_without_folds(&mut self, boundary: &[bool], cancelled: &(dyn Fn() -> bool + Sync)) -> Result<(), Fault> {
         let cotangents = self.cotangents();
         let uniform = vec![0.5; cotangents.len()];
-        let exact = |w: f64| w;
-        let clamp = |w: f64| w.clamp(WEIGHT_RANGE[0], WEIGHT_RANGE[1]);
         let few = 1 + (FEW_FOLDS * self.triangles.len() as f64) as usize;
-        let attempts: [(&Vec<f64>, &dyn Fn(f64) -> f64); 3] =
-            [(&cotangents, &exact), (&cotangents, &clamp), (&uniform, &clamp)];
-        for (weights, limit) in attempts {
-            if self.solve(boundary, weights, limit, cancelled).is_ok() {
+        for (weights, clamped) in [(&cotangents, false), (&cotangents, true), (&uniform, true)] {
+            let limit = |w: f64| if clamped { w.clamp(WEIGHT_RANGE[0], WEIGHT_RANGE[1]) } else { w };
+            if self.solve(boundary, weights, &limit, cancelled).is_ok() {
                 let folds = self.folds();
                 if folds > 0 && folds <= few {
                     self.untangle(boundary);

@@ -117,3 +117,77 @@ impl Chart {
         spot
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::DVec3;
+    use crate::grid::chart::{Chart, flatten};
+    use crate::mesh::{FacePoint, TriMesh};
+    use crate::network::PatchMesh;
+
+    /// Chart of a sheet of 21 x 21 vertices at `shape(s, t)`.
+    fn chart(shape: impl Fn(f64, f64) -> DVec3) -> Chart {
+        let n = 21u32;
+        let points = (0..n * n).map(|k| shape((k % n) as f64 / 20.0, (k / n) as f64 / 20.0)).collect();
+        let cells = (0..n - 1).flat_map(|j| (0..n - 1).map(move |i| j * n + i));
+        let triangles = cells.flat_map(|a| [[a, a + 1, a + 1 + n], [a, a + 1 + n, a + n]]).collect();
+        let input = TriMesh::new(points, triangles);
+        let mut origin = vec![FacePoint::corner(0, 0); input.points.len()];
+        for (f, t) in input.triangles.iter().enumerate() {
+            (0..3).for_each(|k| origin[t[k] as usize] = FacePoint::corner(f as u32, k));
+        }
+        let face_origin = (0..input.triangles.len() as u32).collect();
+        let sides = [
+            (0..n).collect(),
+            (0..n).map(|j| j * n + n - 1).collect(),
+            (0..n).rev().map(|i| (n - 1) * n + i).collect(),
+            (0..n).rev().map(|j| j * n).collect(),
+        ];
+        let patch = PatchMesh { mesh: input.clone(), origin, face_origin, sides };
+        flatten(&input, &patch, &|| false).expect("a flat chart")
+    }
+
+    #[test]
+    fn a_step_over_a_flat_sheet_lands_at_the_sum_within_1e_12() {
+        let chart = chart(|s, t| DVec3::new(s, t, 0.0));
+        let from = chart.locate(glam::DVec2::new(0.21, 0.33), 0);
+        let step = DVec3::new(0.512, 0.247, 0.0);
+        let want = chart.position(from) + step;
+        assert!(chart.position(chart.advance(from, step)).distance(want) < 1e-12);
+    }
+
+    #[test]
+    fn a_step_around_a_cylinder_keeps_its_height_and_its_length_within_1_percent() {
+        let turn = |a: f64, z: f64| DVec3::new(-a.cos(), z, a.sin());
+        let chart = chart(|s, t| turn(2.0 * s, t));
+        let from = chart.locate(glam::DVec2::new(0.25, 0.5), 0);
+        let there = chart.position(chart.advance(from, DVec3::new(0.5f64.sin(), 0.0, 0.5f64.cos())));
+        // One unit of arc from the angle 0.5.
+        assert!(there.distance(turn(1.5, 0.5)) < 0.01, "{there}");
+    }
+
+    #[test]
+    fn a_step_beyond_the_rim_ends_on_it() {
+        let chart = chart(|s, t| DVec3::new(s, t, 0.0));
+        let from = chart.locate(glam::DVec2::new(0.9, 0.41), 0);
+        let there = chart.position(chart.advance(from, DVec3::new(5.0, 0.0, 0.0)));
+        assert!(there.distance(DVec3::new(1.0, 0.41, 0.0)) < 1e-12, "{there}");
+    }
+
+    #[test]
+    fn a_trace_measures_a_roof_of_two_slopes_within_1e_12() {
+        // Slopes of 45 degrees: the length over the ridge is the square root of 2 times the run.
+        let chart = chart(|s, t| DVec3::new(s, t, 0.5 - (s - 0.5).abs()));
+        let (p, q) = (glam::DVec2::new(0.03, 0.5), glam::DVec2::new(0.93, 0.5));
+        let (a, b) = (chart.locate(p, 0), chart.locate(q, 0));
+        let mut last = chart.position(a);
+        let run = chart.position(b).x - last.x;
+        let mut sum = 0.0;
+        chart.trace(p, a.triangle, q, &mut |_, x| {
+            sum += last.distance(x);
+            last = x;
+        });
+        sum += last.distance(chart.position(b));
+        assert!((sum - run * 2f64.sqrt()).abs() < 1e-12, "{sum}");
+    }
+}
