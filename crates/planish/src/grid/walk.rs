@@ -121,31 +121,7 @@ impl Chart {
 #[cfg(test)]
 mod tests {
     use crate::DVec3;
-    use crate::grid::chart::{Chart, flatten};
-    use crate::mesh::{FacePoint, TriMesh};
-    use crate::network::PatchMesh;
-
-    /// Chart of a sheet of 21 x 21 vertices at `shape(s, t)`.
-    fn chart(shape: impl Fn(f64, f64) -> DVec3) -> Chart {
-        let n = 21u32;
-        let points = (0..n * n).map(|k| shape((k % n) as f64 / 20.0, (k / n) as f64 / 20.0)).collect();
-        let cells = (0..n - 1).flat_map(|j| (0..n - 1).map(move |i| j * n + i));
-        let triangles = cells.flat_map(|a| [[a, a + 1, a + 1 + n], [a, a + 1 + n, a + n]]).collect();
-        let input = TriMesh::new(points, triangles);
-        let mut origin = vec![FacePoint::corner(0, 0); input.points.len()];
-        for (f, t) in input.triangles.iter().enumerate() {
-            (0..3).for_each(|k| origin[t[k] as usize] = FacePoint::corner(f as u32, k));
-        }
-        let face_origin = (0..input.triangles.len() as u32).collect();
-        let sides = [
-            (0..n).collect(),
-            (0..n).map(|j| j * n + n - 1).collect(),
-            (0..n).rev().map(|i| (n - 1) * n + i).collect(),
-            (0..n).rev().map(|j| j * n).collect(),
-        ];
-        let patch = PatchMesh { mesh: input.clone(), origin, face_origin, sides };
-        flatten(&input, &patch, &|| false).expect("a flat chart")
-    }
+    use crate::grid::chart::tests::chart;
 
     #[test]
     fn a_step_over_a_flat_sheet_lands_at_the_sum_within_1e_12() {
