@@ -22,7 +22,8 @@ fn main() {
     writeln!(out, "{header}").expect("a terminal");
     for (sheet, n) in all.iter().filter(|(s, _)| s.name.contains(&filter)) {
         let start = Instant::now();
-        let result = relax(&sheet.input, &[sheet.patch.clone()], &[(*n, *n)], &GridParams::default(), &Silent);
+        let result =
+            relax(&sheet.input, std::slice::from_ref(&sheet.patch), &[(*n, *n)], &GridParams::default(), &Silent);
         let seconds = start.elapsed().as_secs_f64();
         match result {
             Ok(grids) => {

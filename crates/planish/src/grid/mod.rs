@@ -55,7 +55,8 @@ pub struct Grid {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GridParams {
-    /// Grid points per vertex of the patches, over the whole network.
+    /// Grid points per vertex of the patches, over the whole network. With the default the grids of a dense scan
+    /// stay within 0.2 % of the diagonal of its vertices, 0.01 % in the mean.
     #[schemars(range(min = 0.01, max = 100.0), extend("unit" = "points per vertex"))]
     pub density: f64,
     /// Least number of points along a side.
@@ -80,12 +81,12 @@ pub struct GridParams {
 impl Default for GridParams {
     fn default() -> GridParams {
         GridParams {
-            density: 1.0,
+            density: 1.5,
             min_side: 17,
             max_side: 1025,
             max_points: 8_000_000,
-            squareness: 0.05,
-            fairness: 0.15,
+            squareness: 0.03,
+            fairness: 0.1,
         }
     }
 }

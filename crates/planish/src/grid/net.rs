@@ -3,9 +3,13 @@
 use super::chart::Chart;
 use super::locate::{Spot, orientation};
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 /// Halvings of a point's move before it is given up for this round.
 const HALVINGS: usize = 4;
+
+/// Points that one task moves at least.
+const PARALLEL_LENGTH: usize = 2048;
 
 /// `cols x rows` points of a chart, row-major; the rim is fixed.
 #[derive(Clone)]
@@ -101,8 +105,13 @@ impl<'a> Net<'a> {
                 points[k] = self.chart.position(spots[k]);
             }
         };
-        for k in (0..count).filter(|&k| self.is_inner(k)) {
-            place(k, 0, &mut spots, &mut uv, &mut points);
+        let first: Vec<Spot> = (0..count)
+            .into_par_iter()
+            .with_min_len(PARALLEL_LENGTH)
+            .map(|k| if self.is_inner(k) { by(k, 1.0) } else { self.spots[k] })
+            .collect();
+        for (k, &spot) in first.iter().enumerate().filter(|(k, _)| self.is_inner(*k)) {
+            (spots[k], uv[k], points[k]) = (spot, self.chart.uv_of(spot), self.chart.position(spot));
         }
         let cells = (self.cols - 1) * (self.rows - 1);
         let turned = |c: usize, uv: &[DVec2], points: &[DVec3]| {

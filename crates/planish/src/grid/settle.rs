@@ -10,9 +10,9 @@ use super::net::{Net, cell_corners};
 use super::{Fault, GridParams};
 use glam::{DVec2, DVec3};
 
-/// Part of the squareness weight that acts on the square of the angle, besides its sixth power: enough to tell
+/// Part of the squareness weight that acts on the square of the angle, besides its tenth power: enough to tell
 /// which of two cells near square is better.
-const GENTLE_SHARE: f64 = 0.08;
+const GENTLE_SHARE: f64 = 0.13;
 /// Angle off square at which both weights are meant.
 const MEANT_ANGLE: f64 = std::f64::consts::FRAC_PI_4;
 /// Cells along the longer side for which the weight of bends is meant.
@@ -70,9 +70,9 @@ pub fn settle<'a>(
 /// Residual of a cell's angle off square and its derivative by that angle.
 fn angle_residual(angle: f64, squareness: f64) -> (f64, f64) {
     let x = angle / MEANT_ANGLE;
-    let fourth = x * x * x * x;
-    let root = (squareness * (GENTLE_SHARE + fourth)).sqrt();
-    (x * root, squareness * (GENTLE_SHARE + 3.0 * fourth) / root / MEANT_ANGLE)
+    let steep = x.powi(8);
+    let root = (squareness * (GENTLE_SHARE + steep)).sqrt();
+    (x * root, squareness * (GENTLE_SHARE + 5.0 * steep) / root / MEANT_ANGLE)
 }
 
 /// Mid-lines of a cell, along u and v.

@@ -77,3 +77,23 @@ fn coarsest<'a>(
     }
     Ok(best.map_or_else(|| Net::regular(chart, cols, rows), |(_, net)| net))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::DVec3;
+    use crate::grid::chart::tests::chart;
+    use crate::grid::net::turns_over;
+
+    #[test]
+    fn every_cell_of_a_grid_over_a_steep_bump_is_convex_in_the_chart() {
+        let bump = |s: f64, t: f64| (-30.0 * ((s - 0.6).powi(2) + (t - 0.45).powi(2))).exp();
+        let chart = chart(|s, t| DVec3::new(s, t, 1.5 * bump(s, t)));
+        for (cols, rows) in [(9, 9), (40, 71), (130, 100)] {
+            let spots = relax(&chart, cols, rows, &GridParams::default(), &|| false).expect("a grid");
+            let uv: Vec<_> = spots.iter().map(|&s| chart.uv_of(s)).collect();
+            let turned = (0..(cols - 1) * (rows - 1)).filter(|&c| turns_over(&uv, cols, c)).count();
+            assert_eq!(turned, 0, "{cols} x {rows}");
+        }
+    }
+}

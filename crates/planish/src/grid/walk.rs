@@ -117,3 +117,53 @@ impl Chart {
         spot
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::DVec3;
+    use crate::grid::chart::tests::chart;
+
+    #[test]
+    fn a_step_over_a_flat_sheet_lands_at_the_sum_within_1e_12() {
+        let chart = chart(|s, t| DVec3::new(s, t, 0.0));
+        let from = chart.locate(glam::DVec2::new(0.21, 0.33), 0);
+        let step = DVec3::new(0.512, 0.247, 0.0);
+        let want = chart.position(from) + step;
+        assert!(chart.position(chart.advance(from, step)).distance(want) < 1e-12);
+    }
+
+    #[test]
+    fn a_step_around_a_cylinder_keeps_its_height_and_its_length_within_1_percent() {
+        let turn = |a: f64, z: f64| DVec3::new(-a.cos(), z, a.sin());
+        let chart = chart(|s, t| turn(2.0 * s, t));
+        let from = chart.locate(glam::DVec2::new(0.25, 0.5), 0);
+        let there = chart.position(chart.advance(from, DVec3::new(0.5f64.sin(), 0.0, 0.5f64.cos())));
+        // One unit of arc from the angle 0.5.
+        assert!(there.distance(turn(1.5, 0.5)) < 0.01, "{there}");
+    }
+
+    #[test]
+    fn a_step_beyond_the_rim_ends_on_it() {
+        let chart = chart(|s, t| DVec3::new(s, t, 0.0));
+        let from = chart.locate(glam::DVec2::new(0.9, 0.41), 0);
+        let there = chart.position(chart.advance(from, DVec3::new(5.0, 0.0, 0.0)));
+        assert!(there.distance(DVec3::new(1.0, 0.41, 0.0)) < 1e-12, "{there}");
+    }
+
+    #[test]
+    fn a_trace_measures_a_roof_of_two_slopes_within_1e_12() {
+        // Slopes of 45 degrees: the length over the ridge is the square root of 2 times the run.
+        let chart = chart(|s, t| DVec3::new(s, t, 0.5 - (s - 0.5).abs()));
+        let (p, q) = (glam::DVec2::new(0.03, 0.5), glam::DVec2::new(0.93, 0.5));
+        let (a, b) = (chart.locate(p, 0), chart.locate(q, 0));
+        let mut last = chart.position(a);
+        let run = chart.position(b).x - last.x;
+        let mut sum = 0.0;
+        chart.trace(p, a.triangle, q, &mut |_, x| {
+            sum += last.distance(x);
+            last = x;
+        });
+        sum += last.distance(chart.position(b));
+        assert!((sum - run * 2f64.sqrt()).abs() < 1e-12, "{sum}");
+    }
+}

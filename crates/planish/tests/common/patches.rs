@@ -256,66 +256,6 @@ pub fn read_ply(path: &std::path::Path) -> TriMesh {
     TriMesh::new(points, triangles)
 }
 
-/// A disk of up to `size` faces grown around face `seed`, nearest first, with corners at quarters of its boundary.
-pub fn grow(name: &str, input: &TriMesh, seed: u32, size: usize) -> Sheet {
-    let adjacency = Adjacency::new(input);
-    let center = |f: u32| input.corners(f as usize).iter().sum::<DVec3>() / 3.0;
-    let mut faces = vec![];
-    let mut taken = vec![false; input.triangles.len()];
-    let mut uses = vec![0u32; input.points.len()];
-    // Distances along the dual graph; a face joins if it meets the disk in one connected path.
-    let mut heap = std::collections::BinaryHeap::from([(std::cmp::Reverse(0u64), seed)]);
-    let mut held: Vec<(u64, u32)> = vec![];
-    while faces.len() < size {
-        let Some((std::cmp::Reverse(distance), f)) = heap.pop() else { break };
-        if taken[f as usize] {
-            continue;
-        }
-        let triangle = input.triangles[f as usize];
-        let neighbours: Vec<u32> = (0..3).map(|k| adjacency.opposite[3 * f as usize + k]).collect();
-        let joined: Vec<bool> = neighbours.iter().map(|&h| h != NONE && taken[h as usize / 3]).collect();
-        let edges = joined.iter().filter(|j| **j).count();
-        let vertices = triangle.iter().filter(|&&v| uses[v as usize] > 0).count();
-        let fits = faces.is_empty() || (edges == 1 && vertices == 2) || (edges == 2 && vertices == 3);
-        if !fits {
-            held.push((distance, f));
-            continue;
-        }
-        taken[f as usize] = true;
-        faces.push(f);
-        for v in triangle {
-            uses[v as usize] += 1;
-        }
-        for h in neighbours.into_iter().filter(|&h| h != NONE) {
-            let step = (center(f).distance(center(h / 3)) * 1e9) as u64;
-            heap.push((std::cmp::Reverse(distance + step), h / 3));
-        }
-        if faces.len() % 64 == 0 {
-            heap.extend(held.drain(..).map(|(d, f)| (std::cmp::Reverse(d), f)));
-        }
-    }
-    faces.sort_unstable();
-    let first = faces.iter().flat_map(|&f| [3 * f, 3 * f + 1, 3 * f + 2]).find(|&h| {
-        let g = adjacency.opposite[h as usize];
-        g == NONE || !taken[g as usize / 3]
-    });
-    let first = input.triangles[first.unwrap() as usize / 3][first.unwrap() as usize % 3];
-    let whole = cut(input, &faces, [first; 4]);
-    let rim = &whole.sides[0];
-    let mut sums = vec![0.0];
-    for w in rim.windows(2) {
-        sums.push(sums.last().unwrap() + whole.mesh.points[w[0] as usize].distance(whole.mesh.points[w[1] as usize]));
-    }
-    let total = *sums.last().unwrap();
-    let corners = [0, 1, 2, 3].map(|k| {
-        let at = sums.partition_point(|s| *s < total * (k as f64 / 4.0)).min(rim.len() - 2);
-        let place = whole.origin[rim[at] as usize];
-        let k = place.bary.iter().position(|b| *b == 1.0).unwrap();
-        input.triangles[place.face as usize][k]
-    });
-    Sheet { name: name.into(), patch: cut(input, &faces, corners), input: input.clone() }
-}
-
 /// The part of `input` around the first corner of face `seed` within a ball of `radius`, cut along the ball's
 /// surface; `None` if that part is not a disk. Corners at quarters of its boundary.
 pub fn disk(name: &str, input: &TriMesh, seed: u32, radius: f64) -> Option<Sheet> {
