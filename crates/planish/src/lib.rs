@@ -7,6 +7,7 @@ pub mod geom;
 pub mod grid;
 pub mod linalg;
 pub mod mesh;
+pub mod model;
 pub mod network;
 pub mod observe;
 pub mod relief;
@@ -14,4 +15,5 @@ pub mod render;
 pub mod surface;
 
 pub use glam::{DVec2, DVec3};
+pub use model::{HistoryEntry, Model, Units, UnknownUnit};
 pub use observe::{Observer, Silent};
