@@ -1,1 +1,3 @@
-//! x
+//! Everything that enters or leaves planish.
+
+pub mod report;

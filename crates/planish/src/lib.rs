@@ -10,6 +10,7 @@ pub mod mesh;
 pub mod model;
 pub mod network;
 pub mod observe;
+pub mod pipeline;
 pub mod relief;
 pub mod render;
 pub mod surface;
