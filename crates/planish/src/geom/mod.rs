@@ -1,7 +1,8 @@
-//! Ground floor: boxes, trees and the one tolerance.
+//! Ground floor: boxes, trees, random numbers and the one tolerance.
 
 mod aabb;
 mod bvh;
+pub mod random;
 pub mod tolerance;
 
 pub use aabb::Aabb;

@@ -1,8 +1,34 @@
-//! Spring grids: a four-sided patch resampled to a regular grid on the mesh.
+//! Spring grids: a four-sided patch resampled to a regular grid of points that lie on the mesh.
+//!
+//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, ch. 5.
+//! 1. sides resampled by arc length      - §5.4, [`side`]
+//! 2. start grid                         - §5.4, [`chart`]: a convex map of the patch to the unit square
+//! 3. relax, subdivide, relax            - §5.5 and 5.6, [`springs`]
+//! 4. number of points along every side  - §5.6, [`sizes`]
+//!
+//! Departs from [K98]: the start is a convex map instead of crossings of shortest paths (those cross twice or run
+//! along a side on curved patches and fold the grid), and points move in that chart, where every step can be
+//! checked exactly for folds, instead of walking over the triangles.
 
-use crate::mesh::FacePoint;
+mod chart;
+mod locate;
+mod quality;
+mod side;
+mod sizes;
+mod springs;
+
+pub use quality::{GridQuality, measure};
+pub use sizes::choose_sizes;
+
+use crate::mesh::{FacePoint, TriMesh};
+use crate::network::PatchMesh;
+use crate::observe::Observer;
 use glam::DVec3;
+use locate::Spot;
+use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A patch resampled to `rows x cols` points of the mesh.
 ///
@@ -18,4 +44,180 @@ pub struct Grid {
     pub points: Vec<DVec3>,
     /// The same points as places on the input mesh.
     pub places: Vec<FacePoint>,
+}
+
+/// How patches are resampled.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct GridParams {
+    /// Grid points per vertex of the patches, over the whole network.
+    #[schemars(range(min = 0.01, max = 100.0), extend("unit" = "points per vertex"))]
+    pub density: f64,
+    /// Least number of points along a side.
+    #[schemars(range(min = 4, max = 1025))]
+    pub min_side: usize,
+    /// Greatest number of points along a side.
+    #[schemars(range(min = 4, max = 8193))]
+    pub max_side: usize,
+    /// Greatest number of points of all grids together; the density gives way.
+    #[schemars(range(min = 1000))]
+    pub max_points: usize,
+}
+
+impl Default for GridParams {
+    fn default() -> GridParams {
+        GridParams { density: 1.0, min_side: 17, max_side: 1025, max_points: 8_000_000 }
+    }
+}
+
+/// Why patches could not be resampled.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GridError {
+    /// The number of sizes is not the number of patches.
+    #[error("{patches} patches but {sizes} grid sizes; give one size per patch")]
+    SizeCount {
+        /// Patches given.
+        patches: usize,
+        /// Sizes given.
+        sizes: usize,
+    },
+    /// A grid needs two points in each direction.
+    #[error("patch {patch} was asked for a grid of {cols} x {rows} points; give at least 2 x 2")]
+    TooSmall {
+        /// Index of the patch.
+        patch: usize,
+        /// Points along `u`.
+        cols: usize,
+        /// Points along `v`.
+        rows: usize,
+    },
+    /// A patch mesh is not a disk with four sides.
+    #[error("patch {patch} is not a disk with four sides: {reason}; cut it anew from its network")]
+    NotADisk {
+        /// Index of the patch.
+        patch: usize,
+        /// What is wrong.
+        reason: &'static str,
+    },
+    /// A side has no length.
+    #[error("side {side} of patch {patch} has no length; move its corners apart")]
+    DegenerateSide {
+        /// Index of the patch.
+        patch: usize,
+        /// Side, 0 to 3.
+        side: usize,
+    },
+    /// The patch could not be flattened without folds.
+    #[error("patch {patch} could not be flattened: {triangles} triangles stay folded; divide it by another curve")]
+    Folded {
+        /// Index of the patch.
+        patch: usize,
+        /// Triangles with the wrong orientation.
+        triangles: usize,
+    },
+    /// The observer no longer wanted the result.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// What is wrong with one patch; becomes a [`GridError`] with its index.
+#[derive(Debug)]
+enum Fault {
+    NotADisk(&'static str),
+    DegenerateSide(usize),
+    Folded(usize),
+    Cancelled,
+}
+
+impl Fault {
+    fn of_patch(self, patch: usize) -> GridError {
+        match self {
+            Fault::NotADisk(reason) => GridError::NotADisk { patch, reason },
+            Fault::DegenerateSide(side) => GridError::DegenerateSide { patch, side },
+            Fault::Folded(triangles) => GridError::Folded { patch, triangles },
+            Fault::Cancelled => GridError::Cancelled,
+        }
+    }
+}
+
+/// Resamples every patch to a regular grid of points on the mesh.
+///
+/// * `input` - the mesh that places refer to
+/// * `patches` - exact sub-meshes of `input`
+/// * `sizes` - for each patch `(cols, rows)`, points along `u` and `v`, see [`choose_sizes`]
+///
+/// Returns one grid per patch. Points on a side lie at equal arc length and have the same bits in both patches of
+/// a curve if those have the same number of points along it.
+/// # Errors
+/// See [`GridError`]; of several faulty patches the first is reported.
+/// Source: [K98] §5.4 to 5.6.
+pub fn relax(
+    input: &TriMesh,
+    patches: &[PatchMesh],
+    sizes: &[(usize, usize)],
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<Vec<Grid>, GridError> {
+    if patches.len() != sizes.len() {
+        return Err(GridError::SizeCount { patches: patches.len(), sizes: sizes.len() });
+    }
+    let total: usize = patches.iter().map(|p| p.mesh.triangles.len()).sum::<usize>().max(1);
+    let done = AtomicUsize::new(0);
+    let results: Vec<Result<Grid, GridError>> = (patches, sizes)
+        .into_par_iter()
+        .enumerate()
+        .with_max_len(1)
+        .map(|(k, (patch, &(cols, rows)))| {
+            if observer.cancelled() {
+                return Err(GridError::Cancelled);
+            }
+            if cols < 2 || rows < 2 {
+                return Err(GridError::TooSmall { patch: k, cols, rows });
+            }
+            let grid = relax_patch(input, patch, cols, rows, params, observer).map_err(|f| f.of_patch(k))?;
+            let size = patch.mesh.triangles.len();
+            observer.progress((done.fetch_add(size, Ordering::Relaxed) + size) as f64 / total as f64);
+            Ok(grid)
+        })
+        .collect();
+    results.into_iter().collect()
+}
+
+fn relax_patch(
+    input: &TriMesh,
+    patch: &PatchMesh,
+    cols: usize,
+    rows: usize,
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<Grid, Fault> {
+    let cancelled = || observer.cancelled();
+    let chart = chart::flatten(input, patch, &cancelled)?;
+    let spots = springs::relax(&chart, cols, rows, params, &cancelled)?;
+    let mut grid = Grid {
+        rows,
+        cols,
+        points: spots.iter().map(|&s| chart.position(s)).collect(),
+        places: spots.iter().map(|&s| chart.place(s)).collect(),
+    };
+    for (k, chain) in patch.sides.iter().enumerate() {
+        let count = if k % 2 == 0 { cols } else { rows };
+        let points: Vec<DVec3> = chain.iter().map(|&v| patch.mesh.points[v as usize]).collect();
+        let samples = side::resample(&points, count);
+        for n in 0..count {
+            let node = match k {
+                0 => n,
+                1 => n * cols + cols - 1,
+                2 => (rows - 1) * cols + cols - 1 - n,
+                _ => (rows - 1 - n) * cols,
+            };
+            let (triangle, corner) = chart.rim[k][samples.segment[n] as usize];
+            let mut bary = [0.0; 3];
+            bary[corner as usize] = 1.0 - samples.fraction[n];
+            bary[(corner as usize + 1) % 3] = samples.fraction[n];
+            grid.points[node] = samples.points[n];
+            grid.places[node] = chart.place(Spot { triangle, bary });
+        }
+    }
+    Ok(grid)
 }

@@ -4,6 +4,13 @@ use faer::linalg::solvers::SolveCore;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMat, Triplet};
 use faer::{Conj, MatMut, Side};
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Duration;
+
+/// Unknowns from which a factorisation may take longer than the time in which a stage must notice cancelling.
+const WATCHED_SIZE: usize = 30_000;
+/// How often a running factorisation asks whether it is still wanted.
+const WATCH_EVERY: Duration = Duration::from_millis(40);
 
 /// Why a system could not be solved.
 #[derive(Debug, thiserror::Error)]
@@ -41,6 +48,33 @@ impl SparseCholesky {
         let factor = Llt::try_new_with_symbolic(symbolic, matrix.as_ref(), Side::Lower)
             .map_err(|_| SparseError::NotPositive { n })?;
         Ok(SparseCholesky { n, factor })
+    }
+
+    /// As [`SparseCholesky::factor`], but gives up with `None` as soon as `cancelled` says so. A large matrix is
+    /// factored on a thread of its own; after giving up that thread ends by itself with its result unused.
+    /// # Errors
+    /// As [`SparseCholesky::factor`].
+    pub fn factor_watched(
+        n: usize,
+        lower: Vec<(usize, usize, f64)>,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Option<Result<SparseCholesky, SparseError>> {
+        if n < WATCHED_SIZE {
+            return (!cancelled()).then(|| SparseCholesky::factor(n, &lower));
+        }
+        let (send, receive) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            // The receiver is gone after cancelling; nobody then wants the factor.
+            let _ = send.send(SparseCholesky::factor(n, &lower));
+        });
+        loop {
+            match receive.recv_timeout(WATCH_EVERY) {
+                Ok(result) => return Some(result),
+                Err(RecvTimeoutError::Timeout) if cancelled() => return None,
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Some(Err(SparseError::NotPositive { n })),
+            }
+        }
     }
 
     /// Solves in place for `rhs.len() / n` right-hand sides stored one after the other.

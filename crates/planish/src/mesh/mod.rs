@@ -1,7 +1,10 @@
 //! Triangle meshes: flat arrays, adjacency, places on the surface.
 
 mod adjacency;
+mod demo;
 mod face_point;
+mod rings;
+pub mod shapes;
 
 pub use adjacency::{Adjacency, NONE, next, previous};
 pub use face_point::FacePoint;

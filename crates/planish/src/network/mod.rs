@@ -1,5 +1,12 @@
 //! Networks: corners, curves and four-sided patches on a mesh.
 
+pub(crate) mod disk;
+pub(crate) mod imprint;
+mod layout;
+
+pub use imprint::{ImprintError, imprint};
+pub use layout::{LayoutError, LayoutParams, layout};
+
 use crate::mesh::{FacePoint, TriMesh};
 use serde::{Deserialize, Serialize};
 

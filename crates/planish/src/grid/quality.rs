@@ -1,0 +1,132 @@
+//! How good a grid is.
+
+use super::Grid;
+use crate::geom::{Aabb, Bvh};
+use crate::mesh::TriMesh;
+use crate::network::PatchMesh;
+use glam::DVec3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Measures of one grid, see [`measure`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GridQuality {
+    /// Cells that turn over against the surface.
+    pub folds: usize,
+    /// Standard deviation over mean of the spacing along an iso-curve, mean over all iso-curves.
+    pub spacing_cv: f64,
+    /// The same for the worst iso-curve.
+    pub spacing_cv_worst: f64,
+    /// Deviation of the angles of cells from a right angle that 95 % of the cells stay within, degrees.
+    pub angle_p95_deg: f64,
+    /// Standard deviation over mean of the areas of the cells.
+    pub area_cv: f64,
+    /// Greatest distance of a vertex of the patch from the grid's surface, over the diagonal of the patch.
+    pub miss_max: f64,
+    /// Root mean square of these distances, over the diagonal of the patch.
+    pub miss_rms: f64,
+}
+
+/// Measures `grid` against its `patch`.
+///
+/// The grid's surface has two triangles per cell, divided along the shorter diagonal. A cell counts as a fold if any
+/// of its four corner triangles points against the mean normal of its neighbourhood, the sum of the area vectors of
+/// the cells up to [`FOLD_REACH`] away: rough relief tilts single cells, but only a fold turns one right over. (That
+/// the grid is one-to-one on the patch is a matter of construction: `relax` checks the orientation of every cell in
+/// the chart exactly.)
+pub fn measure(grid: &Grid, patch: &PatchMesh) -> GridQuality {
+    let (rows, cols) = (grid.rows, grid.cols);
+    let at = |i: usize, j: usize| grid.points[j * cols + i];
+    let mut variations: Vec<f64> =
+        (0..rows).map(|j| variation((1..cols).map(|i| at(i - 1, j).distance(at(i, j))))).collect();
+    variations.extend((0..cols).map(|i| variation((1..rows).map(|j| at(i, j - 1).distance(at(i, j))))));
+    let mut angles: Vec<f64> = Vec::with_capacity((rows - 1) * (cols - 1));
+    let mut areas = Vec::with_capacity(angles.capacity());
+    for j in 0..rows - 1 {
+        for i in 0..cols - 1 {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            let (e, f) = (b - a + c - d, d - a + c - b);
+            areas.push(cell_vector([a, b, c, d]).length());
+            let sides = e.length() * f.length();
+            angles.push(if sides > 0.0 { (e.dot(f) / sides).clamp(-1.0, 1.0).asin().abs().to_degrees() } else { 90.0 });
+        }
+    }
+    angles.sort_by(f64::total_cmp);
+    let (miss_max, miss_rms) = miss(grid, patch);
+    GridQuality {
+        folds: folds(grid),
+        spacing_cv: variations.iter().sum::<f64>() / variations.len() as f64,
+        spacing_cv_worst: variations.iter().copied().fold(0.0, f64::max),
+        angle_p95_deg: angles[(angles.len() * 95 / 100).min(angles.len() - 1)],
+        area_cv: variation(areas.into_iter()),
+        miss_max,
+        miss_rms,
+    }
+}
+
+/// Cells to each side that make up the neighbourhood of the fold test.
+pub const FOLD_REACH: usize = 2;
+
+/// Twice the area vector of a cell.
+fn cell_vector([a, b, c, d]: [DVec3; 4]) -> DVec3 {
+    (c - a).cross(d - b)
+}
+
+fn folds(grid: &Grid) -> usize {
+    let (m, n) = (grid.cols - 1, grid.rows - 1);
+    let corners = |i: usize, j: usize| {
+        let k = j * grid.cols + i;
+        [k, k + 1, k + 1 + grid.cols, k + grid.cols].map(|k| grid.points[k])
+    };
+    let mut count = 0;
+    for j in 0..n {
+        for i in 0..m {
+            let mut normal = DVec3::ZERO;
+            for y in j.saturating_sub(FOLD_REACH)..(j + FOLD_REACH + 1).min(n) {
+                for x in i.saturating_sub(FOLD_REACH)..(i + FOLD_REACH + 1).min(m) {
+                    normal += cell_vector(corners(x, y));
+                }
+            }
+            let q = corners(i, j);
+            let turned = |k: usize| {
+                let (p, a, b) = (q[k], q[(k + 1) % 4], q[(k + 3) % 4]);
+                (a - p).cross(b - p).dot(normal) < 0.0
+            };
+            count += (0..4).any(turned) as usize;
+        }
+    }
+    count
+}
+
+/// Standard deviation over mean.
+fn variation(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let (count, sum) = values.clone().fold((0.0, 0.0), |(n, s), x| (n + 1.0, s + x));
+    let mean = sum / count;
+    let square: f64 = values.map(|x| (x - mean) * (x - mean)).sum();
+    if mean > 0.0 { (square / count).sqrt() / mean } else { 0.0 }
+}
+
+/// Greatest and root mean square distance of the patch's vertices from the grid's surface, over the diagonal.
+fn miss(grid: &Grid, patch: &PatchMesh) -> (f64, f64) {
+    let cols = grid.cols as u32;
+    let mut triangles = Vec::with_capacity(2 * grid.points.len());
+    for j in 0..grid.rows as u32 - 1 {
+        for i in 0..cols - 1 {
+            let a = j * cols + i;
+            let [p, q, r, s] = [a, a + 1, a + 1 + cols, a + cols];
+            let at = |k: u32| grid.points[k as usize];
+            if at(p).distance_squared(at(r)) <= at(q).distance_squared(at(s)) {
+                triangles.extend([[p, q, r], [p, r, s]]);
+            } else {
+                triangles.extend([[p, q, s], [q, r, s]]);
+            }
+        }
+    }
+    let surface = Bvh::new(&TriMesh::new(grid.points.clone(), triangles));
+    let points = &patch.mesh.points;
+    let distances: Vec<f64> = points.par_iter().map(|&p| surface.closest(p).distance).collect();
+    let diagonal = Aabb::of(points).diagonal().max(f64::MIN_POSITIVE);
+    let square: f64 = distances.iter().map(|d| d * d).sum();
+    let greatest = distances.iter().copied().fold(0.0, f64::max);
+    (greatest / diagonal, (square / distances.len().max(1) as f64).sqrt() / diagonal)
+}

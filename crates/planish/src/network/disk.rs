@@ -1,0 +1,257 @@
+//! Disks cut out of a mesh: their own numbering, a convex map to the plane, straight lines in it.
+//!
+//! The map is Tutte's: boundary on a circle, every inner vertex a positive average of its neighbours, which is
+//! one to one whatever the shape. The weights are cotangents kept positive, so it is nearly harmonic.
+
+use crate::linalg::SparseCholesky;
+use crate::mesh::{Adjacency, NONE, next, previous};
+use glam::{DVec2, DVec3};
+use robust::{Coord, orient2d};
+use std::collections::HashMap;
+
+/// Least weight of an edge in the map, against the cotangent weight 1 of a right isosceles triangle: keeps
+/// the map one to one where triangles are obtuse.
+const LEAST_WEIGHT: f64 = 0.05;
+
+/// Greatest weight: a sliver must not outweigh all its neighbours by more than the solver's digits.
+const GREATEST_WEIGHT: f64 = 1e4;
+
+/// A disk of triangles, cut open along its boundary.
+#[derive(Clone, Debug)]
+pub(crate) struct Disk {
+    /// Triangles over the disk's own vertices.
+    pub triangles: Vec<[u32; 3]>,
+    /// For each of its vertices the vertex of the mesh.
+    pub vertices: Vec<u32>,
+    /// For each of its triangles the face of the mesh.
+    pub faces: Vec<u32>,
+    /// Its boundary, counter-clockwise, from the start of the first half-edge given.
+    pub boundary: Vec<u32>,
+    /// Its own adjacency.
+    pub adjacency: Adjacency,
+}
+
+impl Disk {
+    /// The disk of `faces` (sorted), cut open at the half-edges for which `barrier` holds; its boundary starts
+    /// with half-edge `start` of the mesh. `None` if it is not a disk.
+    pub fn new(
+        triangles: &[[u32; 3]],
+        adjacency: &Adjacency,
+        faces: &[u32],
+        barrier: impl Fn(u32) -> bool,
+        start: u32,
+    ) -> Option<Disk> {
+        let local: HashMap<u32, u32> = faces.iter().enumerate().map(|(i, &f)| (f, i as u32)).collect();
+        let mut opposite = vec![NONE; 3 * faces.len()];
+        for (i, &f) in faces.iter().enumerate() {
+            for k in 0..3 {
+                let h = 3 * f + k;
+                let o = adjacency.opposite[h as usize];
+                if !barrier(h) && o != NONE {
+                    if let Some(&j) = local.get(&(o / 3)) {
+                        opposite[3 * i + k as usize] = 3 * j + o % 3;
+                    } else {
+                        return None; // the region leaks
+                    }
+                }
+            }
+        }
+        let mut own = vec![NONE; 3 * faces.len()];
+        let mut vertices = Vec::new();
+        let mut outgoing = Vec::new();
+        for h in 0..own.len() as u32 {
+            if own[h as usize] != NONE {
+                continue;
+            }
+            let mut first = h;
+            loop {
+                let o = opposite[first as usize];
+                if o == NONE || next(o) == h {
+                    break;
+                }
+                first = next(o);
+            }
+            let name = vertices.len() as u32;
+            vertices.push(triangles[faces[h as usize / 3] as usize][h as usize % 3]);
+            outgoing.push(first);
+            let mut g = first;
+            loop {
+                own[g as usize] = name;
+                let turned = opposite[previous(g) as usize];
+                if turned == NONE || turned == first {
+                    break;
+                }
+                g = turned;
+            }
+        }
+        let triangles: Vec<[u32; 3]> = own.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+        let first = 3 * *local.get(&(start / 3))? + start % 3;
+        let mut boundary = Vec::new();
+        let mut h = first;
+        loop {
+            if opposite[h as usize] != NONE || boundary.len() > own.len() {
+                return None;
+            }
+            boundary.push(own[h as usize]);
+            h = next(h);
+            while opposite[h as usize] != NONE {
+                h = next(opposite[h as usize]);
+            }
+            if h == first {
+                break;
+            }
+        }
+        let open = opposite.iter().filter(|&&o| o == NONE).count();
+        let euler = vertices.len() as i64 - (3 * faces.len() + open) as i64 / 2 + faces.len() as i64;
+        if open != boundary.len() || euler != 1 {
+            return None;
+        }
+        let adjacency = Adjacency { opposite, outgoing };
+        Some(Disk { triangles, vertices, faces: faces.to_vec(), boundary, adjacency })
+    }
+
+    /// Maps the disk into the unit circle; `angles` (radians, rising) are those of the boundary vertices.
+    /// `points` are positions of the mesh's vertices. `None` if the system cannot be solved.
+    pub fn circle_map(&self, points: &[DVec3], angles: &[f64]) -> Option<Vec<DVec2>> {
+        let n = self.vertices.len();
+        let mut uv = vec![DVec2::ZERO; n];
+        let mut unknown = vec![0u32; n];
+        for (&v, &a) in self.boundary.iter().zip(angles) {
+            uv[v as usize] = DVec2::from_angle(a);
+            unknown[v as usize] = NONE;
+        }
+        let mut count = 0u32;
+        for u in unknown.iter_mut().filter(|u| **u != NONE) {
+            *u = count;
+            count += 1;
+        }
+        if count == 0 {
+            return Some(uv);
+        }
+        let m = count as usize;
+        let position = |v: u32| points[self.vertices[v as usize] as usize];
+        let mut lower = Vec::with_capacity(8 * m);
+        let mut diagonal = vec![0.0; m];
+        let mut rhs = vec![0.0; 2 * m];
+        for h in 0..self.adjacency.opposite.len() as u32 {
+            let o = self.adjacency.opposite[h as usize];
+            if o < h {
+                continue;
+            }
+            let (a, b) = (self.from(h), self.from(next(h)));
+            let mut w = 0.0;
+            for g in [h, o].into_iter().filter(|&g| g != NONE) {
+                let apex = position(self.from(previous(g)));
+                let (x, y) = (position(a) - apex, position(b) - apex);
+                w += x.dot(y) / x.cross(y).length().max(f64::MIN_POSITIVE) / 2.0;
+            }
+            let w = if w.is_finite() { w.clamp(LEAST_WEIGHT, GREATEST_WEIGHT) } else { 1.0 };
+            let (i, j) = (unknown[a as usize], unknown[b as usize]);
+            for (x, y, other) in [(i, j, b), (j, i, a)] {
+                if x == NONE {
+                    continue;
+                }
+                diagonal[x as usize] += w;
+                if y == NONE {
+                    rhs[x as usize] += w * uv[other as usize].x;
+                    rhs[m + x as usize] += w * uv[other as usize].y;
+                } else if x > y {
+                    lower.push((x as usize, y as usize, -w));
+                }
+            }
+        }
+        lower.extend(diagonal.iter().enumerate().map(|(i, &d)| (i, i, d)));
+        SparseCholesky::factor(m, &lower).ok()?.solve(&mut rhs);
+        for (v, &u) in unknown.iter().enumerate() {
+            if u != NONE {
+                uv[v] = DVec2::new(rhs[u as usize], rhs[m + u as usize]);
+            }
+        }
+        uv.iter().all(|p| p.is_finite()).then_some(uv)
+    }
+
+    /// Start vertex of half-edge `h`.
+    pub fn from(&self, h: u32) -> u32 {
+        self.triangles[h as usize / 3][h as usize % 3]
+    }
+
+    /// What the straight segment from vertex `a` to vertex `b` meets in the map `uv`, ends excluded. `None`
+    /// if it runs along the boundary or the map is folded there.
+    pub fn straight(&self, uv: &[DVec2], a: u32, b: u32) -> Option<Vec<Met>> {
+        let coord = |v: u32| Coord { x: uv[v as usize].x, y: uv[v as usize].y };
+        let target = coord(b);
+        let mut met = Vec::new();
+        let mut v = a;
+        let mut steps = 0;
+        'vertex: loop {
+            steps += 1;
+            if steps > self.vertices.len() {
+                return None;
+            }
+            let source = coord(v);
+            let mut exit = None;
+            for h in self.adjacency.fan(v) {
+                let (p, q) = (self.from(next(h)), self.from(previous(h)));
+                for (w, edge) in [(p, h), (q, previous(h))] {
+                    if w == b {
+                        let open = self.adjacency.opposite[edge as usize] == NONE;
+                        return if open { None } else { Some(met) };
+                    }
+                }
+                let (right, left) = (orient2d(source, coord(p), target), orient2d(source, coord(q), target));
+                let ahead = |w: u32| (uv[w as usize] - uv[v as usize]).dot(uv[b as usize] - uv[v as usize]) > 0.0;
+                if right == 0.0 && ahead(p) {
+                    exit = Some(Err(p));
+                } else if left == 0.0 && ahead(q) {
+                    exit = Some(Err(q));
+                } else if right > 0.0 && left < 0.0 {
+                    exit = Some(Ok(next(h)));
+                }
+            }
+            let mut edge = match exit? {
+                Err(w) => {
+                    met.push(Met::Vertex(w));
+                    v = w;
+                    continue 'vertex;
+                }
+                Ok(edge) => edge,
+            };
+            loop {
+                steps += 1;
+                if steps > 3 * self.triangles.len() {
+                    return None;
+                }
+                let (p, q) = (self.from(edge), self.from(next(edge)));
+                let (right, left) = (-orient2d(source, target, coord(p)), orient2d(source, target, coord(q)));
+                if right <= 0.0 || left <= 0.0 {
+                    return None;
+                }
+                met.push(Met::Edge(p, q, right / (right + left)));
+                let other = self.adjacency.opposite[edge as usize];
+                if other == NONE {
+                    return None;
+                }
+                let r = self.from(previous(other));
+                if r == b {
+                    return Some(met);
+                }
+                let side = orient2d(source, target, coord(r));
+                if side == 0.0 {
+                    met.push(Met::Vertex(r));
+                    v = r;
+                    continue 'vertex;
+                }
+                edge = if side > 0.0 { next(other) } else { previous(other) };
+            }
+        }
+    }
+}
+
+/// What a straight line meets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Met {
+    /// A vertex of the disk.
+    Vertex(u32),
+    /// The edge between two vertices, the fraction of the way from the first.
+    Edge(u32, u32, f64),
+}

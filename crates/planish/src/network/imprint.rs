@@ -1,0 +1,503 @@
+//! Imprints curves into a mesh: every crossed triangle is split along them, so that each patch becomes an
+//! exact sub-mesh.
+//!
+//! 1. every curve point becomes a vertex: one of the mesh, a new one on an edge, or a new one in a face;
+//! 2. every face with new vertices or a curve through it is triangulated again, alone, with the pieces of the
+//!    curves as constraints; points of an edge are sorted along it, so both faces agree;
+//! 3. the faces on both sides of the curves are flooded and named after the patch they belong to.
+
+use super::disk::{self, Disk};
+use super::{Network, PatchMesh};
+use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
+use glam::DVec3;
+use rayon::prelude::*;
+use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
+use std::collections::HashMap;
+
+/// Outward bulge of the points of an edge in the flat picture of a face, as a fraction of the face. It makes
+/// them strictly convex, so that rounding can neither hide one nor leave a gap along the edge.
+const BULGE: f64 = 1e-7;
+
+/// Barycentric coordinates below this count as zero: the point lies on the edge or at the corner.
+const ON_EDGE: f64 = 1e-12;
+
+/// Why curves could not be imprinted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ImprintError {
+    /// A curve names a face that the mesh does not have.
+    #[error("curve {curve} lies on face {face}, the mesh has {faces} faces - hint: use the mesh that the network was made for")]
+    NoSuchFace {
+        /// Index of the curve.
+        curve: usize,
+        /// Index of the face.
+        face: u32,
+        /// Faces of the mesh.
+        faces: usize,
+    },
+    /// Two neighbouring points of a curve share no face.
+    #[error("curve {curve} jumps at ({x:.6}, {y:.6}, {z:.6}): neighbouring points must share a face - hint: add points between")]
+    Jump {
+        /// Index of the curve.
+        curve: usize,
+        /// Place.
+        x: f64,
+        /// Place.
+        y: f64,
+        /// Place.
+        z: f64,
+    },
+    /// Two curves cross or touch between their ends.
+    #[error("curves cross at ({x:.6}, {y:.6}, {z:.6}) - hint: move one of them apart")]
+    Crossing {
+        /// Place.
+        x: f64,
+        /// Place.
+        y: f64,
+        /// Place.
+        z: f64,
+    },
+    /// The curves around a patch do not bound a disk with these four sides.
+    #[error("patch {patch} is not a disk between its four sides ({why}) - hint: check its curves and their direction")]
+    NotADisk {
+        /// Index of the patch.
+        patch: usize,
+        /// What is wrong.
+        why: &'static str,
+    },
+    /// A part of the mesh belongs to no patch.
+    #[error("{faces} triangles near ({x:.6}, {y:.6}, {z:.6}) belong to no patch - hint: close the network around them")]
+    Uncovered {
+        /// Triangles of the part.
+        faces: usize,
+        /// Place.
+        x: f64,
+        /// Place.
+        y: f64,
+        /// Place.
+        z: f64,
+    },
+}
+
+/// A place on a mesh by what it lies on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Place {
+    /// A vertex.
+    Vertex(u32),
+    /// On the edge with this half-edge (the lower of the two), `t` of the way from its start.
+    Edge(u32, f64),
+    /// Inside a face.
+    Face(FacePoint),
+}
+
+/// A mesh cut along curves.
+#[derive(Clone, Debug)]
+pub(crate) struct Cut {
+    /// The cut mesh; its first vertices are those of the uncut one.
+    pub mesh: TriMesh,
+    /// Where each vertex lies on the uncut mesh.
+    pub origin: Vec<Place>,
+    /// The uncut face that each triangle is a part of.
+    pub parent: Vec<u32>,
+    /// For each curve its vertices.
+    pub chains: Vec<Vec<u32>>,
+}
+
+/// The place of a face point, canonical for all faces that share it.
+pub(crate) fn place_of(adjacency: &Adjacency, triangles: &[[u32; 3]], point: &FacePoint) -> Place {
+    let corner = |k: usize| triangles[point.face as usize][k];
+    let near: Vec<usize> = (0..3).filter(|&k| point.bary[k] > ON_EDGE).collect();
+    match near[..] {
+        [k] => Place::Vertex(corner(k)),
+        [a, b] => {
+            let k = if (a + 1) % 3 == b { a } else { b };
+            let h = 3 * point.face + k as u32;
+            let t = point.bary[(k + 1) % 3] / (point.bary[k] + point.bary[(k + 1) % 3]);
+            canonical(adjacency, h, t)
+        }
+        _ => Place::Face(*point),
+    }
+}
+
+/// The place `t` of the way along half-edge `h`, named by the lower half-edge of the edge.
+pub(crate) fn canonical(adjacency: &Adjacency, h: u32, t: f64) -> Place {
+    let o = adjacency.opposite[h as usize];
+    if o < h { Place::Edge(o, 1.0 - t) } else { Place::Edge(h, t) }
+}
+
+impl Place {
+    /// World position.
+    pub fn position(&self, mesh: &TriMesh) -> DVec3 {
+        match *self {
+            Place::Vertex(v) => mesh.points[v as usize],
+            Place::Edge(h, t) => {
+                let corners = mesh.corners(h as usize / 3);
+                corners[h as usize % 3].lerp(corners[next(h) as usize % 3], t)
+            }
+            Place::Face(p) => p.position(mesh),
+        }
+    }
+
+    /// The same place as a face point of `face`, if it lies on that face.
+    pub fn on_face(&self, adjacency: &Adjacency, triangles: &[[u32; 3]], face: u32) -> Option<FacePoint> {
+        let mut bary = [0.0; 3];
+        match *self {
+            Place::Vertex(v) => bary[triangles[face as usize].iter().position(|&w| w == v)?] = 1.0,
+            Place::Edge(h, t) => {
+                let (k, t) = if h / 3 == face {
+                    ((h % 3) as usize, t)
+                } else {
+                    let o = adjacency.opposite[h as usize];
+                    if o == NONE || o / 3 != face {
+                        return None;
+                    }
+                    ((o % 3) as usize, 1.0 - t)
+                };
+                bary[k] = 1.0 - t;
+                bary[(k + 1) % 3] = t;
+            }
+            Place::Face(p) if p.face == face => bary = p.bary,
+            Place::Face(_) => return None,
+        }
+        Some(FacePoint { face, bary })
+    }
+
+    /// Some face that the place lies on.
+    pub fn some_face(&self, adjacency: &Adjacency) -> u32 {
+        match *self {
+            Place::Vertex(v) => adjacency.outgoing[v as usize] / 3,
+            Place::Edge(h, _) => h / 3,
+            Place::Face(p) => p.face,
+        }
+    }
+}
+
+/// What two places of a curve have in common, if anything.
+pub(crate) fn shared_face(adjacency: &Adjacency, triangles: &[[u32; 3]], a: &Place, b: &Place) -> Option<Shared> {
+    let faces = |p: &Place| -> Vec<u32> {
+        match *p {
+            Place::Vertex(v) => adjacency.fan(v).map(|h| h / 3).collect(),
+            Place::Edge(h, _) => {
+                let o = adjacency.opposite[h as usize];
+                if o == NONE { vec![h / 3] } else { vec![h / 3, o / 3] }
+            }
+            Place::Face(p) => vec![p.face],
+        }
+    };
+    let other = faces(b);
+    let face = faces(a).into_iter().filter(|f| other.contains(f)).min()?;
+    let ends = |h: u32| [triangles[h as usize / 3][h as usize % 3], triangles[h as usize / 3][next(h) as usize % 3]];
+    let along = match (*a, *b) {
+        (Place::Vertex(_), Place::Vertex(_)) => true,
+        (Place::Vertex(v), Place::Edge(h, _)) | (Place::Edge(h, _), Place::Vertex(v)) => ends(h).contains(&v),
+        (Place::Edge(g, _), Place::Edge(h, _)) => g == h,
+        _ => false,
+    };
+    Some(if along { Shared::Edge } else { Shared::Face(face) })
+}
+
+/// What two neighbouring places of a curve have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Shared {
+    /// Both lie on one edge.
+    Edge,
+    /// Both lie on this face and on no common edge.
+    Face(u32),
+}
+
+/// Cuts `mesh` along the curves of `network` into one exact disk sub-mesh per patch.
+/// # Errors
+/// `ImprintError` names the curve or patch that is not in order, with its place.
+pub fn imprint(mesh: &TriMesh, network: &Network) -> Result<Vec<PatchMesh>, ImprintError> {
+    let adjacency = Adjacency::new(mesh);
+    let faces = mesh.triangles.len();
+    let mut curves: Vec<Vec<Place>> = Vec::with_capacity(network.curves.len());
+    for (c, curve) in network.curves.iter().enumerate() {
+        if let Some(p) = curve.points.iter().find(|p| p.face as usize >= faces) {
+            return Err(ImprintError::NoSuchFace { curve: c, face: p.face, faces });
+        }
+        curves.push(curve.points.iter().map(|p| place_of(&adjacency, &mesh.triangles, p)).collect());
+    }
+    let borrowed: Vec<&[Place]> = curves.iter().map(|c| &c[..]).collect();
+    let cut = cut(mesh, &adjacency, &borrowed)?;
+    let cut_adjacency = Adjacency::new(&cut.mesh);
+    let mut barrier = vec![false; 3 * cut.mesh.triangles.len()];
+    let mut left: Vec<Vec<u32>> = Vec::with_capacity(cut.chains.len());
+    let mut right: Vec<Vec<u32>> = Vec::with_capacity(cut.chains.len());
+    for (c, chain) in cut.chains.iter().enumerate() {
+        let (mut l, mut r) = (Vec::new(), Vec::new());
+        for pair in chain.windows(2) {
+            let forward = half_edge(&cut.mesh.triangles, &cut_adjacency, pair[0], pair[1]);
+            let backward = half_edge(&cut.mesh.triangles, &cut_adjacency, pair[1], pair[0]);
+            if forward.is_none() && backward.is_none() {
+                let p = cut.mesh.points[pair[0] as usize];
+                return Err(ImprintError::Jump { curve: c, x: p.x, y: p.y, z: p.z });
+            }
+            for h in [forward, backward].into_iter().flatten() {
+                barrier[h as usize] = true;
+            }
+            l.push(forward.unwrap_or(NONE));
+            r.push(backward.unwrap_or(NONE));
+        }
+        r.reverse();
+        left.push(l);
+        right.push(r);
+    }
+    let side_edges = |p: usize, k: usize| {
+        let side = network.patches[p].sides[k];
+        if side.reversed { &right[side.curve as usize] } else { &left[side.curve as usize] }
+    };
+    let mut seeds = Vec::new();
+    for p in 0..network.patches.len() {
+        for k in 0..4 {
+            for &h in side_edges(p, k) {
+                if h == NONE {
+                    return Err(ImprintError::NotADisk { patch: p, why: "a side has no surface on its left" });
+                }
+                seeds.push((h, p as u32));
+            }
+        }
+    }
+    let name = flood(&cut, &cut_adjacency, &barrier, &seeds)
+        .map_err(|(a, _)| ImprintError::NotADisk { patch: a as usize, why: "it runs into another patch" })?;
+    let mut members = vec![Vec::new(); network.patches.len()];
+    let mut lost = Vec::new();
+    for (f, &p) in name.iter().enumerate() {
+        if p == NONE { lost.push(f) } else { members[p as usize].push(f as u32) }
+    }
+    if let Some(&f) = lost.first() {
+        let p = cut.mesh.corners(f)[0];
+        return Err(ImprintError::Uncovered { faces: lost.len(), x: p.x, y: p.y, z: p.z });
+    }
+    members
+        .par_iter()
+        .enumerate()
+        .map(|(p, faces)| {
+            let not = |why| ImprintError::NotADisk { patch: p, why };
+            let first = *side_edges(p, 0).first().ok_or(not("a side has no length"))?;
+            let disk = Disk::new(&cut.mesh.triangles, &cut_adjacency, faces, |h| barrier[h as usize], first)
+                .ok_or(not("it has a hole or a handle"))?;
+            let counts: [usize; 4] = std::array::from_fn(|k| side_edges(p, k).len());
+            if counts.contains(&0) || counts.iter().sum::<usize>() != disk.boundary.len() {
+                return Err(not("its sides do not close"));
+            }
+            let mut at = 0;
+            let sides = counts.map(|n| {
+                let side = (at..=at + n).map(|i| disk.boundary[i % disk.boundary.len()]).collect();
+                at += n;
+                side
+            });
+            Ok(patch_mesh(mesh, &adjacency, &cut, &disk, sides))
+        })
+        .collect()
+}
+
+/// A patch as a mesh of its own.
+fn patch_mesh(mesh: &TriMesh, adjacency: &Adjacency, cut: &Cut, disk: &disk::Disk, sides: [Vec<u32>; 4]) -> PatchMesh {
+    let face_origin: Vec<u32> = disk.faces.iter().map(|&f| cut.parent[f as usize]).collect();
+    let mut origin = vec![FacePoint::corner(0, 0); disk.vertices.len()];
+    for (triangle, &face) in disk.triangles.iter().zip(&face_origin) {
+        for &v in triangle {
+            let place = cut.origin[disk.vertices[v as usize] as usize];
+            origin[v as usize] = place.on_face(adjacency, &mesh.triangles, face).expect("a corner lies on its own face");
+        }
+    }
+    let points = disk.vertices.iter().map(|&v| cut.mesh.points[v as usize]).collect();
+    PatchMesh { mesh: TriMesh::new(points, disk.triangles.clone()), origin, face_origin, sides }
+}
+
+/// Cuts `mesh` along `curves`.
+/// # Errors
+/// `Jump` where neighbouring places share no face, `Crossing` where two curves cross.
+pub(crate) fn cut(mesh: &TriMesh, adjacency: &Adjacency, curves: &[&[Place]]) -> Result<Cut, ImprintError> {
+    let mut points = mesh.points.clone();
+    let mut origin: Vec<Place> = (0..points.len() as u32).map(Place::Vertex).collect();
+    let mut on_edge: HashMap<u32, Vec<(f64, u32)>> = HashMap::new();
+    let mut in_face: HashMap<u32, Vec<(FacePoint, u32)>> = HashMap::new();
+    let mut segments: HashMap<u32, Vec<[u32; 2]>> = HashMap::new();
+    let mut chains = Vec::with_capacity(curves.len());
+    for (c, curve) in curves.iter().enumerate() {
+        let mut chain: Vec<u32> = Vec::with_capacity(curve.len());
+        for place in curve.iter() {
+            let mut add = |points: &mut Vec<DVec3>| {
+                points.push(place.position(mesh));
+                origin.push(*place);
+                points.len() as u32 - 1
+            };
+            let v = match *place {
+                Place::Vertex(v) => v,
+                Place::Edge(h, t) => {
+                    let list = on_edge.entry(h).or_default();
+                    match list.iter().find(|x| x.0 == t) {
+                        Some(&(_, v)) => v,
+                        None => {
+                            let v = add(&mut points);
+                            list.push((t, v));
+                            v
+                        }
+                    }
+                }
+                Place::Face(p) => {
+                    let list = in_face.entry(p.face).or_default();
+                    match list.iter().find(|x| x.0 == p) {
+                        Some(&(_, v)) => v,
+                        None => {
+                            let v = add(&mut points);
+                            list.push((p, v));
+                            v
+                        }
+                    }
+                }
+            };
+            chain.push(v);
+        }
+        for (i, pair) in curve.windows(2).enumerate() {
+            match shared_face(adjacency, &mesh.triangles, &pair[0], &pair[1]) {
+                Some(Shared::Face(f)) => segments.entry(f).or_default().push([chain[i], chain[i + 1]]),
+                Some(Shared::Edge) => {}
+                None => {
+                    let p = points[chain[i] as usize];
+                    return Err(ImprintError::Jump { curve: c, x: p.x, y: p.y, z: p.z });
+                }
+            }
+        }
+        chains.push(chain);
+    }
+    for list in on_edge.values_mut() {
+        list.sort_by(|a, b| a.0.total_cmp(&b.0));
+    }
+    let mut touched = vec![false; mesh.triangles.len()];
+    for &h in on_edge.keys() {
+        touched[h as usize / 3] = true;
+        let o = adjacency.opposite[h as usize];
+        if o != NONE {
+            touched[o as usize / 3] = true;
+        }
+    }
+    for &f in in_face.keys().chain(segments.keys()) {
+        touched[f as usize] = true;
+    }
+    let split: Vec<u32> = (0..touched.len() as u32).filter(|&f| touched[f as usize]).collect();
+    let pieces: Vec<Vec<[u32; 3]>> = split
+        .par_iter()
+        .map(|&f| split_face(f, mesh, adjacency, &on_edge, &in_face, &segments, &points))
+        .collect::<Result<_, _>>()?;
+    let mut triangles = Vec::with_capacity(mesh.triangles.len() + 3 * split.len());
+    let mut parent = Vec::with_capacity(triangles.capacity());
+    for f in (0..mesh.triangles.len()).filter(|&f| !touched[f]) {
+        triangles.push(mesh.triangles[f]);
+        parent.push(f as u32);
+    }
+    for (&f, piece) in split.iter().zip(&pieces) {
+        triangles.extend_from_slice(piece);
+        parent.extend(std::iter::repeat_n(f, piece.len()));
+    }
+    Ok(Cut { mesh: TriMesh::new(points, triangles), origin, parent, chains })
+}
+
+/// Triangulates one face with its new vertices and curve pieces.
+fn split_face(
+    f: u32,
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    on_edge: &HashMap<u32, Vec<(f64, u32)>>,
+    in_face: &HashMap<u32, Vec<(FacePoint, u32)>>,
+    segments: &HashMap<u32, Vec<[u32; 2]>>,
+    points: &[DVec3],
+) -> Result<Vec<[u32; 3]>, ImprintError> {
+    const CORNERS: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+    const OUT: [[f64; 2]; 3] = [[0.0, -1.0], [1.0, 1.0], [-1.0, 0.0]];
+    let mut names = Vec::new();
+    let mut flat = Vec::new();
+    for k in 0..3 {
+        names.push(mesh.triangles[f as usize][k]);
+        flat.push(Point2::new(CORNERS[k][0], CORNERS[k][1]));
+        let h = 3 * f + k as u32;
+        let o = adjacency.opposite[h as usize];
+        let mine = on_edge.get(&if o < h { o } else { h }).map_or(&[][..], |l| &l[..]);
+        let (a, b) = (CORNERS[k], CORNERS[(k + 1) % 3]);
+        for &(t, v) in mine {
+            let t = if o < h { 1.0 - t } else { t };
+            let bulge = BULGE * t * (1.0 - t);
+            names.push(v);
+            flat.push(Point2::new(
+                a[0] + (b[0] - a[0]) * t + OUT[k][0] * bulge,
+                a[1] + (b[1] - a[1]) * t + OUT[k][1] * bulge,
+            ));
+        }
+    }
+    for (p, v) in in_face.get(&f).map_or(&[][..], |l| &l[..]) {
+        names.push(*v);
+        flat.push(Point2::new(p.bary[1], p.bary[2]));
+    }
+    let crossing = |v: u32| {
+        let p = points[v as usize];
+        ImprintError::Crossing { x: p.x, y: p.y, z: p.z }
+    };
+    let mut cdt = ConstrainedDelaunayTriangulation::<Point2<f64>>::new();
+    let mut handles = Vec::with_capacity(flat.len());
+    let mut owner = Vec::with_capacity(flat.len());
+    for (p, &v) in flat.iter().zip(&names) {
+        let handle = cdt.insert(*p).map_err(|_| crossing(v))?;
+        if handle.index() != owner.len() {
+            return Err(crossing(v)); // two points of one place
+        }
+        owner.push(v);
+        handles.push((v, handle));
+    }
+    handles.sort_by_key(|x| x.0);
+    let handle_of = |v: u32| handles[handles.binary_search_by_key(&v, |x| x.0).expect("a point of the face")].1;
+    for &[a, b] in segments.get(&f).map_or(&[][..], |l| &l[..]) {
+        let (x, y) = (handle_of(a), handle_of(b));
+        if cdt.try_add_constraint(x, y).is_empty() && !cdt.exists_constraint(x, y) {
+            return Err(crossing(a));
+        }
+    }
+    Ok(cdt.inner_faces().map(|t| t.vertices().map(|v| owner[v.index()])).collect())
+}
+
+/// Names the faces of a cut mesh: `seeds` are `(chain edge start, chain edge end, name)`, the face to the left
+/// of that edge bears the name. Returns for each face its name or [`NONE`].
+/// # Errors
+/// The pair of names that met in one part.
+pub(crate) fn flood(
+    cut: &Cut,
+    adjacency: &Adjacency,
+    barrier: &[bool],
+    seeds: &[(u32, u32)],
+) -> Result<Vec<u32>, (u32, u32)> {
+    let mut name = vec![NONE; cut.mesh.triangles.len()];
+    let mut stack = Vec::new();
+    for &(h, label) in seeds {
+        let f = h / 3;
+        if name[f as usize] == label {
+            continue;
+        }
+        if name[f as usize] != NONE {
+            return Err((name[f as usize], label));
+        }
+        name[f as usize] = label;
+        stack.push(f);
+        while let Some(f) = stack.pop() {
+            for g in 3 * f..3 * f + 3 {
+                let o = adjacency.opposite[g as usize];
+                if barrier[g as usize] || o == NONE {
+                    continue;
+                }
+                match name[o as usize / 3] {
+                    NONE => {
+                        name[o as usize / 3] = label;
+                        stack.push(o / 3);
+                    }
+                    other if other != label => return Err((other, label)),
+                    _ => {}
+                }
+            }
+        }
+    }
+    Ok(name)
+}
+
+/// The half-edge of `adjacency` from vertex `a` to vertex `b`.
+pub(crate) fn half_edge(triangles: &[[u32; 3]], adjacency: &Adjacency, a: u32, b: u32) -> Option<u32> {
+    adjacency.fan(a).find(|&h| triangles[h as usize / 3][next(h) as usize % 3] == b)
+}

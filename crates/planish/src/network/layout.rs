@@ -1,0 +1,243 @@
+//! Automatic layout: a network of four-sided patches on any manifold mesh.
+//!
+//! 1. feature lines and boundaries are fixed; long edges are split ([`refine`]);
+//! 2. a centroidal partition into disks between the fixed lines ([`partition`], [`outline`]);
+//! 3. all cells are made even and parted into quads ([`polygon`]);
+//! 4. nodes and arcs are relaxed and the connectivity is improved by changes inside the union of a few cells,
+//!    each drawn in a one-to-one map of that union ([`recut`]), so that nothing ever crosses or gets lost.
+
+mod complex;
+mod improve;
+mod lines;
+mod outline;
+mod partition;
+mod polygon;
+mod recut;
+mod refine;
+
+use super::imprint::Shared;
+use super::{Corner, Curve, CurveKind, Network, Patch, Side, imprint};
+use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh};
+use crate::observe::Observer;
+use complex::Complex;
+use recut::Bench;
+use refine::Refined;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Edges of the working mesh against the side of a patch: short enough for a curve to find its way.
+const EDGE_TO_SIDE: f64 = 0.12;
+
+/// Attempts with edges of half the length each, where the working mesh proves too coarse.
+const ATTEMPTS: usize = 5;
+
+/// Attempts at the number of patches asked for: the features decide how many patches a partition gives.
+const COUNT_ATTEMPTS: usize = 3;
+
+/// Parameters of [`layout`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LayoutParams {
+    /// Number of patches to aim at. Feature lines may force more.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub patches: usize,
+    /// Edges whose faces meet at more than this angle are sharp and become patch boundaries.
+    #[schemars(range(min = 1.0, max = 180.0), extend("unit" = "deg"))]
+    pub sharp_angle_deg: f64,
+    /// Connected sharp edges shorter together than this fraction of the diagonal are surface detail.
+    #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "diagonal"))]
+    pub feature_length: f64,
+    /// Rounds of relaxing corners and curves.
+    #[schemars(range(min = 0, max = 50))]
+    pub smoothing: usize,
+}
+
+impl Default for LayoutParams {
+    fn default() -> LayoutParams {
+        LayoutParams { patches: 120, sharp_angle_deg: 40.0, feature_length: 0.05, smoothing: 3 }
+    }
+}
+
+/// Why no layout was made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LayoutError {
+    /// The mesh has no faces.
+    #[error("the mesh has no faces")]
+    Empty,
+    /// The mesh is not an oriented manifold.
+    #[error("{edges} edges of the mesh have more than two faces or faces that disagree - hint: repair the mesh first")]
+    NotManifold {
+        /// Number of such edges.
+        edges: usize,
+    },
+    /// The faces do not allow a network, even when split.
+    #[error("no four-sided network was found on {faces} faces - hint: look for degenerate faces with `planish info`")]
+    Stuck {
+        /// Faces of the mesh.
+        faces: usize,
+    },
+    /// Stopped by the observer.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// Lays a conforming network of four-sided patches on `mesh`, an oriented manifold with or without boundary.
+///
+/// Sharp lines and boundaries lie on patch boundaries; every patch is an exact disk ([`super::imprint`]).
+/// # Errors
+/// `NotManifold` for a mesh that needs repair, `Stuck` if its faces are degenerate beyond use.
+pub fn layout(mesh: &TriMesh, params: &LayoutParams, observer: &dyn Observer) -> Result<Network, LayoutError> {
+    check(mesh)?;
+    let adjacency = Adjacency::new(mesh);
+    let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
+    let side = (area / params.patches.max(1) as f64).sqrt();
+    let mut edge = EDGE_TO_SIDE * side;
+    let (sharp, _) = lines::feature_lines(mesh, &adjacency, params);
+    for _ in 0..ATTEMPTS {
+        let work = refine::refine(mesh, edge);
+        if let Some(complex) = draft(&work, mesh, &adjacency, &sharp, side, params, observer)? {
+            let work_adjacency = Adjacency::new(&work.mesh);
+            if let Some(mut bench) = Bench::new(&work.mesh, &work_adjacency, complex)
+                && improve::quads(&mut bench)
+            {
+                observer.progress(0.4);
+                improve::relax(&mut bench, params.smoothing, observer)?;
+                observer.progress(1.0);
+                return Ok(network(&work, &work_adjacency, &bench.complex));
+            }
+        }
+        edge /= 2.0;
+    }
+    Err(LayoutError::Stuck { faces: mesh.triangles.len() })
+}
+
+fn check(mesh: &TriMesh) -> Result<(), LayoutError> {
+    if mesh.triangles.is_empty() {
+        return Err(LayoutError::Empty);
+    }
+    let adjacency = Adjacency::new(mesh);
+    let mut edges: std::collections::HashMap<[u32; 2], u32> = std::collections::HashMap::new();
+    for (h, &o) in adjacency.opposite.iter().enumerate() {
+        if o == NONE {
+            let t = mesh.triangles[h / 3];
+            let (a, b) = (t[h % 3], t[(h + 1) % 3]);
+            *edges.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+    }
+    match edges.values().filter(|&&n| n > 1).count() {
+        0 => Ok(()),
+        edges => Err(LayoutError::NotManifold { edges }),
+    }
+}
+
+/// The complex of even cells, with about as many quads to come as asked for. `None` if the working mesh is too
+/// coarse.
+fn draft(
+    work: &Refined,
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    sharp: &[bool],
+    side: f64,
+    params: &LayoutParams,
+    observer: &dyn Observer,
+) -> Result<Option<Complex>, LayoutError> {
+    let work_adjacency = Adjacency::new(&work.mesh);
+    let work_sharp = carry(work, mesh, adjacency, &work_adjacency, sharp);
+    let ground = partition::Ground::new(&work.mesh, &work_adjacency, &work_sharp);
+    let corner = outline::corners(&ground, side / 4.0);
+    let mut cells = (params.patches as f64 / 2.0).max(1.0);
+    let mut best: Option<(usize, Complex)> = None;
+    for attempt in 0..COUNT_ATTEMPTS {
+        observer.progress(0.1 * attempt as f64);
+        let (label, count) = partition::partition(&ground, cells.round() as usize, observer)?;
+        let mut complex = outline::outline(&ground, &label, count, &corner);
+        if !polygon::make_even(&work.mesh, &mut complex) {
+            return Ok(best.map(|b| b.1));
+        }
+        let quads: usize = complex.live_cells().map(|c| complex.loop_of(c).len() / 2 - 1).sum();
+        let miss = quads.abs_diff(params.patches);
+        if best.as_ref().is_none_or(|b| miss < b.0) {
+            best = Some((miss, complex));
+        }
+        let ratio = params.patches as f64 / quads.max(1) as f64;
+        if (0.9..1.1).contains(&ratio) || (ratio < 1.0 && cells <= 1.0) {
+            break;
+        }
+        cells = (cells * ratio).max(1.0);
+    }
+    Ok(best.map(|b| b.1))
+}
+
+/// The sharp half-edges of the working mesh: the pieces of those of the input.
+fn carry(work: &Refined, mesh: &TriMesh, adjacency: &Adjacency, work_adjacency: &Adjacency, sharp: &[bool]) -> Vec<bool> {
+    let _ = (mesh, adjacency);
+    let mut carried = vec![false; work_adjacency.opposite.len()];
+    for (f, (face, corners)) in work.parent.iter().enumerate() {
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            // On the input edge opposite corner i both ends have weight zero there (exactly: halves of zeros).
+            for i in 0..3 {
+                if a[i] == 0.0 && b[i] == 0.0 && sharp[3 * *face as usize + (i + 1) % 3] {
+                    carried[3 * f + k] = true;
+                }
+            }
+        }
+    }
+    carried
+}
+
+/// The complex as a network on the input mesh.
+fn network(work: &Refined, adjacency: &Adjacency, complex: &Complex) -> Network {
+    let triangles = &work.mesh.triangles;
+    let mut corner_of = vec![NONE; complex.nodes.len()];
+    let mut curve_of = vec![NONE; complex.arcs.len()];
+    let mut out = Network::default();
+    for a in complex.live_arcs() {
+        let arc = complex.arc(2 * a);
+        let corners = arc.nodes.map(|n| {
+            if corner_of[n as usize] == NONE {
+                corner_of[n as usize] = out.corners.len() as u32;
+                let f = adjacency.outgoing[complex.nodes[n as usize].vertex as usize] / 3;
+                let k = triangles[f as usize].iter().position(|&v| v == complex.nodes[n as usize].vertex);
+                let at = FacePoint::corner(f, k.expect("a corner of its face"));
+                out.corners.push(Corner { place: work.to_input(f, at.bary) });
+            }
+            corner_of[n as usize]
+        });
+        let mut points: Vec<FacePoint> = Vec::with_capacity(arc.chain.len());
+        for pair in arc.chain.windows(2) {
+            let face = match imprint::shared_face(adjacency, triangles, &pair[0], &pair[1]) {
+                Some(Shared::Face(f)) => f,
+                _ => common_face(adjacency, triangles, pair),
+            };
+            for (place, wanted) in [(pair[0], points.is_empty()), (pair[1], true)] {
+                if wanted {
+                    let at = place.on_face(adjacency, triangles, face).expect("both places lie on the shared face");
+                    points.push(work.to_input(face, at.bary));
+                }
+            }
+        }
+        curve_of[a as usize] = out.curves.len() as u32;
+        out.curves.push(Curve { corners, kind: arc.kind, points });
+    }
+    for c in complex.live_cells() {
+        let sides = complex.loop_of(c);
+        let sides = std::array::from_fn(|k| Side { curve: curve_of[sides[k] as usize / 2], reversed: sides[k] % 2 == 1 });
+        out.patches.push(Patch { sides });
+    }
+    out
+}
+
+/// A face with both places, which lie on one edge.
+fn common_face(adjacency: &Adjacency, triangles: &[[u32; 3]], pair: &[imprint::Place]) -> u32 {
+    let around: Vec<u32> = match pair[0] {
+        imprint::Place::Vertex(v) => adjacency.fan(v).map(|h| h / 3).collect(),
+        place => vec![place.some_face(adjacency)],
+    };
+    around
+        .into_iter()
+        .find(|&f| pair.iter().all(|p| p.on_face(adjacency, triangles, f).is_some()))
+        .expect("neighbouring places share a face")
+}
+
+const _: CurveKind = CurveKind::Smooth;

@@ -1,0 +1,267 @@
+//! The first cells of a layout: a centroidal partition of the faces into disks that respects feature lines.
+//!
+//! 1. sites by farthest-point sampling, at least one per region between feature lines;
+//! 2. Lloyd: grow all cells from their sites, move every site to the middle of its cell;
+//! 3. wherever a cell is no disk, or meets itself across a feature line, add sites there and grow again.
+
+use super::LayoutError;
+use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
+use crate::observe::Observer;
+use glam::DVec3;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
+
+/// Rounds of Lloyd relaxation; the cells hardly change after these.
+const LLOYD_ROUNDS: usize = 8;
+
+/// Rounds of adding sites one per bad cell before they are added by the handful.
+const GENTLE_ROUNDS: usize = 40;
+
+/// Fewest cells of a closed component: those of a cube.
+const CLOSED_CELLS: usize = 6;
+
+/// What the partition works on.
+pub(super) struct Ground<'a> {
+    pub mesh: &'a TriMesh,
+    pub adjacency: &'a Adjacency,
+    /// Half-edges on feature lines.
+    pub sharp: &'a [bool],
+    centroid: Vec<DVec3>,
+    area: Vec<f64>,
+}
+
+/// An `f64` that sorts.
+#[derive(PartialEq, PartialOrd)]
+struct Sorted(f64);
+impl Eq for Sorted {}
+impl Ord for Sorted {
+    fn cmp(&self, other: &Sorted) -> std::cmp::Ordering {
+        self.0.total_cmp(&other.0)
+    }
+}
+
+impl<'a> Ground<'a> {
+    pub fn new(mesh: &'a TriMesh, adjacency: &'a Adjacency, sharp: &'a [bool]) -> Ground<'a> {
+        let faces = 0..mesh.triangles.len();
+        let centroid = faces.clone().map(|f| mesh.corners(f).into_iter().sum::<DVec3>() / 3.0).collect();
+        Ground { mesh, adjacency, sharp, centroid, area: faces.map(|f| mesh.area(f)).collect() }
+    }
+
+    fn neighbours(&self, f: u32) -> impl Iterator<Item = u32> + '_ {
+        (3 * f..3 * f + 3).filter_map(|h| {
+            let o = self.adjacency.opposite[h as usize];
+            (o != NONE && !self.sharp[h as usize]).then_some(o / 3)
+        })
+    }
+
+    /// Lowers `distance` by paths from `sources`, and names the faces reached after their source's label.
+    fn grow(&self, sources: &[(u32, u32)], distance: &mut [f64], label: &mut [u32]) {
+        let mut heap = BinaryHeap::new();
+        for &(f, l) in sources {
+            distance[f as usize] = 0.0;
+            label[f as usize] = l;
+            heap.push(Reverse((Sorted(0.0), f, l)));
+        }
+        while let Some(Reverse((Sorted(d), f, l))) = heap.pop() {
+            if d > distance[f as usize] || label[f as usize] != l {
+                continue;
+            }
+            for g in self.neighbours(f) {
+                let e = d + self.centroid[f as usize].distance(self.centroid[g as usize]);
+                if e < distance[g as usize] {
+                    distance[g as usize] = e;
+                    label[g as usize] = l;
+                    heap.push(Reverse((Sorted(e), g, l)));
+                }
+            }
+        }
+    }
+
+    /// Cells grown from `sites`.
+    fn cells(&self, sites: &[u32]) -> (Vec<u32>, Vec<f64>) {
+        let mut distance = vec![f64::INFINITY; self.area.len()];
+        let mut label = vec![NONE; self.area.len()];
+        let sources: Vec<_> = sites.iter().enumerate().map(|(l, &f)| (f, l as u32)).collect();
+        self.grow(&sources, &mut distance, &mut label);
+        (label, distance)
+    }
+
+    /// For each cell the face nearest to its centroid.
+    fn middles(&self, label: &[u32], count: usize) -> Vec<u32> {
+        let mut sum = vec![(DVec3::ZERO, 0.0); count];
+        for (f, &l) in label.iter().enumerate() {
+            let s = &mut sum[l as usize];
+            // A degenerate face still counts a little, so that a cell of such faces has a middle.
+            let w = self.area[f] + f64::MIN_POSITIVE;
+            *s = (s.0 + self.centroid[f] * w, s.1 + w);
+        }
+        let mut best = vec![(f64::INFINITY, NONE); count];
+        for (f, &l) in label.iter().enumerate() {
+            let (s, w) = sum[l as usize];
+            let d = self.centroid[f].distance_squared(s / w);
+            if d < best[l as usize].0 || best[l as usize].1 == NONE {
+                best[l as usize] = (d, f as u32);
+            }
+        }
+        best.into_iter().map(|b| b.1).collect()
+    }
+
+    /// Sites by farthest-point sampling: one per region (more where the surface is closed), then up to `count`.
+    fn sample(&self, count: usize) -> Vec<u32> {
+        let n = self.area.len();
+        let mut region = vec![NONE; n];
+        let mut closed = Vec::new();
+        let mut first = Vec::new();
+        for f in 0..n as u32 {
+            if region[f as usize] != NONE {
+                continue;
+            }
+            let r = first.len() as u32;
+            first.push(f);
+            region[f as usize] = r;
+            let (mut stack, mut open) = (vec![f], false);
+            while let Some(f) = stack.pop() {
+                open |= (3 * f..3 * f + 3)
+                    .any(|h| self.sharp[h as usize] || self.adjacency.opposite[h as usize] == NONE);
+                for g in self.neighbours(f) {
+                    if region[g as usize] == NONE {
+                        region[g as usize] = r;
+                        stack.push(g);
+                    }
+                }
+            }
+            closed.push(!open);
+        }
+        let mut distance = vec![f64::INFINITY; n];
+        let mut label = vec![NONE; n];
+        let mut sites = Vec::new();
+        let mut add = |f: u32, distance: &mut Vec<f64>, label: &mut Vec<u32>| {
+            self.grow(&[(f, sites.len() as u32)], distance, label);
+            sites.push(f);
+        };
+        for (r, &f) in first.iter().enumerate() {
+            add(f, &mut distance, &mut label);
+            if closed[r] {
+                let members: Vec<u32> = (0..n as u32).filter(|&f| region[f as usize] == r as u32).collect();
+                for _ in 1..CLOSED_CELLS.min(members.len()) {
+                    let far = members.iter().copied().max_by_key(|&f| (Sorted(distance[f as usize]), Reverse(f)));
+                    add(far.expect("a face"), &mut distance, &mut label);
+                }
+            }
+        }
+        let more = count.saturating_sub(first.len());
+        for _ in 0..more {
+            let far = (0..n as u32).max_by(|&a, &b| {
+                distance[a as usize].total_cmp(&distance[b as usize]).then(b.cmp(&a))
+            });
+            match far {
+                Some(f) if distance[f as usize] > 0.0 => add(f, &mut distance, &mut label),
+                _ => break,
+            }
+        }
+        sites
+    }
+
+    /// True for half-edges between two cells, on feature lines and on the boundary.
+    pub fn barriers(&self, label: &[u32]) -> Vec<bool> {
+        (0..self.sharp.len())
+            .map(|h| {
+                let o = self.adjacency.opposite[h];
+                o == NONE || self.sharp[h] || label[h / 3] != label[o as usize / 3]
+            })
+            .collect()
+    }
+
+    /// Faces where a site is wanted because their cell is no disk or meets itself across a feature line.
+    fn wanted(&self, label: &[u32], distance: &[f64], count: usize, eager: bool) -> Vec<u32> {
+        let barrier = self.barriers(label);
+        // Euler characteristic of the cell cut open along its barriers: inner vertices - inner edges + faces.
+        let mut euler = vec![0i64; count];
+        let mut far: Vec<(f64, u32)> = vec![(-1.0, NONE); count];
+        let mut own: HashMap<u32, [u32; 2]> = HashMap::new();
+        for f in 0..label.len() {
+            let c = label[f] as usize;
+            euler[c] += 1;
+            if distance[f] > far[c].0 {
+                far[c] = (distance[f], f as u32);
+            }
+        }
+        for h in 0..barrier.len() {
+            let o = self.adjacency.opposite[h];
+            if o == NONE || (o as usize) < h {
+                continue;
+            }
+            if !barrier[h] {
+                euler[label[h / 3] as usize] -= 1;
+            } else if label[h / 3] == label[o as usize / 3] {
+                own.entry(label[h / 3]).or_insert([h as u32 / 3, o / 3]);
+            }
+        }
+        for v in 0..self.mesh.points.len() as u32 {
+            let mut inner = !self.adjacency.is_boundary_vertex(v);
+            let mut last = NONE;
+            for h in self.adjacency.fan(v) {
+                inner &= !barrier[h as usize] && !barrier[previous(h) as usize];
+                last = label[h as usize / 3];
+            }
+            if inner && last != NONE {
+                euler[last as usize] += 1;
+            }
+        }
+        let mut wanted = Vec::new();
+        for c in 0..count as u32 {
+            if euler[c as usize] != 1 {
+                wanted.push(far[c as usize].1);
+            }
+            if let Some(pair) = own.get(&c) {
+                wanted.extend(pair);
+            }
+        }
+        if eager {
+            let bad: Vec<u32> = wanted.iter().map(|&f| label[f as usize]).collect();
+            wanted.extend((0..label.len() as u32).filter(|&f| f % 7 == 0 && bad.contains(&label[f as usize])));
+        }
+        wanted.sort_unstable();
+        wanted.dedup();
+        wanted
+    }
+}
+
+/// Parts the faces into about `count` cells, each a disk that does not meet itself: a label per face and the
+/// number of labels.
+pub(super) fn partition(
+    ground: &Ground,
+    count: usize,
+    observer: &dyn Observer,
+) -> Result<(Vec<u32>, usize), LayoutError> {
+    let mut sites = ground.sample(count);
+    for _ in 0..LLOYD_ROUNDS {
+        if observer.cancelled() {
+            return Err(LayoutError::Cancelled);
+        }
+        let (label, _) = ground.cells(&sites);
+        sites = ground.middles(&label, sites.len());
+    }
+    for round in 0.. {
+        if observer.cancelled() {
+            return Err(LayoutError::Cancelled);
+        }
+        let (label, distance) = ground.cells(&sites);
+        let mut wanted = ground.wanted(&label, &distance, sites.len(), round >= GENTLE_ROUNDS);
+        wanted.retain(|f| !sites.contains(f));
+        if wanted.is_empty() {
+            return Ok((label, sites.len()));
+        }
+        sites.extend(wanted);
+    }
+    unreachable!("the rounds end when every face is its own cell")
+}
+
+/// The next half-edge around a cell after boundary half-edge `h`.
+pub(super) fn next_around(adjacency: &Adjacency, barrier: &[bool], h: u32) -> u32 {
+    let mut g = next(h);
+    while !barrier[g as usize] {
+        g = next(adjacency.opposite[g as usize]);
+    }
+    g
+}

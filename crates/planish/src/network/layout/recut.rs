@@ -1,0 +1,459 @@
+//! Changes of the complex inside a few cells: their union, a disk, is mapped to a circle and cut again along
+//! straight lines of the map. New arcs can therefore neither cross nor leave the union.
+
+use super::complex::{Arc, Complex, Node};
+use crate::mesh::{Adjacency, NONE, TriMesh, next};
+use crate::network::CurveKind;
+use crate::network::disk::{Disk, Met};
+use crate::network::imprint::{self, Cut, Place, Shared, canonical, flood, half_edge, shared_face};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+/// A new node is looked for within this radius of the unit circle, so that no cell is left a sliver.
+const INNER_RADIUS: f64 = 0.85;
+
+/// Curves that cross one edge keep at least this distance from each other and from its ends, as a fraction
+/// of the edge (less where many cross).
+const APART: f64 = 0.02;
+
+/// A change inside the union of some cells.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Change {
+    /// Cells to replace; their union must be a disk.
+    pub cells: Vec<u32>,
+    /// Arcs inside the union, which go.
+    pub removed: Vec<u32>,
+    /// Straight lines between corners of the union (positions in its outline).
+    pub lines: Vec<(usize, usize)>,
+    /// Corners of the union joined to a new node inside.
+    pub spokes: Vec<usize>,
+    /// The node that the new one replaces, if any.
+    pub center: Option<u32>,
+}
+
+/// The complex cut into the working mesh.
+pub(super) struct Embedding {
+    cut: Cut,
+    adjacency: Adjacency,
+    /// For each half-edge of the cut mesh its half-arc.
+    half_arc: Vec<u32>,
+    /// First half-edge of each half-arc.
+    first: Vec<u32>,
+    /// Faces of each cell, sorted.
+    pub members: Vec<Vec<u32>>,
+}
+
+/// What a change comes to, once drawn.
+struct Drawn {
+    outline: Vec<u32>,
+    lines: Vec<Vec<Place>>,
+    spokes: Vec<Vec<Place>>,
+    center: u32,
+}
+
+impl Embedding {
+    /// Cuts the complex into the mesh and checks that every cell is where it should be.
+    pub fn new(mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex) -> Option<Embedding> {
+        let empty: &[Place] = &[];
+        let curves: Vec<&[Place]> = complex.arcs.iter().map(|a| a.as_ref().map_or(empty, |a| &a.chain[..])).collect();
+        let cut = imprint::cut(mesh, adjacency, &curves).ok()?;
+        let cut_adjacency = Adjacency::new(&cut.mesh);
+        let mut half_arc = vec![NONE; 3 * cut.mesh.triangles.len()];
+        let mut first = vec![NONE; 2 * complex.arcs.len()];
+        let mut seeds = Vec::new();
+        for a in complex.live_arcs() {
+            let chain = &cut.chains[a as usize];
+            for (reversed, cell) in complex.arc(2 * a).cells.into_iter().enumerate() {
+                if cell == NONE {
+                    continue;
+                }
+                let half = 2 * a + reversed as u32;
+                for i in 0..chain.len() - 1 {
+                    let (x, y) = if reversed == 0 { (chain[i], chain[i + 1]) } else { (chain[i + 1], chain[i]) };
+                    let h = half_edge(&cut.mesh.triangles, &cut_adjacency, x, y)?;
+                    if half_arc[h as usize] != NONE {
+                        return None; // two arcs on one edge
+                    }
+                    half_arc[h as usize] = half;
+                    seeds.push((h, cell));
+                    if i == if reversed == 0 { 0 } else { chain.len() - 2 } {
+                        first[half as usize] = h;
+                    }
+                }
+            }
+        }
+        let barrier: Vec<bool> = half_arc.iter().map(|&a| a != NONE).collect();
+        let label = flood(&cut, &cut_adjacency, &barrier, &seeds).ok()?;
+        let mut members = vec![Vec::new(); complex.cells.len()];
+        for (f, &c) in label.iter().enumerate() {
+            members.get_mut(c as usize)?.push(f as u32);
+        }
+        Some(Embedding { cut, adjacency: cut_adjacency, half_arc, first, members })
+    }
+
+    /// The union of a change as a disk, its outline and the position of each outline corner in the disk's
+    /// boundary.
+    fn union(&self, complex: &Complex, change: &Change) -> Option<(Disk, Vec<u32>, Vec<usize>)> {
+        let outline = outline(complex, change)?;
+        let mut faces: Vec<u32> = change.cells.iter().flat_map(|&c| self.members[c as usize].iter().copied()).collect();
+        faces.sort_unstable();
+        let barrier = |h: u32| {
+            let a = self.half_arc[h as usize];
+            a != NONE && !change.removed.contains(&(a / 2))
+        };
+        let start = self.first[outline[0] as usize];
+        let disk = Disk::new(&self.cut.mesh.triangles, &self.adjacency, &faces, barrier, start)?;
+        let mut at = 0;
+        let mut corners = Vec::with_capacity(outline.len());
+        for &half in &outline {
+            corners.push(at);
+            at += self.cut.chains[half as usize / 2].len() - 1;
+        }
+        (at == disk.boundary.len()).then_some((disk, outline, corners))
+    }
+
+    /// Draws a change; `None` if it cannot be.
+    fn draw(&self, mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex, change: &Change) -> Option<Drawn> {
+        let (disk, outline, corners) = self.union(complex, change)?;
+        let points = &self.cut.mesh.points;
+        let at = |v: u32| points[disk.vertices[v as usize] as usize];
+        let n = disk.boundary.len();
+        // Half of the circle shared evenly among the sides, half by their length.
+        let step: Vec<f64> = (0..n).map(|i| at(disk.boundary[i]).distance(at(disk.boundary[(i + 1) % n]))).collect();
+        let total: f64 = step.iter().sum();
+        let mut angles = vec![0.0; n];
+        let mut angle = 0.0;
+        for (k, &from) in corners.iter().enumerate() {
+            let to = corners.get(k + 1).copied().unwrap_or(n);
+            let length: f64 = step[from..to].iter().sum();
+            let share = std::f64::consts::TAU * (0.5 / corners.len() as f64 + 0.5 * length / total);
+            let mut run = 0.0;
+            for i in from..to {
+                let even = (i - from) as f64 / (to - from) as f64;
+                // A little evenness keeps the vertices of tiny steps apart.
+                angles[i] = angle + share * (0.95 * run / length + 0.05 * even);
+                run += step[i];
+            }
+            angle += share;
+        }
+        let uv = disk.circle_map(points, &angles)?;
+        let line = |a: u32, b: u32| -> Option<Vec<Place>> {
+            let met = disk.straight(&uv, a, b)?;
+            let places = met.iter().filter_map(|m| self.on_ground(mesh, adjacency, &disk, m));
+            let name = |v: u32| self.cut.origin[disk.vertices[v as usize] as usize];
+            let chain: Vec<Place> = [name(a)].into_iter().chain(places).chain([name(b)]).collect();
+            Some(tighten(mesh, adjacency, chain))
+        };
+        let corner = |i: usize| disk.boundary[corners[i]];
+        let lines = change.lines.iter().map(|&(i, j)| line(corner(i), corner(j))).collect::<Option<Vec<_>>>()?;
+        let (mut spokes, mut center) = (Vec::new(), NONE);
+        if !change.spokes.is_empty() {
+            let v = self.middle(&disk, &uv, &corners)?;
+            let Place::Vertex(w) = self.cut.origin[disk.vertices[v as usize] as usize] else { return None };
+            center = w;
+            spokes = change.spokes.iter().map(|&i| line(v, corner(i))).collect::<Option<Vec<_>>>()?;
+        }
+        Some(Drawn { outline, lines, spokes, center })
+    }
+
+    /// The vertex of the working mesh, inside the disk, nearest to the mean of the disk's corners.
+    fn middle(&self, disk: &Disk, uv: &[DVec2], corners: &[usize]) -> Option<u32> {
+        let at = |v: u32| self.cut.mesh.points[disk.vertices[v as usize] as usize];
+        let mean = corners.iter().map(|&i| at(disk.boundary[i])).sum::<DVec3>() / corners.len() as f64;
+        let mut on_boundary = vec![false; disk.vertices.len()];
+        for &v in &disk.boundary {
+            on_boundary[v as usize] = true;
+        }
+        (0..disk.vertices.len() as u32)
+            .filter(|&v| !on_boundary[v as usize])
+            .filter(|&v| matches!(self.cut.origin[disk.vertices[v as usize] as usize], Place::Vertex(_)))
+            .min_by(|&v, &w| {
+                let key = |v: u32| (uv[v as usize].length() > INNER_RADIUS, at(v).distance_squared(mean));
+                let (a, b) = (key(v), key(w));
+                a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+            })
+    }
+
+    /// Where a line's meeting lies on the working mesh; `None` inside a face, where a chord will do.
+    fn on_ground(&self, mesh: &TriMesh, adjacency: &Adjacency, disk: &Disk, met: &Met) -> Option<Place> {
+        let name = |v: u32| self.cut.origin[disk.vertices[v as usize] as usize];
+        match *met {
+            Met::Vertex(v) => match name(v) {
+                Place::Face(_) => None,
+                place => Some(place),
+            },
+            Met::Edge(p, q, t) => {
+                let (a, b) = (name(p), name(q));
+                if shared_face(adjacency, &mesh.triangles, &a, &b) != Some(Shared::Edge) {
+                    return None;
+                }
+                let h = match (a, b) {
+                    (Place::Edge(h, _), _) | (_, Place::Edge(h, _)) => h,
+                    (Place::Vertex(v), Place::Vertex(w)) => {
+                        let h = half_edge(&mesh.triangles, adjacency, v, w)
+                            .or_else(|| half_edge(&mesh.triangles, adjacency, w, v))?;
+                        h.min(adjacency.opposite[h as usize])
+                    }
+                    _ => return None,
+                };
+                let along = |place: Place| match place {
+                    Place::Edge(_, t) => t,
+                    Place::Vertex(v) if mesh.triangles[h as usize / 3][next(h) as usize % 3] == v => 1.0,
+                    _ => 0.0,
+                };
+                Some(Place::Edge(h, along(a) + (along(b) - along(a)) * t))
+            }
+        }
+    }
+}
+
+/// The half-arcs around the union of a change, counter-clockwise.
+pub(super) fn outline(complex: &Complex, change: &Change) -> Option<Vec<u32>> {
+    let gone = |h: u32| change.removed.contains(&(h / 2));
+    let next_of = |h: u32| {
+        let sides = complex.loop_of(complex.cell(h));
+        let i = sides.iter().position(|&s| s == h).expect("a side of its cell");
+        sides[(i + 1) % sides.len()]
+    };
+    let outer: usize =
+        change.cells.iter().map(|&c| complex.loop_of(c).iter().filter(|&&h| !gone(h)).count()).sum();
+    let start = change.cells.iter().flat_map(|&c| complex.loop_of(c)).copied().find(|&h| !gone(h))?;
+    let mut around = vec![start];
+    loop {
+        let mut h = next_of(*around.last().expect("not empty"));
+        let mut turns = 0;
+        while gone(h) {
+            h = next_of(h ^ 1);
+            turns += 1;
+            if turns > 4 * change.removed.len() + 4 {
+                return None;
+            }
+        }
+        if h == start {
+            break;
+        }
+        around.push(h);
+        if around.len() > outer {
+            return None;
+        }
+    }
+    (around.len() == outer).then_some(around)
+}
+
+/// Takes out of a chain what turns back in the edge it came from.
+fn tighten(mesh: &TriMesh, adjacency: &Adjacency, chain: Vec<Place>) -> Vec<Place> {
+    let ends = |h: u32| [mesh.triangles[h as usize / 3][h as usize % 3], mesh.triangles[h as usize / 3][next(h) as usize % 3]];
+    let named = |p: Place| match p {
+        Place::Edge(h, t) => canonical(adjacency, h, t),
+        other => other,
+    };
+    let mut out: Vec<Place> = Vec::with_capacity(chain.len());
+    for place in chain.into_iter().map(named) {
+        match (out.last().copied(), place) {
+            (Some(Place::Edge(g, _)), Place::Edge(h, _)) if g == h => {
+                out.pop();
+            }
+            (Some(Place::Vertex(v)), Place::Edge(h, _)) if ends(h).contains(&v) => {}
+            (Some(Place::Vertex(v)), Place::Vertex(w)) if v == w => {}
+            (_, Place::Vertex(w)) => {
+                while let Some(Place::Edge(h, _)) = out.last()
+                    && ends(*h).contains(&w)
+                {
+                    out.pop();
+                }
+                out.push(place);
+            }
+            _ => out.push(place),
+        }
+    }
+    out
+}
+
+/// A complex with its embedding, kept in step.
+pub(super) struct Bench<'a> {
+    pub mesh: &'a TriMesh,
+    pub adjacency: &'a Adjacency,
+    pub complex: Complex,
+    pub embedding: Embedding,
+}
+
+impl<'a> Bench<'a> {
+    /// `None` if the complex is not properly embedded.
+    pub fn new(mesh: &'a TriMesh, adjacency: &'a Adjacency, complex: Complex) -> Option<Bench<'a>> {
+        let embedding = Embedding::new(mesh, adjacency, &complex)?;
+        Some(Bench { mesh, adjacency, complex, embedding })
+    }
+
+    /// Makes `changes`, whose cells must be disjoint, each if it can be drawn. Returns how many were made; the
+    /// complex stays as it was if the result does not hold together.
+    pub fn apply(&mut self, changes: &[Change]) -> usize {
+        let drawn: Vec<Option<Drawn>> = changes
+            .par_iter()
+            .map(|change| self.embedding.draw(self.mesh, self.adjacency, &self.complex, change))
+            .collect();
+        let before = self.complex.clone();
+        let mut made = 0;
+        for (change, drawn) in changes.iter().zip(drawn) {
+            if let Some(drawn) = drawn {
+                replace(&mut self.complex, change, drawn);
+                made += 1;
+            }
+        }
+        if made == 0 {
+            return 0;
+        }
+        spread(&mut self.complex);
+        match Embedding::new(self.mesh, self.adjacency, &self.complex) {
+            Some(embedding) => {
+                self.embedding = embedding;
+                made
+            }
+            None => {
+                self.complex = before;
+                0
+            }
+        }
+    }
+
+    /// Makes `changes` in rounds of disjoint ones, each built by `plan` when its turn comes.
+    pub fn sweep(&mut self, items: &[u32], plan: impl Fn(&Complex, u32) -> Option<Change>) -> usize {
+        let mut waiting = items.to_vec();
+        let mut made = 0;
+        while !waiting.is_empty() {
+            let mut taken = vec![false; self.complex.cells.len()];
+            let (mut now, mut later) = (Vec::new(), Vec::new());
+            for &item in &waiting {
+                let Some(change) = plan(&self.complex, item) else { continue };
+                if change.cells.iter().any(|&c| taken[c as usize]) {
+                    later.push(item);
+                    continue;
+                }
+                for &c in &change.cells {
+                    taken[c as usize] = true;
+                }
+                now.push(change);
+            }
+            made += self.apply(&now);
+            waiting = later;
+        }
+        made
+    }
+}
+
+/// Puts a drawn change into the complex.
+fn replace(complex: &mut Complex, change: &Change, drawn: Drawn) {
+    let mut free_arcs: Vec<u32> = change.removed.iter().rev().copied().collect();
+    let mut free_cells: Vec<u32> = change.cells.iter().rev().copied().collect();
+    for &a in &change.removed {
+        complex.arcs[a as usize] = None;
+    }
+    for &c in &change.cells {
+        complex.cells[c as usize] = None;
+    }
+    let corner: Vec<u32> = drawn.outline.iter().map(|&h| complex.from(h)).collect();
+    let n = corner.len();
+    let mut add_arc = |complex: &mut Complex, nodes: [u32; 2], chain: Vec<Place>| -> u32 {
+        let arc = Some(Arc { nodes, kind: CurveKind::Smooth, chain, cells: [NONE; 2] });
+        match free_arcs.pop() {
+            Some(a) => {
+                complex.arcs[a as usize] = arc;
+                a
+            }
+            None => {
+                complex.arcs.push(arc);
+                complex.arcs.len() as u32 - 1
+            }
+        }
+    };
+    // Faces as lists of (position of the start, half-arc).
+    let whole: Vec<(usize, u32)> = drawn.outline.iter().enumerate().map(|(i, &h)| (i, h)).collect();
+    let mut faces = vec![whole];
+    for (&(i, j), chain) in change.lines.iter().zip(drawn.lines) {
+        let a = add_arc(complex, [corner[i], corner[j]], chain);
+        let k = faces
+            .iter()
+            .position(|f| f.iter().any(|x| x.0 == i) && f.iter().any(|x| x.0 == j))
+            .expect("lines of a change do not cross");
+        let mut face = faces.swap_remove(k);
+        let start = face.iter().position(|x| x.0 == i).expect("found above");
+        face.rotate_left(start);
+        let middle = face.iter().position(|x| x.0 == j).expect("found above");
+        let mut rest = face.split_off(middle);
+        face.push((j, 2 * a + 1));
+        rest.push((i, 2 * a));
+        faces.push(face);
+        faces.push(rest);
+    }
+    if !change.spokes.is_empty() {
+        let center = match change.center {
+            Some(node) => {
+                complex.nodes[node as usize].vertex = drawn.center;
+                node
+            }
+            None => {
+                complex.nodes.push(Node { vertex: drawn.center, corner: false });
+                complex.nodes.len() as u32 - 1
+            }
+        };
+        let arcs: Vec<u32> = change
+            .spokes
+            .iter()
+            .zip(drawn.spokes)
+            .map(|(&i, chain)| add_arc(complex, [center, corner[i]], chain))
+            .collect();
+        let whole = faces.pop().expect("spokes go without lines");
+        for (k, &i) in change.spokes.iter().enumerate() {
+            let l = (k + 1) % arcs.len();
+            let j = change.spokes[l];
+            let mut face: Vec<(usize, u32)> = Vec::new();
+            let mut at = i;
+            while face.is_empty() || at != j {
+                face.push(whole[at]);
+                at = (at + 1) % n;
+            }
+            face.push((j, 2 * arcs[l] + 1));
+            face.push((n, 2 * arcs[k]));
+            faces.push(face);
+        }
+    }
+    for face in faces {
+        let c = free_cells.pop().unwrap_or_else(|| {
+            complex.cells.push(None);
+            complex.cells.len() as u32 - 1
+        });
+        let sides: Vec<u32> = face.into_iter().map(|x| x.1).collect();
+        for &h in &sides {
+            complex.arcs[h as usize / 2].as_mut().expect("a live arc").cells[h as usize % 2] = c;
+        }
+        complex.cells[c as usize] = Some(sides);
+    }
+}
+
+/// Moves the crossings of every edge apart, keeping their order.
+fn spread(complex: &mut Complex) {
+    let mut on_edge: Vec<(u32, f64, u32, u32)> = Vec::new();
+    for a in complex.live_arcs() {
+        for (i, place) in complex.arc(2 * a).chain.iter().enumerate() {
+            if let Place::Edge(h, t) = *place {
+                on_edge.push((h, t, a, i as u32));
+            }
+        }
+    }
+    on_edge.sort_by(|x, y| x.0.cmp(&y.0).then(x.1.total_cmp(&y.1)).then((x.2, x.3).cmp(&(y.2, y.3))));
+    for run in on_edge.chunk_by_mut(|x, y| x.0 == y.0) {
+        let gap = APART.min(0.5 / (run.len() + 1) as f64);
+        let mut least = gap;
+        for x in run.iter_mut() {
+            x.1 = x.1.max(least);
+            least = x.1 + gap;
+        }
+        let mut most = 1.0 - gap;
+        for x in run.iter_mut().rev() {
+            x.1 = x.1.min(most);
+            most = x.1 - gap;
+        }
+        for &(h, t, a, i) in run.iter() {
+            complex.arcs[a as usize].as_mut().expect("a live arc").chain[i as usize] = Place::Edge(h, t);
+        }
+    }
+}
