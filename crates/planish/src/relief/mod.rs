@@ -1,4 +1,21 @@
 //! Relief: what a surface leaves out of its grid, as a vector displacement map.
+//!
+//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, ch. 7 and §8.2.
+//! 1. a frame at every node - `frame`      2. bake and displace - `bake`, eq. 7.1
+//! 3. maps of one number, folds - `scalar`      4. one mesh of all patches - `weld`
+//!
+//! Departs from [K98]: its frame `(S_u, S_v, N)` with dot products (eq. 7.1) is exact only where `S_u` and `S_v` are
+//! orthogonal; an orthonormal frame is exact everywhere.
+
+mod bake;
+mod frame;
+mod scalar;
+mod weld;
+
+pub use bake::{bake, displace};
+pub use frame::{Frame, frame_at, frames};
+pub use scalar::{fold_over, length, normal_component};
+pub use weld::{displaced_mesh, patch_mesh, span_shapes, surface_mesh};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -15,4 +32,47 @@ pub struct Relief {
     pub cols: usize,
     /// Displacements `(t, b, n)`, world units.
     pub vectors: Vec<DVec3>,
+}
+
+/// Errors of the relief stage.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ReliefError {
+    /// One list entry per patch is needed.
+    #[error("{found} {what} were given for {wanted} patches; give one each")]
+    Count {
+        /// What the list holds.
+        what: &'static str,
+        /// Entries found.
+        found: usize,
+        /// Patches.
+        wanted: usize,
+    },
+    /// An array's length is not `rows * cols`, or there are fewer than 2 rows or columns.
+    #[error("patch {patch} has {found} points for {rows} x {cols} nodes; bake it again")]
+    Shape {
+        /// The patch.
+        patch: usize,
+        /// Nodes along `v`.
+        rows: usize,
+        /// Nodes along `u`.
+        cols: usize,
+        /// Entries found.
+        found: usize,
+    },
+    /// Two patches disagree on the number of nodes along their curve.
+    #[error("curve {curve} has {first} nodes on one side and {second} on the other; give its chord one count")]
+    Mismatch {
+        /// The curve.
+        curve: usize,
+        /// Nodes on the first side.
+        first: usize,
+        /// Nodes on another.
+        second: usize,
+    },
+    /// A side names a curve or a corner that does not exist.
+    #[error("patch {patch} uses a curve or corner that the network does not have")]
+    Network {
+        /// The patch.
+        patch: usize,
+    },
 }

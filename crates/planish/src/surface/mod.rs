@@ -1,4 +1,31 @@
 //! B-spline surfaces fitted to grids, and their seams.
+//!
+//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, ch. 4, 6 and 8.
+//! 1. basis and evaluation - `basis`, `evaluate`      2. one grid - `fit`, eq. 4.4
+//! 3. a network without gaps - `network_fit`, `resolution`
+//! 4. smooth seams - `corner`, `seam_curve`, `stitch`, §8.1      5. how good it is - `quality`, eq. 6.1
+
+pub mod basis;
+//mod corner;
+mod error;
+mod evaluate;
+mod fit;
+mod network_fit;
+mod quality;
+mod resolution;
+//mod seam_curve;
+mod sides;
+//mod stitch;
+
+pub use error::FitError;
+pub use evaluate::Jet;
+pub(crate) use evaluate::each_row;
+pub use fit::{FEWEST_CONTROL, fit};
+pub use network_fit::{FitParams, fit_network};
+pub use quality::{Deviation, SeamQuality, deviation, deviation_of, measure_seams};
+pub use resolution::Resolution;
+pub(crate) use sides::{check, node};
+//pub use stitch::{StitchParams, stitch};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

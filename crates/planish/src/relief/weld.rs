@@ -1,0 +1,168 @@
+//! One triangle mesh of all patches, welded by topology.
+//!
+//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §8.2.
+//!
+//! Departs from [K98]: no averaging of boundary rows. A node on a curve or corner is one vertex because the network
+//! says so, whatever its distance; its position is that of the first patch that has it.
+
+use super::{Relief, ReliefError, displace};
+use crate::grid::Grid;
+use crate::mesh::{Attribute, TriMesh};
+use crate::network::Network;
+use crate::surface::basis::uniform_parameters;
+use crate::surface::{FitError, Surface, check, node};
+use glam::DVec3;
+use rayon::prelude::*;
+
+const NONE: u32 = u32::MAX;
+
+/// The displaced grids of all patches as one mesh: for a closed network a closed manifold one.
+///
+/// # Errors
+/// Lists that are not one per patch, or counts that differ along a curve.
+pub fn displaced_mesh(network: &Network, surfaces: &[Surface], reliefs: &[Relief]) -> Result<TriMesh, ReliefError> {
+    let patches = network.patches.len();
+    for (what, found) in [("surfaces", surfaces.len()), ("reliefs", reliefs.len())] {
+        if found != patches {
+            return Err(ReliefError::Count { what, found, wanted: patches });
+        }
+    }
+    let arrays: Vec<Result<Vec<DVec3>, ReliefError>> =
+        surfaces.par_iter().zip(reliefs).map(|(s, r)| displace(s, r)).collect();
+    let mut nodes = Vec::with_capacity(patches);
+    for (patch, (points, relief)) in arrays.into_iter().zip(reliefs).enumerate() {
+        let points = points.map_err(|e| match e {
+            ReliefError::Shape { rows, cols, found, .. } => ReliefError::Shape { patch, rows, cols, found },
+            other => other,
+        })?;
+        nodes.push(Grid { rows: relief.rows, cols: relief.cols, points, places: Vec::new() });
+    }
+    weld(network, &nodes)
+}
+
+/// The smooth surfaces of all patches as one mesh.
+///
+/// * `shapes` - per patch the nodes along `v` and along `u`, equal along every curve; see [`span_shapes`]
+///
+/// # Errors
+/// Lists that are not one per patch, or counts that differ along a curve.
+pub fn surface_mesh(network: &Network, surfaces: &[Surface], shapes: &[[usize; 2]]) -> Result<TriMesh, ReliefError> {
+    let patches = network.patches.len();
+    for (what, found) in [("surfaces", surfaces.len()), ("shapes", shapes.len())] {
+        if found != patches {
+            return Err(ReliefError::Count { what, found, wanted: patches });
+        }
+    }
+    let nodes: Vec<Grid> = surfaces
+        .par_iter()
+        .zip(shapes)
+        .map(|(surface, &[rows, cols])| Grid {
+            rows,
+            cols,
+            points: surface.sample(&uniform_parameters(cols), &uniform_parameters(rows), [0, 0]),
+            places: Vec::new(),
+        })
+        .collect();
+    weld(network, &nodes)
+}
+
+/// Nodes along `v` and `u` of each surface with `per_span` (at least 1) quads per knot span.
+pub fn span_shapes(surfaces: &[Surface], per_span: usize) -> Vec<[usize; 2]> {
+    let nodes = |control: usize| control.saturating_sub(3).max(1) * per_span.max(1) + 1;
+    surfaces.iter().map(|s| [nodes(s.rows), nodes(s.cols)]).collect()
+}
+
+/// One patch as a mesh of its own with a `"uv"` attribute of width 2.
+///
+/// The texture coordinates put node `(i, j)` on a texel centre of an image with one texel per node,
+/// `((i + 1/2) / cols, (j + 1/2) / rows)`, so that a node map reads back without blur.
+pub fn patch_mesh(points: Vec<DVec3>, rows: usize, cols: usize) -> Result<TriMesh, ReliefError> {
+    super::bake::check(rows, cols, points.len())?;
+    let ids: Vec<u32> = (0..points.len() as u32).collect();
+    let mut triangles = Vec::new();
+    split_quads(&points, &ids, rows, cols, [false; 4], &mut triangles);
+    let values = (0..rows * cols)
+        .flat_map(|n| [(n % cols) as f32 + 0.5, (n / cols) as f32 + 0.5].into_iter().zip([cols, rows]))
+        .map(|(texel, size)| texel / size as f32)
+        .collect();
+    Ok(TriMesh { points, triangles, attributes: vec![Attribute { name: "uv".into(), width: 2, values }] })
+}
+
+/// Joins arrays of nodes along the curves and corners of the network.
+fn weld(network: &Network, nodes: &[Grid]) -> Result<TriMesh, ReliefError> {
+    let shapes: Vec<_> = nodes.iter().map(|g| (g.rows, g.cols, g.points.len())).collect();
+    let counts = check(network, "grids", &shapes).map_err(|e| match e {
+        FitError::Count { what, found, wanted } => ReliefError::Count { what, found, wanted },
+        FitError::Shape { patch, rows, cols, points } => ReliefError::Shape { patch, rows, cols, found: points },
+        FitError::Mismatch { curve, first, second } => ReliefError::Mismatch { curve, first, second },
+        FitError::NoSuchCurve { patch, .. } => ReliefError::Network { patch },
+        other => unreachable!("checking shapes says {other}"),
+    })?;
+    let mut valence = vec![0; network.corners.len()];
+    for p in 0..network.patches.len() {
+        for k in 0..4 {
+            *valence.get_mut(network.corner(p, k) as usize).ok_or(ReliefError::Network { patch: p })? += 1;
+        }
+    }
+    let mut corner_ids = vec![NONE; network.corners.len()];
+    let mut curve_ids: Vec<Vec<u32>> = counts.iter().map(|&n| vec![NONE; n]).collect();
+    let mut mesh = TriMesh::default();
+    for (p, (patch, grid)) in network.patches.iter().zip(nodes).enumerate() {
+        let mut ids = vec![NONE; grid.points.len()];
+        for (k, side) in patch.sides.iter().enumerate() {
+            let n = if k % 2 == 0 { grid.cols } else { grid.rows };
+            for i in 0..n {
+                let here = node(grid.rows, grid.cols, k, i, 0);
+                let along = if side.reversed { n - 1 - i } else { i };
+                let ends = network.curves[side.curve as usize].corners;
+                let shared = match along {
+                    0 => corner_ids.get_mut(ends[0] as usize),
+                    a if a == n - 1 => corner_ids.get_mut(ends[1] as usize),
+                    a => curve_ids[side.curve as usize].get_mut(a),
+                };
+                let shared = shared.ok_or(ReliefError::Network { patch: p })?;
+                if *shared == NONE {
+                    *shared = mesh.points.len() as u32;
+                    mesh.points.push(grid.points[here]);
+                }
+                ids[here] = *shared;
+            }
+        }
+        for (id, &point) in ids.iter_mut().zip(&grid.points) {
+            if *id == NONE {
+                *id = mesh.points.len() as u32;
+                mesh.points.push(point);
+            }
+        }
+        let through = std::array::from_fn(|k| valence[network.corner(p, k) as usize] == 2);
+        split_quads(&mesh.points, &ids, grid.rows, grid.cols, through, &mut mesh.triangles);
+    }
+    Ok(mesh)
+}
+
+/// Splits each quad along its shorter diagonal (on a tie the one from the lower left) and leaves out triangles
+/// that have lost a corner to welding.
+///
+/// The quads at the corners of the patch with `through` are split through that corner: around a corner of
+/// valence 2 both quads have the same other diagonal, which must not become an edge of four triangles.
+fn split_quads(
+    points: &[DVec3],
+    ids: &[u32],
+    rows: usize,
+    cols: usize,
+    through: [bool; 4],
+    triangles: &mut Vec<[u32; 3]>,
+) {
+    let corners = [(0, 0), (cols - 2, 0), (cols - 2, rows - 2), (0, rows - 2)];
+    for j in 0..rows - 1 {
+        for i in 0..cols - 1 {
+            let at = |di: usize, dj: usize| ids[(j + dj) * cols + i + di];
+            let (a, b, c, d) = (at(0, 0), at(1, 0), at(1, 1), at(0, 1));
+            let length = |p: u32, q: u32| points[p as usize].distance_squared(points[q as usize]);
+            let forced = (0..4).find(|&k| through[k] && corners[k] == (i, j)).map(|k| k % 2 == 0);
+            let rising = forced.unwrap_or_else(|| length(a, c) <= length(b, d));
+            let halves = if rising { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
+            triangles.extend(halves.into_iter().filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]));
+        }
+    }
+}

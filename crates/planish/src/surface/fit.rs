@@ -1,0 +1,255 @@
+//! Least squares: a grid of points to a clamped uniform bicubic B-spline.
+//!
+//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §4.3.2 eq. 4.4 and §6.2: with nodes at
+//! uniform parameters, `P = B_u X B_v^T` separates into curve fits. The grid is read once, to form
+//! `B_u^T P B_v`; everything after that has the size of the control net.
+//!
+//! Departs from [K98]: the outer rings of control points can be given (exact seams), then the others are the
+//! least-squares solution for those.
+
+use super::basis::{BasisRows, uniform_knots, uniform_parameters};
+use super::{FitError, Surface};
+use crate::linalg::{Banded, BandedCholesky};
+use glam::DVec3;
+use std::collections::BTreeMap;
+
+/// Fewest control points along one direction: one cubic span.
+pub const FEWEST_CONTROL: usize = 4;
+
+/// Points per block of a row that are summed up together: four rows of data and four of sums stay in the
+/// first-level cache.
+const BLOCK: usize = 128;
+
+/// Fits a clamped uniform bicubic B-spline to a grid of points.
+///
+/// * `points` - `rows * cols` of them, row-major, world units; node `(i, j)` has the parameters
+///   `(i / (cols - 1), j / (rows - 1))`
+/// * `control` - control points along `v` and along `u`: `[rows, cols]`, each `4..=` the grid's count
+///
+/// # Errors
+/// [`FitError::TooFewPoints`] if a direction has fewer points than control points,
+/// [`FitError::TooFewControl`] below four, [`FitError::Shape`] if the number of points is not `rows * cols`.
+///
+/// Source: [K98] §4.3.2, eq. 4.4.
+pub fn fit(points: &[DVec3], rows: usize, cols: usize, control: [usize; 2]) -> Result<Surface, FitError> {
+    if points.len() != rows * cols {
+        return Err(FitError::Shape { patch: 0, rows, cols, points: points.len() });
+    }
+    let (along_v, along_u) = (Direction::new(rows, control[0])?, Direction::new(cols, control[1])?);
+    let projection = project(points, &along_u, &along_v);
+    let mut net = vec![DVec3::ZERO; control[0] * control[1]];
+    solve_inside(&mut net, &projection, &along_u, &along_v, 0);
+    Ok(surface_of(net, &along_u, &along_v))
+}
+
+/// What a fit of `count` nodes by `control` control points needs in one direction.
+#[derive(Clone, Debug)]
+pub(crate) struct Direction {
+    pub knots: Vec<f64>,
+    pub basis: BasisRows,
+    /// Normal matrix `B^T B`.
+    gram: Banded,
+    /// Its factors without the outer 0, 1 or 2 control points on either side.
+    factors: [BandedCholesky; 3],
+}
+
+impl Direction {
+    pub fn new(count: usize, control: usize) -> Result<Direction, FitError> {
+        if control < FEWEST_CONTROL {
+            return Err(FitError::TooFewControl { control });
+        }
+        if count < control {
+            return Err(FitError::TooFewPoints { points: count, control });
+        }
+        let knots = uniform_knots(control);
+        let basis = BasisRows::new(&knots, &uniform_parameters(count), 0);
+        let mut gram = Banded::zero(control, 3);
+        for (&first, w) in basis.first.iter().zip(&basis.weights) {
+            for a in 0..4 {
+                for b in 0..=a {
+                    gram.add(first + a, first + b, w[a] * w[b]);
+                }
+            }
+        }
+        let factor = |inset: usize| {
+            BandedCholesky::factor(gram.part(inset..control - inset))
+                .ok_or(FitError::Singular { points: count, control })
+        };
+        let factors = [factor(0)?, factor(1)?, factor(2)?];
+        Ok(Direction { knots, basis, gram, factors })
+    }
+
+    pub fn control(&self) -> usize {
+        self.gram.len()
+    }
+
+    pub fn factor(&self, inset: usize) -> &BandedCholesky {
+        &self.factors[inset]
+    }
+
+    /// `B^T x` for one value per node.
+    pub fn project(&self, nodes: impl Iterator<Item = DVec3>) -> Vec<DVec3> {
+        let mut sums = vec![DVec3::ZERO; self.control()];
+        for ((p, &first), w) in nodes.zip(&self.basis.first).zip(&self.basis.weights) {
+            for a in 0..4 {
+                sums[first + a] += p * w[a];
+            }
+        }
+        sums
+    }
+
+    /// Fits a curve to one point per node, keeping the outer `inset` values of `net` on either side.
+    pub fn fit_curve(&self, nodes: impl Iterator<Item = DVec3>, net: &mut [DVec3], inset: usize) {
+        let n = net.len();
+        let mut rhs = self.project(nodes);
+        for i in inset..n - inset {
+            for j in self.gram.columns(i).filter(|&j| j < inset || j >= n - inset) {
+                rhs[i] -= net[j] * self.gram.get(i, j);
+            }
+        }
+        self.factors[inset].solve(&mut rhs[inset..n - inset]);
+        net[inset..n - inset].copy_from_slice(&rhs[inset..n - inset]);
+    }
+}
+
+/// The directions of a whole network, factored once per pair of node count and control count.
+pub(crate) struct Directions(BTreeMap<(usize, usize), Direction>);
+
+impl Directions {
+    pub fn new(pairs: impl Iterator<Item = (usize, usize)>) -> Result<Directions, FitError> {
+        let mut map = BTreeMap::new();
+        for pair in pairs {
+            if let std::collections::btree_map::Entry::Vacant(slot) = map.entry(pair) {
+                slot.insert(Direction::new(pair.0, pair.1)?);
+            }
+        }
+        Ok(Directions(map))
+    }
+
+    /// The direction of `count` nodes and `control` control points, one of the pairs given to `new`.
+    pub fn get(&self, count: usize, control: usize) -> &Direction {
+        &self.0[&(count, control)]
+    }
+}
+
+/// `B_v^T P B_u`: the grid as far as the fit sees it, control net shaped.
+pub(crate) fn project(points: &[DVec3], along_u: &Direction, along_v: &Direction) -> Vec<DVec3> {
+    let cols = along_u.basis.len();
+    let narrow = project_rows(points, cols, &along_v.basis, along_v.control());
+    let mut net = Vec::with_capacity(along_u.control() * along_v.control());
+    for row in narrow.chunks_exact(cols) {
+        net.extend(along_u.project(row.iter().copied()));
+    }
+    net
+}
+
+/// `B^T P`: sums rows of `width` points into one row per control point.
+pub(crate) fn project_rows(points: &[DVec3], width: usize, basis: &BasisRows, control: usize) -> Vec<DVec3> {
+    let mut out = vec![DVec3::ZERO; control * width];
+    let mut j = 0;
+    while j < basis.len() {
+        let first = basis.first[j];
+        let span = basis.first[j..].iter().take_while(|&&f| f == first).count();
+        let (r0, rest) = out[first * width..(first + 4) * width].split_at_mut(width);
+        let (r1, rest) = rest.split_at_mut(width);
+        let (r2, r3) = rest.split_at_mut(width);
+        for start in (0..width).step_by(BLOCK) {
+            let block = start..(start + BLOCK).min(width);
+            let sums = [&mut r0[block.clone()], &mut r1[block.clone()], &mut r2[block.clone()], &mut r3[block.clone()]];
+            sum_block(sums, &points[j * width..(j + span) * width], width, block, &basis.weights[j..j + span]);
+        }
+        j += span;
+    }
+    out
+}
+
+/// Adds rows of data, each with its four weights, to four rows of sums.
+fn sum_block(
+    sums: [&mut [DVec3]; 4],
+    rows: &[DVec3],
+    width: usize,
+    block: std::ops::Range<usize>,
+    weights: &[[f64; 4]],
+) {
+    let [s0, s1, s2, s3] = sums;
+    let n = block.len();
+    let (s0, s1, s2, s3) = (&mut s0[..n], &mut s1[..n], &mut s2[..n], &mut s3[..n]);
+    let row = |r: usize| &rows[r * width + block.start..r * width + block.end];
+    let mut r = 0;
+    while r + 4 <= weights.len() {
+        let [a, b, c, d] = [weights[r], weights[r + 1], weights[r + 2], weights[r + 3]];
+        let (p, q, x, y) = (&row(r)[..n], &row(r + 1)[..n], &row(r + 2)[..n], &row(r + 3)[..n]);
+        for i in 0..n {
+            s0[i] += p[i] * a[0] + q[i] * b[0] + x[i] * c[0] + y[i] * d[0];
+            s1[i] += p[i] * a[1] + q[i] * b[1] + x[i] * c[1] + y[i] * d[1];
+            s2[i] += p[i] * a[2] + q[i] * b[2] + x[i] * c[2] + y[i] * d[2];
+            s3[i] += p[i] * a[3] + q[i] * b[3] + x[i] * c[3] + y[i] * d[3];
+        }
+        r += 4;
+    }
+    for r in r..weights.len() {
+        let (a, p) = (weights[r], &row(r)[..n]);
+        for i in 0..n {
+            s0[i] += p[i] * a[0];
+            s1[i] += p[i] * a[1];
+            s2[i] += p[i] * a[2];
+            s3[i] += p[i] * a[3];
+        }
+    }
+}
+
+/// Solves for the control points that have at least `inset` (0, 1 or 2) rings outside them; those rings of
+/// `net` are given and stay.
+pub(crate) fn solve_inside(
+    net: &mut [DVec3],
+    projection: &[DVec3],
+    along_u: &Direction,
+    along_v: &Direction,
+    inset: usize,
+) {
+    let (m, n) = (along_u.control(), along_v.control());
+    let (inner_m, inner_n) = (m - 2 * inset, n - 2 * inset);
+    if inner_m == 0 || inner_n == 0 {
+        return;
+    }
+    let inside = |i: usize, j: usize| i >= inset && i < m - inset && j >= inset && j < n - inset;
+    let mut rhs = Vec::with_capacity(inner_m * inner_n);
+    if inset == 0 {
+        rhs.extend_from_slice(projection);
+    } else {
+        // G_v C G_u of the given rings, rows first.
+        let mut half = vec![DVec3::ZERO; m * n];
+        for j in 0..n {
+            for i in inset..m - inset {
+                half[j * m + i] = along_u
+                    .gram
+                    .columns(i)
+                    .filter(|&k| !inside(k, j))
+                    .fold(DVec3::ZERO, |sum, k| sum + net[j * m + k] * along_u.gram.get(i, k));
+            }
+        }
+        for j in inset..n - inset {
+            for i in inset..m - inset {
+                let given =
+                    along_v.gram.columns(j).fold(DVec3::ZERO, |sum, k| sum + half[k * m + i] * along_v.gram.get(j, k));
+                rhs.push(projection[j * m + i] - given);
+            }
+        }
+    }
+    along_v.factor(inset).solve(&mut rhs);
+    for (row, j) in rhs.chunks_exact_mut(inner_m).zip(inset..) {
+        along_u.factor(inset).solve(row);
+        net[j * m + inset..j * m + m - inset].copy_from_slice(row);
+    }
+}
+
+/// The surface of a control net.
+pub(crate) fn surface_of(control: Vec<DVec3>, along_u: &Direction, along_v: &Direction) -> Surface {
+    Surface {
+        rows: along_v.control(),
+        cols: along_u.control(),
+        control,
+        knots_u: along_u.knots.clone(),
+        knots_v: along_v.knots.clone(),
+    }
+}

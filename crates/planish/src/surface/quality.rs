@@ -1,0 +1,131 @@
+//! How near the surfaces are to their grids and how well they meet.
+//!
+//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §6.2 eq. 6.1 (parametric distance) and
+//! §8.1.1 (normals along a seam; here their angle in degrees).
+
+use super::basis::{BasisRows, uniform_parameters};
+use super::sides::place;
+use super::{Surface, each_row};
+use crate::grid::Grid;
+use crate::network::{CurveKind, Network};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Fewest samples along a seam.
+const SEAM_SAMPLES: usize = 33;
+/// Samples per knot span of a longer one: a cubic's error between knots has at most three extremes.
+const SPAN_SAMPLES: usize = 4;
+/// Relative length of `S_u x S_v` below which a surface has no normal there.
+const FLAT: f64 = 1e-9;
+
+/// Parametric distances of grid nodes from their surfaces, world units.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Deviation {
+    /// Largest.
+    pub max: f64,
+    /// Root of the mean square.
+    pub rms: f64,
+    /// 95 of 100 are not larger.
+    pub p95: f64,
+}
+
+/// Parametric distances of all nodes of all grids from their surfaces ([K98] eq. 6.1).
+pub fn deviation(surfaces: &[Surface], grids: &[Grid]) -> Deviation {
+    summary(surfaces.par_iter().zip(grids).map(|(s, g)| distances(s, g)).collect::<Vec<_>>().concat())
+}
+
+/// Parametric distances of the nodes of one grid from its surface.
+pub fn deviation_of(surface: &Surface, grid: &Grid) -> Deviation {
+    summary(distances(surface, grid))
+}
+
+fn summary(mut distances: Vec<f64>) -> Deviation {
+    if distances.is_empty() {
+        return Deviation::default();
+    }
+    let n = distances.len();
+    let rms = (distances.iter().map(|d| d * d).sum::<f64>() / n as f64).sqrt();
+    let max = distances.iter().copied().fold(0.0, f64::max);
+    let (_, p95, _) = distances.select_nth_unstable_by((n - 1) * 95 / 100, f64::total_cmp);
+    Deviation { max, rms, p95: *p95 }
+}
+
+fn distances(surface: &Surface, grid: &Grid) -> Vec<f64> {
+    let along_u = BasisRows::new(&surface.knots_u, &uniform_parameters(grid.cols), 0);
+    let along_v = BasisRows::new(&surface.knots_v, &uniform_parameters(grid.rows), 0);
+    let mut out = Vec::with_capacity(grid.points.len());
+    each_row(surface, &along_u, &along_v, |row| {
+        let nodes = &grid.points[out.len()..];
+        out.extend(row.iter().zip(nodes).map(|(a, b)| a.distance(*b)));
+    });
+    out
+}
+
+/// How two patches meet along one curve.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SeamQuality {
+    /// Index of the curve.
+    pub curve: u32,
+    /// What it follows; a feature seam is meant to have an angle.
+    pub kind: CurveKind,
+    /// Largest distance between the two boundaries at equal parameters, world units.
+    pub gap_max: f64,
+    /// Largest angle between the two normals, degrees.
+    pub angle_max_deg: f64,
+    /// Root of the mean square of the angle, degrees.
+    pub angle_rms_deg: f64,
+    /// Mean angle, degrees.
+    pub angle_mean_deg: f64,
+    /// Length of the seam, world units.
+    pub length: f64,
+}
+
+/// Measures every curve that has a patch on both sides, in the order of the curves, at 33 samples or more.
+///
+/// Surfaces must be those of the network's patches. Samples where a surface has no normal (a corner with an
+/// angle of 0 or 180 degrees) count for the gap only.
+pub fn measure_seams(network: &Network, surfaces: &[Surface]) -> Vec<SeamQuality> {
+    let uses = network.uses();
+    (0..uses.len())
+        .into_par_iter()
+        .filter(|&c| uses[c].len() == 2 && uses[c].iter().all(|&(p, _)| (p as usize) < surfaces.len()))
+        .map(|c| measure(network, surfaces, c, [uses[c][0], uses[c][1]]))
+        .collect()
+}
+
+fn measure(network: &Network, surfaces: &[Surface], curve: usize, uses: [(u32, u8); 2]) -> SeamQuality {
+    let (first, k) = (&surfaces[uses[0].0 as usize], uses[0].1);
+    let spans = if k % 2 == 0 { first.cols } else { first.rows } - 3;
+    let samples = SEAM_SAMPLES.max(SPAN_SAMPLES * spans + 1);
+    let (mut gap_max, mut angle_max, mut squares, mut sum, mut angles, mut length) = (0f64, 0f64, 0.0, 0.0, 0, 0.0);
+    let mut last = None;
+    for t in uniform_parameters(samples) {
+        let [a, b] = uses.map(|(p, k)| {
+            let side = network.patches[p as usize].sides[k as usize];
+            let (u, v) = place(k as usize, side.reversed, t);
+            surfaces[p as usize].jet(u, v)
+        });
+        gap_max = gap_max.max(a.point.distance(b.point));
+        length += last.map_or(0.0, |l| a.point.distance(l));
+        last = Some(a.point);
+        let has_normal = |j: &super::Jet| j.area_vector().length() > FLAT * j.u.length() * j.v.length();
+        if has_normal(&a) && has_normal(&b) {
+            let (na, nb) = (a.area_vector().normalize(), b.area_vector().normalize());
+            let angle = na.cross(nb).length().atan2(na.dot(nb)).to_degrees();
+            angle_max = angle_max.max(angle);
+            squares += angle * angle;
+            sum += angle;
+            angles += 1;
+        }
+    }
+    let count = f64::from(angles.max(1));
+    SeamQuality {
+        curve: curve as u32,
+        kind: network.curves[curve].kind,
+        gap_max,
+        angle_max_deg: angle_max,
+        angle_rms_deg: (squares / count).sqrt(),
+        angle_mean_deg: sum / count,
+        length,
+    }
+}

@@ -1,0 +1,181 @@
+//! Reliefs and the meshes made of them.
+
+mod patchworks;
+
+use glam::DVec3;
+use patchworks::*;
+use planish::Silent;
+use planish::mesh::{Adjacency, NONE, TriMesh};
+use planish::network::CurveKind;
+use planish::relief::{self, Relief};
+use planish::surface::{self, FitParams, Resolution, Surface};
+
+fn fitted(work: &Patchwork, control: usize) -> (Vec<Surface>, Vec<Relief>) {
+    let params = FitParams { resolution: Resolution::Control([control, control]) };
+    let surfaces = surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap();
+    let reliefs = work.grids.iter().zip(&surfaces).map(|(g, s)| relief::bake(g, s).unwrap()).collect();
+    (surfaces, reliefs)
+}
+
+/// `(Euler number, boundary edges)`; panics if an edge is not used once in each direction at most.
+fn topology(mesh: &TriMesh) -> (i64, usize) {
+    let mut edges: Vec<[u32; 2]> =
+        mesh.triangles.iter().flat_map(|t| (0..3).map(move |k| [t[k], t[(k + 1) % 3]])).collect();
+    edges.sort_unstable();
+    assert!(edges.windows(2).all(|w| w[0] != w[1]), "an edge is used twice in one direction");
+    let open = edges.iter().filter(|e| edges.binary_search(&[e[1], e[0]]).is_err()).count();
+    let mut used: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    used.sort_unstable();
+    used.dedup();
+    let count = (edges.len() + open) / 2;
+    (used.len() as i64 - count as i64 + mesh.triangles.len() as i64, open)
+}
+
+fn volume(mesh: &TriMesh) -> f64 {
+    (0..mesh.triangles.len()).map(|t| mesh.corners(t)).map(|[a, b, c]| a.dot(b.cross(c))).sum::<f64>() / 6.0
+}
+
+#[test]
+fn displacing_returns_the_grid_within_1e_15_of_the_size() {
+    for work in [cube(33, CurveKind::Smooth, blob), torus(25), wavy([20, 31]), tube([30, 12]), purse(17)] {
+        let (surfaces, reliefs) = fitted(&work, 6);
+        for ((grid, s), r) in work.grids.iter().zip(&surfaces).zip(&reliefs) {
+            let back = relief::displace(s, r).unwrap();
+            let worst = back.iter().zip(&grid.points).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+            assert!(worst < 4e-15, "{worst:e}");
+        }
+    }
+}
+
+#[test]
+fn a_flat_net_with_skew_sides_gives_the_displacement_in_an_orthonormal_frame() {
+    // S_u = (1, 0, 0), S_v = (1, 1, 0): not orthogonal.
+    let base = grid(9, 9, |u, v| DVec3::new(u + v, v, 0.0));
+    let s = surface::fit(&base.points, 9, 9, [4, 4]).unwrap();
+    let bumped = grid(9, 9, |u, v| DVec3::new(u + v + 0.1, v + 0.2, 0.3 * u));
+    let map = relief::bake(&bumped, &s).unwrap();
+    for (i, d) in map.vectors.iter().enumerate() {
+        let want = DVec3::new(0.1, 0.2, 0.3 * (i % 9) as f64 / 8.0);
+        assert!(d.distance(want) < 1e-12);
+    }
+    assert_eq!(relief::normal_component(&map), map.vectors.iter().map(|d| d.z).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_side_collapsed_to_a_point_still_round_trips_and_has_an_orthonormal_frame() {
+    // A spherical cap: side 2 is the pole.
+    let cap = grid(17, 21, |u, v| {
+        let (a, b) = (u * 1.2, v * std::f64::consts::FRAC_PI_2);
+        DVec3::new(a.cos() * b.cos(), a.sin() * b.cos(), b.sin())
+    });
+    let pole = DVec3::Z;
+    let points: Vec<DVec3> = cap.points.iter().enumerate().map(|(i, &p)| if i / 21 == 16 { pole } else { p }).collect();
+    let cap = planish::grid::Grid { points, ..cap };
+    let mut s = surface::fit(&cap.points, 17, 21, [6, 6]).unwrap();
+    s.control[30..36].fill(pole);
+    for frame in relief::frames(&s, 17, 21) {
+        assert!((frame.tangent.length() - 1.0).abs() < 1e-12);
+        assert!(frame.tangent.cross(frame.bitangent).distance(frame.normal) < 1e-12);
+        assert!(frame.normal.dot(DVec3::ONE) > 0.0);
+    }
+    let map = relief::bake(&cap, &s).unwrap();
+    let back = relief::displace(&s, &map).unwrap();
+    assert!(back.iter().zip(&cap.points).all(|(a, b)| a.distance(*b) < 1e-14));
+    // A net that is one point has the world axes.
+    let dot = Surface { control: vec![DVec3::ONE; 36], ..s };
+    assert_eq!(relief::frame_at(&dot, 0.3, 0.7).normal, DVec3::Z);
+}
+
+#[test]
+fn displaced_rows_agree_across_every_seam_within_1e_14() {
+    let work = cube(33, CurveKind::Smooth, blob);
+    let (surfaces, reliefs) = fitted(&work, 7);
+    let mesh = relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap();
+    // Every displaced node of every patch has a vertex of the welded mesh at its place.
+    for (s, r) in surfaces.iter().zip(&reliefs) {
+        for p in relief::displace(s, r).unwrap() {
+            assert!(mesh.points.iter().any(|q| q.distance(p) < 1e-14));
+        }
+    }
+}
+
+#[test]
+fn closed_networks_give_closed_meshes_with_euler_number_2_or_0() {
+    for (work, euler) in [
+        (cube(17, CurveKind::Smooth, blob), 2),
+        (cube(9, CurveKind::Feature, |p| p), 2),
+        (torus(13), 0),
+        (one_patch_torus([24, 17]), 0),
+        (purse(16), 2),
+    ] {
+        let (surfaces, reliefs) = fitted(&work, 5);
+        let mesh = relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap();
+        assert_eq!(topology(&mesh), (euler, 0));
+        let adjacency = Adjacency::new(&mesh);
+        assert!(adjacency.opposite.iter().all(|&h| h != NONE));
+        let smooth = relief::surface_mesh(&work.network, &surfaces, &relief::span_shapes(&surfaces, 4)).unwrap();
+        assert_eq!(topology(&smooth), (euler, 0));
+    }
+}
+
+#[test]
+fn open_networks_keep_their_boundary_and_have_euler_number_1_or_0() {
+    for (work, euler) in [(wavy([9, 12]), 1), (tube([24, 10]), 0)] {
+        let (surfaces, reliefs) = fitted(&work, 5);
+        let mesh = relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap();
+        let (found, open) = topology(&mesh);
+        assert_eq!(found, euler);
+        assert!(open > 0);
+    }
+}
+
+#[test]
+fn a_cube_of_side_2_has_volume_8_within_1e_12() {
+    let work = cube(9, CurveKind::Feature, |p| p);
+    let (surfaces, reliefs) = fitted(&work, 5);
+    let mesh = relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap();
+    assert!((volume(&mesh) - 8.0).abs() < 1e-12);
+}
+
+#[test]
+fn displacement_beyond_the_radius_of_a_cylinder_is_a_fold() {
+    // Radius 1, the normal outward: S_u x S_v with u around and v up.
+    let work = tube([61, 9]);
+    let (surfaces, _) = fitted(&work, 9);
+    let map = |n: f64| Relief { rows: 9, cols: 61, vectors: vec![DVec3::new(0.0, 0.0, n); 9 * 61] };
+    assert!(relief::fold_over(&surfaces[0], &map(-0.8)).unwrap().is_empty());
+    assert!(relief::fold_over(&surfaces[0], &map(5.0)).unwrap().is_empty());
+    assert_eq!(relief::fold_over(&surfaces[0], &map(-1.2)).unwrap().len(), 9 * 61);
+}
+
+#[test]
+fn a_patch_mesh_puts_its_nodes_on_texel_centres() {
+    let g = grid(3, 5, |u, v| DVec3::new(u, v, 0.0));
+    let mesh = relief::patch_mesh(g.points, 3, 5).unwrap();
+    assert_eq!(mesh.triangles.len(), 16);
+    assert_eq!(mesh.attributes[0].values[2 * 7..2 * 8], [0.5, 0.5]);
+    assert!(mesh.triangles.iter().enumerate().all(|(t, _)| mesh.area_vector(t).z > 0.0));
+}
+
+#[test]
+fn lists_that_do_not_fit_are_errors() {
+    let work = torus(9);
+    let (surfaces, mut reliefs) = fitted(&work, 5);
+    assert!(relief::displaced_mesh(&work.network, &surfaces[1..], &reliefs).is_err());
+    reliefs[3].vectors.pop();
+    let error = relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap_err();
+    assert!(error.to_string().contains("patch 3"), "{error}");
+}
+
+#[test]
+fn displaced_mesh_is_the_same_to_the_bit_on_1_and_4_threads() {
+    let work = cube(25, CurveKind::Smooth, blob);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let (surfaces, reliefs) = fitted(&work, 8);
+            relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap()
+        })
+    };
+    assert_eq!(run(1), run(4));
+}
