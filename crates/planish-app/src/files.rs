@@ -3,6 +3,7 @@
 use crate::failure::Failure;
 use planish::mesh::TriMesh;
 use planish::model::{Model, Units};
+use planish::network::Network;
 use planish_io::report::Input;
 use std::path::Path;
 
@@ -76,4 +77,13 @@ pub fn check_extension(path: &Path, wanted: &[&str]) -> Result<(), Failure> {
     }
     let list: Vec<String> = wanted.iter().map(|e| format!(".{e}")).collect();
     Err(Failure::usage(path, "has an extension that names no format for this").hint(format!("use {}", list.join(", "))))
+}
+
+/// Reads a network on `input`, if one is given. Its places lie on the mesh as repair leaves it.
+/// # Errors
+/// If the file is no network, or one of another mesh.
+pub fn optional_network(path: Option<&Path>, input: &TriMesh) -> Result<Option<Network>, Failure> {
+    let Some(path) = path else { return Ok(None) };
+    let (repaired, _) = planish::mesh::repair(input).map_err(|e| Failure::input(path, e))?;
+    planish_io::read_network(path, &repaired).map(Some).map_err(|e| Failure::input(path, e))
 }

@@ -8,6 +8,7 @@ pub mod atomic;
 mod error;
 mod gltf;
 mod mesh_file;
+mod network_file;
 mod obj;
 mod place;
 mod ply;
@@ -19,4 +20,5 @@ mod weld;
 
 pub use error::{ReadError, WriteError};
 pub use mesh_file::{MeshFormat, Up, WriteOptions, read_mesh, write_mesh};
+pub use network_file::{NetworkFileError, read_network, write_network};
 pub use place::Place;

@@ -6,11 +6,11 @@
 mod quality;
 mod record;
 
-pub use quality::{SEAM_ANGLE_WARNING_DEG, worst_seams};
+pub use quality::{SEAM_ANGLE_WARNING_DEG, displaced_mesh, surface_mesh, worst_seams};
 pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
 
 use crate::grid::{self, GridError, GridParams};
-use crate::mesh::{self, CompareError, MeshError, TriMesh};
+use crate::mesh::{self, CompareError, MeshError, Repairs, TriMesh};
 use crate::model::Model;
 use crate::network::{self, ImprintError, LayoutError, LayoutParams, Network};
 use crate::relief::{self, ReliefError};
@@ -103,7 +103,7 @@ pub fn fit(
     params: &PipelineParams,
     observer: &dyn PipelineObserver,
 ) -> Result<Fitted, PipelineError> {
-    run(input, network, params, observer).map_err(|e| if observer.cancelled() { PipelineError::Cancelled } else { e })
+    run(input, network, params, observer).map_err(|e| or_cancelled(e, observer))
 }
 
 fn run(
@@ -113,11 +113,10 @@ fn run(
     observer: &dyn PipelineObserver,
 ) -> Result<Fitted, PipelineError> {
     let mut clock = Clock::new(observer, &WEIGHTS);
-    let (mesh, repairs) =
-        clock.stage("repair", |_| mesh::repair(input), |(mesh, _)| [("triangles", mesh.triangles.len())])?;
+    let (mesh, repairs) = repair(input, &mut clock)?;
     let network = match network {
         Some(network) => network,
-        None => clock.stage("layout", |o| network::layout(&mesh, &params.layout, o), |n| [("patches", n.patches.len())])?,
+        None => draw(&mesh, &params.layout, &mut clock)?,
     };
     let patches = clock.stage("imprint", |_| network::imprint(&mesh, &network), |p| [("patches", p.len())])?;
     let sizes = grid::choose_sizes(&network, &patches, &params.grid);
@@ -138,6 +137,42 @@ fn run(
     })
 }
 
+/// What [`layout`] makes.
+#[derive(Clone, Debug)]
+pub struct Drafted {
+    /// The repaired mesh, on which the network lies.
+    pub mesh: TriMesh,
+    /// The network.
+    pub network: Network,
+    /// The stages that ran.
+    pub stages: Vec<StageRecord>,
+    /// Figures of quality.
+    pub quality: Quality,
+    /// What a user should know.
+    pub warnings: Vec<Warning>,
+}
+
+/// The stages up to the network, for one that is edited before it goes on to [`fit`].
+/// # Errors
+/// As [`fit`].
+pub fn layout(
+    input: &TriMesh,
+    params: &LayoutParams,
+    observer: &dyn PipelineObserver,
+) -> Result<Drafted, PipelineError> {
+    let mut clock = Clock::new(observer, &WEIGHTS[..2]);
+    let draft = |clock: &mut Clock| {
+        let (mesh, repairs) = repair(input, clock)?;
+        let network = draw(&mesh, params, clock)?;
+        Ok::<_, PipelineError>((mesh, repairs, network))
+    };
+    let (mesh, repairs, network) = draft(&mut clock).map_err(|e| or_cancelled(e, observer))?;
+    let (mut quality, mut warnings) = (Quality::new(), Vec::new());
+    quality::mesh_figures(&mesh, &network, &repairs, &mut quality, &mut warnings);
+    quality::network_figures(&network, &mut quality);
+    Ok(Drafted { mesh, network, stages: clock.records, quality, warnings })
+}
+
 /// Fits surfaces, seams and reliefs of a model anew and keeps its mesh, network and grids.
 ///
 /// Returns the stages that ran. On an error the model is what it was.
@@ -149,8 +184,21 @@ pub fn refit(
     observer: &dyn PipelineObserver,
 ) -> Result<Vec<StageRecord>, PipelineError> {
     let mut clock = Clock::new(observer, &WEIGHTS);
-    surfaces(model, params, &mut clock).map_err(|e| if observer.cancelled() { PipelineError::Cancelled } else { e })?;
+    surfaces(model, params, &mut clock).map_err(|e| or_cancelled(e, observer))?;
     Ok(clock.records)
+}
+
+/// A stage that was stopped fails with an error of its own; to the caller it is always the same.
+fn or_cancelled(error: PipelineError, observer: &dyn PipelineObserver) -> PipelineError {
+    if observer.cancelled() { PipelineError::Cancelled } else { error }
+}
+
+fn repair(input: &TriMesh, clock: &mut Clock) -> Result<(TriMesh, Repairs), PipelineError> {
+    Ok(clock.stage("repair", |_| mesh::repair(input), |(mesh, _)| [("triangles", mesh.triangles.len())])?)
+}
+
+fn draw(mesh: &TriMesh, params: &LayoutParams, clock: &mut Clock) -> Result<Network, PipelineError> {
+    Ok(clock.stage("layout", |o| network::layout(mesh, params, o), |n| [("patches", n.patches.len())])?)
 }
 
 /// The stages from the grids to the reliefs.

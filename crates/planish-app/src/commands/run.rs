@@ -19,7 +19,7 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
     let staged = Staged::folder(&args.output)?;
     let params = args.stages.params(session.common.seed)?;
     let (input, read) = session.step("read", || files::mesh(&args.input))?;
-    let network = args.network.as_deref().map(|path| files::network(path, &input)).transpose()?;
+    let network = files::optional_network(args.network.as_deref(), &input)?;
     let job = Job {
         command: "run",
         path: &args.input,
@@ -148,7 +148,6 @@ fn seam_rows(model: &Model, seams: &[planish::surface::SeamQuality]) -> Vec<Seam
                 curve: s.curve,
                 patches: [sides[0].0, sides[1].0],
                 feature: s.kind != planish::network::CurveKind::Smooth,
-                length: s.length,
                 gap_max: s.gap_max,
                 angle_max_deg: s.angle_max_deg,
                 angle_rms_deg: s.angle_rms_deg,

@@ -57,14 +57,14 @@ pub struct SeamRow {
     pub patches: [u32; 2],
     /// True along a feature: such a seam is meant to have an angle.
     pub feature: bool,
+    /// Length of the seam, input units.
+    pub length: f64,
     /// Largest distance between the two boundaries, input units.
     pub gap_max: f64,
     /// Largest angle between the two normals, degrees.
     pub angle_max_deg: f64,
     /// Root mean square of that angle, degrees.
     pub angle_rms_deg: f64,
-    /// Place of the largest angle, input units.
-    pub at: [f64; 3],
 }
 
 impl Report {

@@ -34,12 +34,13 @@ pub struct Scale {
 }
 
 /// Figures of quality in words: key, meaning, and how the value is read.
-const FIGURES: [(&str, &str, Reading); 22] = [
+const FIGURES: [(&str, &str, Reading); 23] = [
     ("mesh.triangles", "Triangles of the mesh after repair", Reading::Plain),
     ("mesh.watertight", "The mesh is closed", Reading::Plain),
     ("mesh.manifold", "The mesh is manifold", Reading::Plain),
     ("mesh.feature_edges", "Sharp edges found", Reading::Plain),
     ("patches.count", "Four-sided patches", Reading::Plain),
+    ("patches.irregular_corners", "Corners where not four patches meet", Reading::Plain),
     ("grid.points", "Points of all grids", Reading::Plain),
     ("grid.folds", "Folded grid cells", Reading::Plain),
     ("grid.spacing_cv", "Unevenness of grid spacing (deviation over mean)", Reading::Fraction),
@@ -250,14 +251,14 @@ fn seams(page: &mut String, report: &Report) {
         page,
         "<h2>Seams</h2>\n<p class=\"note\">{}</p>\n<div class=\"scroll\"><table><thead><tr><th>Curve</th>\
          <th>Between patches</th><th class=\"n\">Angle, largest</th><th class=\"n\">Angle, RMS</th>\
-         <th class=\"n\">Gap</th><th>Worst place (x, y, z)</th></tr></thead><tbody>\n",
+         <th class=\"n\">Gap</th><th class=\"n\">Length</th></tr></thead><tbody>\n",
         escape(&note)
     );
     for seam in smooth.iter().take(SEAMS_SHOWN) {
         let _ = writeln!(
             page,
             "<tr><td>{}</td><td>{} and {}</td><td class=\"n\">{}°</td><td class=\"n\">{}°</td><td class=\"n\">{} {}</td>\
-             <td>{}, {}, {}</td></tr>",
+             <td class=\"n\">{} {}</td></tr>",
             seam.curve,
             seam.patches[0],
             seam.patches[1],
@@ -265,9 +266,8 @@ fn seams(page: &mut String, report: &Report) {
             number(seam.angle_rms_deg),
             number(seam.gap_max),
             escape(&report.input.units),
-            number(seam.at[0]),
-            number(seam.at[1]),
-            number(seam.at[2])
+            number(seam.length),
+            escape(&report.input.units)
         );
     }
     page.push_str("</tbody></table></div>\n");

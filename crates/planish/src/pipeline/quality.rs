@@ -4,7 +4,7 @@ use super::{Figure, PipelineError, Quality, Warning};
 use crate::grid;
 use crate::mesh::{self, CompareParams, Comparison, Repairs, TriMesh};
 use crate::model::Model;
-use crate::network::{CurveKind, PatchMesh};
+use crate::network::{CurveKind, Network, PatchMesh};
 use crate::observe::Observer;
 use crate::relief;
 use crate::surface::{self, SeamQuality};
@@ -33,7 +33,8 @@ pub(super) fn measure(
     let mut quality = Quality::new();
     let mut warnings = Vec::new();
     let diagonal = model.mesh.bounds().diagonal();
-    mesh_figures(model, repairs, &mut quality, &mut warnings);
+    mesh_figures(&model.mesh, &model.network, repairs, &mut quality, &mut warnings);
+    network_figures(&model.network, &mut quality);
     grid_figures(model, patches, &mut quality, &mut warnings);
     let seams = seam_figures(model, diagonal, &mut quality, &mut warnings);
     observer.progress(0.1);
@@ -44,15 +45,24 @@ pub(super) fn measure(
     length(&mut quality, "surface.patch_rms_max", worst.reduce(|| 0.0, f64::max), diagonal);
     let base = surface_mesh(model)?;
     distances(&mut quality, "surface", &compare(&model.mesh, &base, &Share(observer, 0.1, 0.45))?, diagonal);
-    let displaced = relief::displaced_mesh(&model.network, &model.surfaces, &model.reliefs)?;
+    let displaced = displaced_mesh(model)?;
     distances(&mut quality, "displaced", &compare(&model.mesh, &displaced, &Share(observer, 0.55, 0.45))?, diagonal);
     relief_figures(model, diagonal, &mut quality, &mut warnings)?;
     observer.progress(1.0);
     Ok(Measured { quality, seams, warnings })
 }
 
+/// The surfaces of a model with their displacement as one mesh: its grids.
+/// # Errors
+/// If the parts of the model do not belong together.
+pub fn displaced_mesh(model: &Model) -> Result<TriMesh, PipelineError> {
+    Ok(relief::displaced_mesh(&model.network, &model.surfaces, &model.reliefs)?)
+}
+
 /// The smooth surfaces of a model as one mesh, fine enough to measure distances on.
-pub(super) fn surface_mesh(model: &Model) -> Result<TriMesh, PipelineError> {
+/// # Errors
+/// If the parts of the model do not belong together.
+pub fn surface_mesh(model: &Model) -> Result<TriMesh, PipelineError> {
     let shapes = relief::span_shapes(&model.surfaces, CUTS_PER_SPAN);
     Ok(relief::surface_mesh(&model.network, &model.surfaces, &shapes)?)
 }
@@ -90,21 +100,27 @@ fn length(quality: &mut Quality, key: &str, value: f64, diagonal: f64) {
 }
 
 fn distances(quality: &mut Quality, name: &str, found: &Comparison, diagonal: f64) {
-    let both = &found.two_sided;
+    let both = &found.both;
     for (key, value) in [("rms", both.rms), ("max", both.max), ("p95", both.p95)] {
         length(quality, &format!("{name}.{key}"), value, diagonal);
     }
 }
 
-fn mesh_figures(model: &Model, repairs: &Repairs, quality: &mut Quality, warnings: &mut Vec<Warning>) {
-    let facts = mesh::diagnose(&model.mesh);
-    let sharp = model.network.curves.iter().filter(|c| c.kind == CurveKind::Feature).map(|c| c.points.len() - 1);
+pub(super) fn mesh_figures(
+    mesh: &TriMesh,
+    network: &Network,
+    repairs: &Repairs,
+    quality: &mut Quality,
+    warnings: &mut Vec<Warning>,
+) {
+    let facts = mesh::diagnose(mesh);
+    let sharp = network.curves.iter().filter(|c| c.kind == CurveKind::Feature).map(|c| c.points.len() - 1);
     quality.insert("mesh.triangles".into(), Figure::Count(facts.triangles as u64));
     quality.insert("mesh.watertight".into(), Figure::Flag(facts.watertight));
     quality.insert("mesh.manifold".into(), Figure::Flag(facts.manifold));
     quality.insert("mesh.feature_edges".into(), Figure::Count(sharp.sum::<usize>() as u64));
     if repairs.any() {
-        warnings.push(Warning::new("mesh_repaired", repairs.to_string(), ""));
+        warnings.push(Warning::new("mesh_repaired", in_words(repairs), ""));
     }
     if repairs.degenerate_left > 0 {
         let text = format!("{} triangles without height could not be removed.", repairs.degenerate_left);
@@ -122,12 +138,44 @@ fn mesh_figures(model: &Model, repairs: &Repairs, quality: &mut Quality, warning
     }
 }
 
+/// What was repaired, as one sentence.
+fn in_words(repairs: &Repairs) -> String {
+    let done = [
+        (repairs.welded_vertices, "vertices at one place merged"),
+        (repairs.repeated_faces, "triangles with a repeated vertex dropped"),
+        (repairs.duplicate_faces, "duplicate triangles dropped"),
+        (repairs.cut_edges, "edges of more than two triangles cut"),
+        (repairs.one_sided_edges, "edges of one-sided pieces cut"),
+        (repairs.turned_faces, "triangles turned round"),
+        (repairs.turned_components, "pieces turned inside out"),
+        (repairs.split_vertices, "vertices split"),
+        (repairs.collapsed_edges + repairs.flipped_edges + repairs.trimmed_faces, "triangles without height removed"),
+        (repairs.unreferenced_vertices, "unused vertices dropped"),
+    ];
+    let words: Vec<String> = done.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+    format!("The mesh was repaired: {}.", words.join(", "))
+}
+
+pub(super) fn network_figures(network: &Network, quality: &mut Quality) {
+    let mut valence = vec![0usize; network.corners.len()];
+    let mut boundary = vec![false; network.corners.len()];
+    for curve in &network.curves {
+        for &corner in &curve.corners {
+            valence[corner as usize] += 1;
+            boundary[corner as usize] |= curve.kind == CurveKind::Boundary;
+        }
+    }
+    let regular = |(&n, &rim): (&usize, &bool)| n == if rim { 3 } else { 4 };
+    let irregular = valence.iter().zip(&boundary).filter(|c| !regular(*c)).count();
+    quality.insert("patches.count".into(), Figure::Count(network.patches.len() as u64));
+    quality.insert("patches.irregular_corners".into(), Figure::Count(irregular as u64));
+}
+
 fn grid_figures(model: &Model, patches: &[PatchMesh], quality: &mut Quality, warnings: &mut Vec<Warning>) {
     let grids: Vec<grid::GridQuality> =
         model.grids.par_iter().zip(patches).map(|(grid, patch)| grid::measure(grid, patch)).collect();
     let folds: usize = grids.iter().map(|g| g.folds).sum();
     let mean = |f: fn(&grid::GridQuality) -> f64| grids.iter().map(f).sum::<f64>() / grids.len().max(1) as f64;
-    quality.insert("patches.count".into(), Figure::Count(model.network.patches.len() as u64));
     quality.insert("grid.points".into(), Figure::Count(model.grids.iter().map(|g| g.points.len() as u64).sum()));
     quality.insert("grid.folds".into(), Figure::Count(folds as u64));
     quality.insert("grid.spacing_cv".into(), Figure::Number(mean(|g| g.spacing_cv)));
