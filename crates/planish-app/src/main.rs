@@ -3,7 +3,9 @@
 mod args;
 mod commands;
 mod failure;
+mod files;
 mod options;
+mod pictures;
 mod progress;
 mod products;
 mod summary;

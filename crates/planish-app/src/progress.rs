@@ -56,13 +56,14 @@ impl Bars {
     }
 
     /// Runs one step outside the pipeline (reading, writing, drawing) under a bar of its own.
-    pub fn step<T>(&self, name: &'static str, work: impl FnOnce(&dyn Observer) -> T) -> T {
+    pub fn step<T>(&self, name: &'static str, work: impl FnOnce(&dyn Observer) -> T) -> (T, StageRecord) {
         self.begins(name, 0.0);
         let start = Instant::now();
         let result = work(self);
         let (seconds, peak_bytes) = (start.elapsed().as_secs_f64(), peak_bytes());
-        self.ends(&StageRecord { name: name.into(), seconds, peak_bytes, counts: Default::default() });
-        result
+        let record = StageRecord { name: name.into(), seconds, peak_bytes, counts: Default::default() };
+        self.ends(&record);
+        (result, record)
     }
 
     fn advance(&self, fraction: f64) {

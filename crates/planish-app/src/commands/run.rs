@@ -148,6 +148,7 @@ fn seam_rows(model: &Model, seams: &[planish::surface::SeamQuality]) -> Vec<Seam
                 curve: s.curve,
                 patches: [sides[0].0, sides[1].0],
                 feature: s.kind != planish::network::CurveKind::Smooth,
+                length: s.length,
                 gap_max: s.gap_max,
                 angle_max_deg: s.angle_max_deg,
                 angle_rms_deg: s.angle_rms_deg,
@@ -163,8 +164,9 @@ fn write_products(staged: &Staged, output: &Path, model: &Model, options: &Write
     };
     planish_io::write_mesh(staged.path("mesh.ply"), &model.mesh, options).map_err(wrong("mesh.ply"))?;
     planish_io::write_model(staged.path("model.planish"), model).map_err(wrong("model.planish"))?;
-    planish_io::export(staged.path("surface.step"), model, options).map_err(wrong("surface.step"))?;
-    planish_io::export(staged.path("preview.glb"), model, options).map_err(wrong("preview.glb"))?;
+    planish_io::write_step(staged.path("surface.step"), model, options).map_err(wrong("surface.step"))?;
+    let displaced = pipeline::displaced_mesh(model).map_err(Failure::fault)?;
+    planish_io::write_mesh(staged.path("preview.glb"), &displaced, options).map_err(wrong("preview.glb"))?;
     planish_io::write_relief(staged.path("relief"), model).map_err(wrong("relief"))?;
     Ok(())
 }
