@@ -8,6 +8,7 @@ use planish::model::Units;
 use planish::network::LayoutParams;
 use planish::pipeline::PipelineParams;
 use planish::surface::{FitParams, StitchParams};
+use planish_io::Up;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -97,6 +98,24 @@ impl From<UnitsWord> for Units {
     }
 }
 
+/// An axis that points up.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum UpWord {
+    /// Y, as in most animation programs
+    Y,
+    /// Z, as in most CAD programs and scanners
+    Z,
+}
+
+impl From<UpWord> for Up {
+    fn from(word: UpWord) -> Up {
+        match word {
+            UpWord::Y => Up::Y,
+            UpWord::Z => Up::Z,
+        }
+    }
+}
+
 /// `planish demo`
 #[derive(Args, Debug)]
 pub struct Demo {
@@ -121,6 +140,9 @@ pub struct Run {
     /// Network to use instead of an automatic one
     #[arg(long, value_name = "NETWORK.json")]
     pub network: Option<PathBuf>,
+    /// Axis of the input that points up, for pictures and GLB
+    #[arg(long, value_name = "AXIS", default_value = "y")]
+    pub up: UpWord,
     #[command(flatten)]
     pub common: Common,
     #[command(flatten)]
@@ -170,6 +192,9 @@ pub struct Export {
     /// Which surface a mesh format gets
     #[arg(long, value_name = "WORD", default_value = "displaced")]
     pub surface: SurfaceWord,
+    /// Axis of the model that points up; GLB is turned accordingly
+    #[arg(long, value_name = "AXIS", default_value = "y")]
+    pub up: UpWord,
     #[command(flatten)]
     pub common: Common,
 }

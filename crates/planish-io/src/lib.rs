@@ -6,6 +6,7 @@
 
 pub mod atomic;
 mod error;
+mod export;
 mod gltf;
 mod mesh_file;
 mod network_file;
@@ -13,12 +14,19 @@ mod obj;
 mod place;
 mod ply;
 mod polygon;
+pub mod project;
+mod relief_files;
 pub mod report;
+mod step;
 mod stl;
 mod text;
 mod weld;
 
 pub use error::{ReadError, WriteError};
+pub use export::{ExportKind, export, export_kind, export_mesh};
 pub use mesh_file::{MeshFormat, Up, WriteOptions, read_mesh, write_mesh};
 pub use network_file::{NetworkFileError, read_network, write_network};
 pub use place::Place;
+pub use project::{ProjectError, read_model, write_model};
+pub use relief_files::{read_relief, write_relief};
+pub use step::{StepInput, StepSummary, write_step};

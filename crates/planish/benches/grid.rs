@@ -12,13 +12,9 @@ fn main() {
     let filter = std::env::args().skip(1).find(|a| !a.starts_with('-')).unwrap_or_default();
     let mut all: Vec<(patches::Sheet, usize)> = patches::snouts(256).into_iter().map(|s| (s, 257)).collect();
     all.extend(patches::sheets(129).into_iter().map(|s| (s, 129)));
-    for (file, seed, size) in
-        [("bunny.ply", 30_000, 20_000), ("armadillo.ply", 3_000, 20_000), ("gargoyle.ply", 50_000, 20_000)]
-    {
-        if let Some(path) = patches::data_file(file) {
-            let sheet = patches::grow(&format!("{file} {seed}"), &patches::read_ply(&path), seed, size);
-            all.push((sheet, 101));
-        }
+    for sheet in patches::scan_disks(0.1).into_iter().filter_map(|(_, disks)| disks).flatten() {
+        let n = (sheet.patch.mesh.points.len() as f64).sqrt().ceil() as usize;
+        all.push((sheet, n.max(17)));
     }
     let mut out = std::io::stdout().lock();
     let header =

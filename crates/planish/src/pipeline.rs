@@ -207,7 +207,7 @@ fn surfaces(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Re
     let control = |s: &Vec<surface::Surface>| [("control_points", s.iter().map(|s| s.control.len()).sum())];
     let fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &params.fit, o), control)?;
     let smooth =
-        clock.stage("seams", |o| surface::stitch(network, grids, fitted, &params.stitch, o), |_| [("curves", network.curves.len())])?;
+        clock.stage("seams", |o| surface::stitch(network, grids, &fitted, &params.stitch, o), |_| [("curves", network.curves.len())])?;
     let reliefs = clock.stage(
         "relief",
         |_| grids.par_iter().zip(&smooth).map(|(grid, surface)| relief::bake(grid, surface)).collect::<Result<Vec<_>, _>>(),

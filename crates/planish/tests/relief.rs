@@ -22,7 +22,10 @@ fn topology(mesh: &TriMesh) -> (i64, usize) {
     let mut edges: Vec<[u32; 2]> =
         mesh.triangles.iter().flat_map(|t| (0..3).map(move |k| [t[k], t[(k + 1) % 3]])).collect();
     edges.sort_unstable();
-    assert!(edges.windows(2).all(|w| w[0] != w[1]), "an edge is used twice in one direction");
+    if let Some(w) = edges.windows(2).find(|w| w[0] == w[1]) {
+        let at = w[0].map(|v| mesh.points[v as usize]);
+        panic!("edge {:?} at {at:?} is used twice in one direction", w[0]);
+    }
     let open = edges.iter().filter(|e| edges.binary_search(&[e[1], e[0]]).is_err()).count();
     let mut used: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
     used.sort_unstable();

@@ -223,3 +223,29 @@ fn fit_is_the_same_to_the_bit_on_1_and_4_threads() {
     };
     assert_eq!(run(1), run(4));
 }
+
+#[test]
+fn probe() {
+    for (name, work) in [
+        ("blob", cube(41, CurveKind::Smooth, blob)),
+        ("sphere", cube(41, CurveKind::Smooth, to_sphere)),
+        ("torus", torus(33)),
+        ("wavy", wavy([33, 33])),
+    ] {
+        for m in [4, 5, 6, 8, 10, 12, 16, 24] {
+            let before = fit(&work, &control(m, m));
+            let after = surface::stitch(&work.network, &work.grids, &before, &Default::default(), &Silent).unwrap();
+            for (s, t) in [("fit", &before), ("stitched", &after)] {
+                let seams = surface::measure_seams(&work.network, t);
+                let max = seams.iter().map(|s| s.angle_max_deg).fold(0.0, f64::max);
+                let mean = seams.iter().map(|s| s.angle_mean_deg).sum::<f64>() / seams.len() as f64;
+                let gap = seams.iter().map(|s| s.gap_max).fold(0.0, f64::max);
+                let d = surface::deviation(t, &work.grids);
+                println!(
+                    "{name} {m:3} {s:9} angle mean {mean:.5} max {max:.4} gap {gap:.1e} rms {:.2e} max {:.2e}",
+                    d.rms, d.max
+                );
+            }
+        }
+    }
+}

@@ -7,22 +7,15 @@ use crate::files;
 use crate::products::Staged;
 use crate::summary::Summary;
 use planish::pipeline;
-use planish_io::WriteOptions;
+use planish_io::{ExportKind, StepInput, WriteError, WriteOptions};
 use planish_io::report::Report;
-
-/// Formats that hold the surfaces themselves.
-const SURFACE_FORMATS: [&str; 2] = ["step", "stp"];
-/// Formats that hold a mesh.
-const MESH_FORMATS: [&str; 4] = ["ply", "obj", "stl", "glb"];
 
 pub fn export(session: &Session, args: &Export) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
-    let extension = args.output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    let maps = extension.is_empty();
-    if !maps {
-        files::check_extension(&args.output, &[&SURFACE_FORMATS[..], &MESH_FORMATS[..]].concat())?;
-    }
-    let staged = if maps { Staged::folder(&args.output)? } else { Staged::file(&args.output)? };
+    let wrong = |e: WriteError| Failure::usage(&args.output, e);
+    let kind = planish_io::export_kind(&args.output).map_err(wrong)?;
+    let staged =
+        if kind == ExportKind::Relief { Staged::folder(&args.output)? } else { Staged::file(&args.output)? };
     let (mut model, read) = session.step("read", || files::model(&args.model))?;
     if let Some(units) = session.common.units {
         model.units = units.into();
@@ -30,23 +23,24 @@ pub fn export(session: &Session, args: &Export) -> Result<Status, Failure> {
     let options = WriteOptions {
         units: model.units,
         name: args.model.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-        ..WriteOptions::default()
+        up: args.up.into(),
     };
-    let wrong = |e: planish_io::WriteError| Failure::usage(&args.output, e);
     let unfit = |e: pipeline::PipelineError| Failure::input(&args.model, e).hint("fit it again with `planish fit`");
-    let ((), write) = session.step("write", || {
-        if maps {
-            return planish_io::write_relief(staged.path(""), &model).map_err(wrong);
+    let ((), write) = session.step("write", || match kind {
+        ExportKind::Relief => planish_io::write_relief(staged.path(""), &model.reliefs, model.units).map_err(wrong),
+        ExportKind::Step => {
+            let (network, surfaces) = (&model.network, model.surfaces.as_slice());
+            let step = StepInput { network, surfaces, units: model.units, name: &options.name, time: None };
+            planish_io::write_step(staged.file_path(), &step).map(drop).map_err(wrong)
         }
-        if SURFACE_FORMATS.contains(&extension.as_str()) {
-            return planish_io::write_step(staged.file_path(), &model, &options).map_err(wrong);
+        ExportKind::Mesh => {
+            let mesh = match args.surface {
+                SurfaceWord::Displaced => &pipeline::displaced_mesh(&model).map_err(unfit)?,
+                SurfaceWord::Base => &pipeline::surface_mesh(&model).map_err(unfit)?,
+                SurfaceWord::Mesh => &model.mesh,
+            };
+            planish_io::write_mesh(staged.file_path(), mesh, &options).map_err(wrong)
         }
-        let mesh = match args.surface {
-            SurfaceWord::Displaced => &pipeline::displaced_mesh(&model).map_err(unfit)?,
-            SurfaceWord::Base => &pipeline::surface_mesh(&model).map_err(unfit)?,
-            SurfaceWord::Mesh => &model.mesh,
-        };
-        planish_io::write_mesh(staged.file_path(), mesh, &options).map_err(wrong)
     })?;
     staged.commit()?;
     let mut report = Report::new("export", files::model_facts(&args.model, &model, model.units));

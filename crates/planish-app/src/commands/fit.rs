@@ -6,6 +6,7 @@ use crate::args::Fit;
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::products::Staged;
+use planish_io::Up;
 
 pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
     files::check_extension(&args.output, &["planish"])?;
@@ -23,6 +24,7 @@ pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
         params,
         demanded,
         output: &args.output,
+        up: Up::default(),
     };
     let (mut report, model) = fitted(session, job, vec![read])?;
     let write = || planish_io::write_model(staged.file_path(), &model).map_err(|e| Failure::usage(&args.output, e));

@@ -11,7 +11,7 @@ use planish::mesh::TriMesh;
 use planish::model::{HistoryEntry, Model};
 use planish::network::Network;
 use planish::pipeline::{self, Fitted, PipelineParams, StageRecord};
-use planish_io::WriteOptions;
+use planish_io::{StepInput, Up, WriteOptions};
 use planish_io::report::{self, Report, SeamRow, count, distance, number};
 use std::path::Path;
 
@@ -28,6 +28,7 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
         params,
         demanded: args.stages.demanded_tolerance(),
         output: &args.output,
+        up: args.up.into(),
     };
     produce(session, job, staged, vec![read])
 }
@@ -48,20 +49,19 @@ pub struct Job<'a> {
     pub demanded: Option<f64>,
     /// Where the products go.
     pub output: &'a Path,
+    /// Axis that points up.
+    pub up: Up,
 }
 
 /// Fits a model and writes all products.
 pub fn produce(session: &Session, job: Job, staged: Staged, before: Vec<StageRecord>) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
-    let (path, input, output, demanded) = (job.path, job.input, job.output, job.demanded);
+    let (path, output, demanded, up) = (job.path, job.output, job.demanded, job.up);
     let (mut report, model) = fitted(session, job, before)?;
-    let options = WriteOptions {
-        units: model.units,
-        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-        ..WriteOptions::default()
-    };
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let options = WriteOptions { units: model.units, up, name };
     let ((), write) = session.step("write", || write_products(&staged, output, &model, &options))?;
-    let (pictures, draw) = session.step("pictures", || pictures::pictures(input, &model, &report))?;
+    let (pictures, draw) = session.step("pictures", || pictures::pictures(&model, &report, up))?;
     report.stages.extend([write, draw]);
     write_text(&staged.path("report.json"), &report.to_json())?;
     write_text(&staged.path("report.html"), &report::html(&report, &pictures))?;
@@ -158,15 +158,15 @@ fn seam_rows(model: &Model, seams: &[planish::surface::SeamQuality]) -> Vec<Seam
 }
 
 fn write_products(staged: &Staged, output: &Path, model: &Model, options: &WriteOptions) -> Result<(), Failure> {
-    let wrong = |name: &str| {
-        let path = output.join(name);
-        move |e: planish_io::WriteError| Failure::usage(path, e)
+    let wrong = |name: &str, e: &dyn std::fmt::Display| Failure::usage(output.join(name), e);
+    let mesh = |name: &str, mesh: &TriMesh| {
+        planish_io::write_mesh(staged.path(name), mesh, options).map_err(|e| wrong(name, &e))
     };
-    planish_io::write_mesh(staged.path("mesh.ply"), &model.mesh, options).map_err(wrong("mesh.ply"))?;
-    planish_io::write_model(staged.path("model.planish"), model).map_err(wrong("model.planish"))?;
-    planish_io::write_step(staged.path("surface.step"), model, options).map_err(wrong("surface.step"))?;
-    let displaced = pipeline::displaced_mesh(model).map_err(Failure::fault)?;
-    planish_io::write_mesh(staged.path("preview.glb"), &displaced, options).map_err(wrong("preview.glb"))?;
-    planish_io::write_relief(staged.path("relief"), model).map_err(wrong("relief"))?;
-    Ok(())
+    let step =
+        StepInput { network: &model.network, surfaces: &model.surfaces, units: model.units, name: &options.name, time: None };
+    mesh("mesh.ply", &model.mesh)?;
+    planish_io::write_model(staged.path("model.planish"), model).map_err(|e| wrong("model.planish", &e))?;
+    planish_io::write_step(staged.path("surface.step"), &step).map_err(|e| wrong("surface.step", &e))?;
+    planish_io::write_relief(staged.path("relief"), &model.reliefs, model.units).map_err(|e| wrong("relief", &e))?;
+    mesh("preview.glb", &pipeline::displaced_mesh(model).map_err(Failure::fault)?)
 }

@@ -21,16 +21,6 @@ pub struct Picture {
     pub png: Vec<u8>,
     /// True if it takes the whole width.
     pub wide: bool,
-    /// Meaning of its colours, if they have one.
-    pub scale: Option<Scale>,
-}
-
-/// The meaning of a picture's colours.
-pub struct Scale {
-    /// Colours from the least to the greatest value, evenly spaced, sRGB.
-    pub colors: Vec<[u8; 3]>,
-    /// Labels from the least to the greatest value, evenly spaced.
-    pub labels: Vec<String>,
 }
 
 /// Figures of quality in words: key, meaning, and how the value is read.
@@ -216,15 +206,6 @@ fn gallery(page: &mut String, pictures: &[Picture]) {
             escape(&picture.title),
             escape(&picture.caption)
         );
-        if let Some(scale) = &picture.scale {
-            let stops: Vec<String> = scale.colors.iter().map(|c| format!("rgb({},{},{})", c[0], c[1], c[2])).collect();
-            let labels: String = scale.labels.iter().map(|l| format!("<span>{}</span>", escape(l))).collect();
-            let _ = write!(
-                page,
-                "<div class=\"scale\"><div style=\"background:linear-gradient(90deg,{})\"></div><p>{labels}</p></div>",
-                stops.join(",")
-            );
-        }
         page.push_str("</figcaption></figure>\n");
     }
     page.push_str("</div>\n");
@@ -382,16 +363,14 @@ mod tests {
     }
 
     #[test]
-    fn pictures_are_embedded_with_their_scale() {
-        let scale = Scale { colors: vec![[0, 0, 255], [255, 0, 0]], labels: vec!["0".into(), "1 mm".into()] };
+    fn pictures_are_embedded() {
         let picture = Picture {
             title: "Deviation".into(),
             caption: "Blue is close.".into(),
             png: vec![1, 2, 3],
             wide: true,
-            scale: Some(scale),
         };
         let page = html(&report(), &[picture]);
-        assert!(page.contains("data:image/png;base64,AQID") && page.contains("rgb(0,0,255),rgb(255,0,0)"));
+        assert!(page.contains("data:image/png;base64,AQID") && page.contains("class=\"wide\""));
     }
 }

@@ -11,11 +11,15 @@
 //! checked exactly for folds, instead of walking over the triangles.
 
 mod chart;
+mod even;
 mod locate;
+mod net;
 mod quality;
+mod settle;
 mod side;
 mod sizes;
 mod springs;
+mod walk;
 
 pub use quality::{GridQuality, measure};
 pub use sizes::choose_sizes;
@@ -62,11 +66,26 @@ pub struct GridParams {
     /// Greatest number of points of all grids together; the density gives way.
     #[schemars(range(min = 1000))]
     pub max_points: usize,
+    /// Weight of square cells against even spacing along the iso-curves: at 45 degrees off square a cell counts as
+    /// much as an edge whose length is off by the root of this. Higher values give squarer, less even grids.
+    #[schemars(range(min = 0.0001, max = 10.0))]
+    pub squareness: f64,
+    /// Weight of straight iso-curves: at 32 cells a sideways bend of one edge length counts as much as an edge
+    /// whose length is off by this fraction.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub fairness: f64,
 }
 
 impl Default for GridParams {
     fn default() -> GridParams {
-        GridParams { density: 1.0, min_side: 17, max_side: 1025, max_points: 8_000_000 }
+        GridParams {
+            density: 1.0,
+            min_side: 17,
+            max_side: 1025,
+            max_points: 8_000_000,
+            squareness: 0.05,
+            fairness: 0.15,
+        }
     }
 }
 

@@ -1,32 +1,46 @@
-//! The grid of one patch, moved over its chart until it is even.
+//! The grid of one patch: coarse to fine, relaxed at every resolution.
+//!
+//! [K98] §5.5 and 5.6. The start is the regular grid of the chart; where a part sticks out of the patch the chart
+//! holds it in a small spot, so the coarsest grid is first drawn into such parts by [`even`], which measures along
+//! the curves and not between their points. Then [`settle`] balances spacing against angles at every resolution.
 
 use super::chart::Chart;
+use super::even::even;
 use super::locate::Spot;
+use super::net::Net;
+use super::settle::settle;
 use super::{Fault, GridParams};
-use glam::DVec2;
+
+/// Cells along the longer direction from which a grid is not made coarser.
+const COARSEST: usize = 32;
+/// Cells along the shorter direction that coarser grids keep.
+const COARSEST_SHORT: usize = 8;
+/// Rounds of Gauss-Newton at the coarsest resolution and at those after it.
+const FIRST_ROUNDS: usize = 16;
+const LATER_ROUNDS: [usize; 3] = [8, 5, 3];
 
 /// The spots of `cols x rows` grid points in `chart`, row-major.
 pub fn relax(
     chart: &Chart,
     cols: usize,
     rows: usize,
-    _params: &GridParams,
+    params: &GridParams,
     cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Spot>, Fault> {
-    let mut spots: Vec<Spot> = Vec::with_capacity(cols * rows);
-    for j in 0..rows {
-        if cancelled() {
-            return Err(Fault::Cancelled);
-        }
-        for i in 0..cols {
-            let uv = DVec2::new(i as f64 / (cols - 1) as f64, j as f64 / (rows - 1) as f64);
-            let hint = match (i, j) {
-                (0, 0) => 0,
-                (0, _) => spots[(j - 1) * cols].triangle,
-                _ => spots[j * cols + i - 1].triangle,
-            };
-            spots.push(chart.locate(uv, hint));
-        }
+    let mut levels = vec![(cols, rows)];
+    while let Some(&(c, r)) = levels.last()
+        && (c - 1).max(r - 1) >= 2 * COARSEST
+    {
+        let halved = |n: usize| if n > 2 * COARSEST_SHORT { (n - 1).div_ceil(2) + 1 } else { n };
+        levels.push((halved(c), halved(r)));
     }
-    Ok(spots)
+    let (c, r) = levels[levels.len() - 1];
+    let mut net = Net::regular(chart, c, r);
+    net = even(net, cancelled)?;
+    net = settle(net, FIRST_ROUNDS, params, cancelled)?;
+    for (k, &(c, r)) in levels.iter().rev().skip(1).enumerate() {
+        net = net.resampled(c, r);
+        net = settle(net, LATER_ROUNDS[k.min(LATER_ROUNDS.len() - 1)], params, cancelled)?;
+    }
+    Ok(net.spots)
 }

@@ -1,13 +1,28 @@
 //! Triangle meshes: flat arrays, adjacency, places on the surface.
 
 mod adjacency;
+pub mod compare;
 mod demo;
+mod diagnose;
 mod face_point;
+mod features;
+pub mod path;
+mod repair;
 mod rings;
+mod sets;
 pub mod shapes;
+mod slivers;
+mod soup;
+mod walk;
 
-pub use adjacency::{Adjacency, NONE, next, previous};
+pub use adjacency::{Adjacency, Fan, NONE, next, previous};
+pub use compare::{Comparison, CompareError, CompareParams, compare};
+pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
 pub use face_point::FacePoint;
+pub use features::{boundary_loops, components, sharp_edges};
+pub use repair::{Repairs, repair, weld};
+pub use soup::check;
+pub use walk::{CurvePlace, move_point_on_curve, move_point_on_surface};
 
 use crate::geom::Aabb;
 use glam::DVec3;
@@ -35,10 +50,39 @@ pub struct Attribute {
     pub values: Vec<f32>,
 }
 
+/// Why a mesh cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    /// A triangle names a vertex that is not there.
+    #[error("triangle {triangle} names vertex {vertex}, but there are {count} vertices; the file is damaged")]
+    BadIndex {
+        /// The triangle.
+        triangle: usize,
+        /// The index it holds.
+        vertex: u32,
+        /// Number of vertices.
+        count: usize,
+    },
+    /// A position is infinite or not a number.
+    #[error("vertex {vertex} has a position that is not a finite number; remove it and the triangles around it")]
+    NotFinite {
+        /// The vertex.
+        vertex: u32,
+    },
+    /// Nothing is left.
+    #[error("no triangle with three different vertices; a mesh with faces is needed")]
+    Empty,
+}
+
 impl TriMesh {
     /// A mesh without attributes.
     pub fn new(points: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> TriMesh {
         TriMesh { points, triangles, attributes: Vec::new() }
+    }
+
+    /// Vertex at the start of half-edge `h = 3 t + k`.
+    pub fn origin(&self, h: u32) -> u32 {
+        self.triangles[h as usize / 3][h as usize % 3]
     }
 
     /// Bounding box of all vertices.

@@ -25,7 +25,9 @@ const ON_EDGE: f64 = 1e-12;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ImprintError {
     /// A curve names a face that the mesh does not have.
-    #[error("curve {curve} lies on face {face}, the mesh has {faces} faces - hint: use the mesh that the network was made for")]
+    #[error(
+        "curve {curve} lies on face {face}, the mesh has {faces} faces - hint: use the mesh that the network was made for"
+    )]
     NoSuchFace {
         /// Index of the curve.
         curve: usize,
@@ -35,7 +37,9 @@ pub enum ImprintError {
         faces: usize,
     },
     /// Two neighbouring points of a curve share no face.
-    #[error("curve {curve} jumps at ({x:.6}, {y:.6}, {z:.6}): neighbouring points must share a face - hint: add points between")]
+    #[error(
+        "curve {curve} jumps at ({x:.6}, {y:.6}, {z:.6}): neighbouring points must share a face - hint: add points between"
+    )]
     Jump {
         /// Index of the curve.
         curve: usize,
@@ -298,7 +302,8 @@ fn patch_mesh(mesh: &TriMesh, adjacency: &Adjacency, cut: &Cut, disk: &disk::Dis
     for (triangle, &face) in disk.triangles.iter().zip(&face_origin) {
         for &v in triangle {
             let place = cut.origin[disk.vertices[v as usize] as usize];
-            origin[v as usize] = place.on_face(adjacency, &mesh.triangles, face).expect("a corner lies on its own face");
+            origin[v as usize] =
+                place.on_face(adjacency, &mesh.triangles, face).expect("a corner lies on its own face");
         }
     }
     let points = disk.vertices.iter().map(|&v| cut.mesh.points[v as usize]).collect();

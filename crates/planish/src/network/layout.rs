@@ -100,7 +100,8 @@ pub fn layout(mesh: &TriMesh, params: &LayoutParams, observer: &dyn Observer) ->
             if let Some(mut bench) = Bench::new(&work.mesh, &work_adjacency, complex)
                 && improve::quads(&mut bench)
             {
-                observer.progress(0.4);
+                improve::relax(&mut bench, 1, observer)?;
+                improve::improve(&mut bench, params.patches, observer)?;
                 improve::relax(&mut bench, params.smoothing, observer)?;
                 observer.progress(1.0);
                 return Ok(network(&work, &work_adjacency, &bench.complex));
@@ -169,7 +170,13 @@ fn draft(
 }
 
 /// The sharp half-edges of the working mesh: the pieces of those of the input.
-fn carry(work: &Refined, mesh: &TriMesh, adjacency: &Adjacency, work_adjacency: &Adjacency, sharp: &[bool]) -> Vec<bool> {
+fn carry(
+    work: &Refined,
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    work_adjacency: &Adjacency,
+    sharp: &[bool],
+) -> Vec<bool> {
     let _ = (mesh, adjacency);
     let mut carried = vec![false; work_adjacency.opposite.len()];
     for (f, (face, corners)) in work.parent.iter().enumerate() {
@@ -222,7 +229,8 @@ fn network(work: &Refined, adjacency: &Adjacency, complex: &Complex) -> Network 
     }
     for c in complex.live_cells() {
         let sides = complex.loop_of(c);
-        let sides = std::array::from_fn(|k| Side { curve: curve_of[sides[k] as usize / 2], reversed: sides[k] % 2 == 1 });
+        let sides =
+            std::array::from_fn(|k| Side { curve: curve_of[sides[k] as usize / 2], reversed: sides[k] % 2 == 1 });
         out.patches.push(Patch { sides });
     }
     out

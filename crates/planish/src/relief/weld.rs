@@ -80,7 +80,7 @@ pub fn patch_mesh(points: Vec<DVec3>, rows: usize, cols: usize) -> Result<TriMes
     super::bake::check(rows, cols, points.len())?;
     let ids: Vec<u32> = (0..points.len() as u32).collect();
     let mut triangles = Vec::new();
-    split_quads(&points, &ids, rows, cols, [false; 4], &mut triangles);
+    split_quads(&points, &ids, rows, cols, [4; 4], &mut triangles);
     let values = (0..rows * cols)
         .flat_map(|n| [(n % cols) as f32 + 0.5, (n / cols) as f32 + 0.5].into_iter().zip([cols, rows]))
         .map(|(texel, size)| texel / size as f32)
@@ -134,8 +134,8 @@ fn weld(network: &Network, nodes: &[Grid]) -> Result<TriMesh, ReliefError> {
                 mesh.points.push(point);
             }
         }
-        let through = std::array::from_fn(|k| valence[network.corner(p, k) as usize] == 2);
-        split_quads(&mesh.points, &ids, grid.rows, grid.cols, through, &mut mesh.triangles);
+        let valences = std::array::from_fn(|k| valence[network.corner(p, k) as usize]);
+        split_quads(&mesh.points, &ids, grid.rows, grid.cols, valences, &mut mesh.triangles);
     }
     Ok(mesh)
 }
@@ -143,14 +143,15 @@ fn weld(network: &Network, nodes: &[Grid]) -> Result<TriMesh, ReliefError> {
 /// Splits each quad along its shorter diagonal (on a tie the one from the lower left) and leaves out triangles
 /// that have lost a corner to welding.
 ///
-/// The quads at the corners of the patch with `through` are split through that corner: around a corner of
-/// valence 2 both quads have the same other diagonal, which must not become an edge of four triangles.
+/// `valences` are the numbers of patch corners around the four corners. Around one of valence 2 both quads have
+/// the same other diagonal, which must not become an edge of four triangles: they are split through the corner.
+/// At one of valence 1 the corner's own quad is folded shut and its two neighbours are in that position.
 fn split_quads(
     points: &[DVec3],
     ids: &[u32],
     rows: usize,
     cols: usize,
-    through: [bool; 4],
+    valences: [u32; 4],
     triangles: &mut Vec<[u32; 3]>,
 ) {
     let corners = [(0, 0), (cols - 2, 0), (cols - 2, rows - 2), (0, rows - 2)];
@@ -159,7 +160,11 @@ fn split_quads(
             let at = |di: usize, dj: usize| ids[(j + dj) * cols + i + di];
             let (a, b, c, d) = (at(0, 0), at(1, 0), at(1, 1), at(0, 1));
             let length = |p: u32, q: u32| points[p as usize].distance_squared(points[q as usize]);
-            let forced = (0..4).find(|&k| through[k] && corners[k] == (i, j)).map(|k| k % 2 == 0);
+            let forced = (0..4).find(|&k| {
+                let away = corners[k].0.abs_diff(i) + corners[k].1.abs_diff(j);
+                valences[k] < 3 && away == 2 - valences[k] as usize
+            });
+            let forced = forced.map(|k| k % 2 == 0);
             let rising = forced.unwrap_or_else(|| length(a, c) <= length(b, d));
             let halves = if rising { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
             triangles.extend(halves.into_iter().filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]));

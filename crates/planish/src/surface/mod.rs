@@ -6,16 +6,16 @@
 //! 4. smooth seams - `corner`, `seam_curve`, `stitch`, §8.1      5. how good it is - `quality`, eq. 6.1
 
 pub mod basis;
-//mod corner;
+mod corner;
 mod error;
 mod evaluate;
 mod fit;
 mod network_fit;
 mod quality;
 mod resolution;
-//mod seam_curve;
+mod seam_curve;
 mod sides;
-//mod stitch;
+mod stitch;
 
 pub use error::FitError;
 pub use evaluate::Jet;
@@ -25,7 +25,7 @@ pub use network_fit::{FitParams, fit_network};
 pub use quality::{Deviation, SeamQuality, deviation, deviation_of, measure_seams};
 pub use resolution::Resolution;
 pub(crate) use sides::{check, node};
-//pub use stitch::{StitchParams, stitch};
+pub use stitch::{StitchParams, stitch};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

@@ -185,8 +185,13 @@ pub fn sheets(n: usize) -> Vec<Sheet> {
             DVec3::new(s, t, 0.1 * (3.0 * s).sin() + 0.3 / n as f64 * noise(k))
         }),
         sheet("slivers 1e-6", n, n, 0.0, |s, t| {
-            let squeeze = |x: f64| if x < 0.5 { x } else { 0.5 - 0.5 / n as f64 + (x - 0.5) * 1e-6 * n as f64 };
-            let t = if t > 0.5 && t < 0.5 + 1.5 / n as f64 { squeeze(t) } else { t };
+            // One row of cells a million times flatter than the others.
+            let h = 1.0 / (n - 1) as f64;
+            let a = (n / 2) as f64 * h;
+            let t = match t - a {
+                x if x < 0.5 * h => t,
+                x => a + 1e-6 * h + (x - h) * (1.0 - a - 1e-6 * h) / (1.0 - a - h),
+            };
             DVec3::new(s, t, 0.2 * (2.0 * s * t).sin())
         }),
     ]
@@ -309,4 +314,97 @@ pub fn grow(name: &str, input: &TriMesh, seed: u32, size: usize) -> Sheet {
         input.triangles[place.face as usize][k]
     });
     Sheet { name: name.into(), patch: cut(input, &faces, corners), input: input.clone() }
+}
+
+/// The part of `input` around the first corner of face `seed` within a ball of `radius`, cut along the ball's
+/// surface; `None` if that part is not a disk. Corners at quarters of its boundary.
+pub fn disk(name: &str, input: &TriMesh, seed: u32, radius: f64) -> Option<Sheet> {
+    let adjacency = Adjacency::new(input);
+    let center = input.points[input.triangles[seed as usize][0] as usize];
+    let height: Vec<f64> = input.points.iter().map(|p| p.distance(center) - radius).collect();
+    let inside = |v: u32| height[v as usize] < 0.0;
+    let mut taken = vec![false; input.triangles.len()];
+    let mut stack = vec![seed];
+    while let Some(f) = stack.pop() {
+        if std::mem::replace(&mut taken[f as usize], true) {
+            continue;
+        }
+        for k in 0..3 {
+            let triangle = input.triangles[f as usize];
+            let h = adjacency.opposite[3 * f as usize + k];
+            if h != NONE && (inside(triangle[k]) || inside(triangle[(k + 1) % 3])) {
+                stack.push(h / 3);
+            }
+        }
+    }
+    let mut local = std::collections::BTreeMap::new();
+    let (mut points, mut origin): (Vec<DVec3>, Vec<FacePoint>) = (vec![], vec![]);
+    let (mut triangles, mut face_origin) = (vec![], vec![]);
+    for f in (0..input.triangles.len() as u32).filter(|&f| taken[f as usize]) {
+        let triangle = input.triangles[f as usize];
+        // The polygon of the face inside the ball; every vertex by the ends of its edge, lower first.
+        let mut polygon = vec![];
+        for k in 0..3 {
+            let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
+            let mut add = |key: (u32, u32)| {
+                let next = local.len() as u32;
+                polygon.push(*local.entry(key).or_insert_with(|| {
+                    let (p, q) = (input.points[key.0 as usize], input.points[key.1 as usize]);
+                    let (s, t) = (height[key.0 as usize], height[key.1 as usize]);
+                    let w = if key.0 == key.1 { 0.0 } else { (s / (s - t)).clamp(1e-3, 1.0 - 1e-3) };
+                    let mut bary = [0.0; 3];
+                    bary[triangle.iter().position(|v| *v == key.0).unwrap()] += 1.0 - w;
+                    bary[triangle.iter().position(|v| *v == key.1).unwrap()] += w;
+                    points.push(p + (q - p) * w);
+                    origin.push(FacePoint { face: f, bary });
+                    next
+                }));
+            };
+            if inside(a) {
+                add((a, a));
+            }
+            if inside(a) != inside(b) {
+                add((a.min(b), a.max(b)));
+            }
+        }
+        for k in 2..polygon.len() {
+            triangles.push([polygon[0], polygon[k - 1], polygon[k]]);
+            face_origin.push(f);
+        }
+    }
+    let mesh = TriMesh::new(points, triangles);
+    let rim = Adjacency::new(&mesh);
+    let open = rim.opposite.iter().filter(|h| **h == NONE).count();
+    if mesh.points.len() + mesh.triangles.len() != (rim.opposite.len() + open) / 2 + 1 {
+        return None;
+    }
+    let first = (0..rim.opposite.len()).find(|&h| rim.opposite[h] == NONE)?;
+    let mut chain = vec![mesh.triangles[first / 3][first % 3]];
+    let mut sums = vec![0.0];
+    while chain.len() == 1 || chain.last() != chain.first() {
+        let from = *chain.last()?;
+        let h = rim.outgoing[from as usize] as usize;
+        let to = mesh.triangles[h / 3][(h % 3 + 1) % 3];
+        sums.push(sums.last()? + mesh.points[from as usize].distance(mesh.points[to as usize]));
+        chain.push(to);
+    }
+    if chain.len() != open + 1 {
+        return None;
+    }
+    let quarters = [0, 1, 2, 3, 4].map(|k| sums.partition_point(|s| *s < sums[open] * k as f64 / 4.0).min(open));
+    let sides = [0, 1, 2, 3].map(|k| chain[quarters[k]..=quarters[k + 1]].to_vec());
+    Some(Sheet { name: name.into(), patch: PatchMesh { mesh, origin, face_origin, sides }, input: input.clone() })
+}
+
+/// Disks cut from the scans of the data folder, `None` for a scan that is not there: every 17th part of the faces
+/// is tried as a centre, with a ball of `reach` of the scan's diagonal.
+pub fn scan_disks(reach: f64) -> Vec<(&'static str, Option<Vec<Sheet>>)> {
+    let files = ["bunny.ply", "armadillo.ply", "gargoyle.ply", "turbine_blade.ply", "casting.ply", "dragon.ply"];
+    let cut = |file: &'static str| {
+        let mesh = read_ply(&data_file(file)?);
+        let radius = reach * mesh.bounds().diagonal();
+        let seeds = (0..16).map(|k| (mesh.triangles.len() * (2 * k + 1) / 34) as u32);
+        Some(seeds.filter_map(|seed| disk(&format!("{file} {seed}"), &mesh, seed, radius)).collect())
+    };
+    files.into_iter().map(|file| (file, cut(file))).collect()
 }

@@ -75,11 +75,8 @@ impl Complex {
 
     /// Outgoing half-arcs of one node, counter-clockwise.
     pub fn star(&self, node: u32) -> Vec<u32> {
-        let out: Vec<u32> = self
-            .live_arcs()
-            .flat_map(|a| [2 * a, 2 * a + 1])
-            .filter(|&h| self.from(h) == node)
-            .collect();
+        let out: Vec<u32> =
+            self.live_arcs().flat_map(|a| [2 * a, 2 * a + 1]).filter(|&h| self.from(h) == node).collect();
         self.around(&out)
     }
 
@@ -139,4 +136,3 @@ impl Complex {
         node
     }
 }
-

@@ -121,8 +121,8 @@ impl<'a> Ground<'a> {
             region[f as usize] = r;
             let (mut stack, mut open) = (vec![f], false);
             while let Some(f) = stack.pop() {
-                open |= (3 * f..3 * f + 3)
-                    .any(|h| self.sharp[h as usize] || self.adjacency.opposite[h as usize] == NONE);
+                open |=
+                    (3 * f..3 * f + 3).any(|h| self.sharp[h as usize] || self.adjacency.opposite[h as usize] == NONE);
                 for g in self.neighbours(f) {
                     if region[g as usize] == NONE {
                         region[g as usize] = r;
@@ -151,9 +151,8 @@ impl<'a> Ground<'a> {
         }
         let more = count.saturating_sub(first.len());
         for _ in 0..more {
-            let far = (0..n as u32).max_by(|&a, &b| {
-                distance[a as usize].total_cmp(&distance[b as usize]).then(b.cmp(&a))
-            });
+            let far =
+                (0..n as u32).max_by(|&a, &b| distance[a as usize].total_cmp(&distance[b as usize]).then(b.cmp(&a)));
             match far {
                 Some(f) if distance[f as usize] > 0.0 => add(f, &mut distance, &mut label),
                 _ => break,

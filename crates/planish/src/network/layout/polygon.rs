@@ -16,7 +16,10 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// Cost of a cell too many or too few around a node, against a quad whose corners are all 45 degrees off.
-const VALENCE_COST: f64 = 1.5;
+pub(super) const VALENCE_COST: f64 = 1.5;
+
+/// Cost of a cell corner of 180 degrees or more, where a patch has no normal of its own.
+const FLAT_COST: f64 = 8.0;
 
 /// Rounds over all cells; each sees the choices of its neighbours.
 const ROUNDS: usize = 6;
@@ -197,7 +200,9 @@ impl Sectors {
 
     /// Cost of sector `s` holding `more` cells than now.
     pub fn cost(&self, s: u32, more: f64) -> f64 {
-        VALENCE_COST * (self.count[s as usize] + more - self.ideal[s as usize]).powi(2)
+        let (count, ideal) = (self.count[s as usize] + more, self.ideal[s as usize]);
+        let flat = if ideal >= 2.0 * count { FLAT_COST } else { 0.0 };
+        VALENCE_COST * (count - ideal).powi(2) + flat
     }
 }
 
@@ -205,7 +210,8 @@ impl Sectors {
 fn sector_angle(mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex, h: u32) -> f64 {
     let arc = complex.arc(h);
     let chain = &arc.chain;
-    let (first, second) = if h % 2 == 0 { (chain[0], chain[1]) } else { (chain[chain.len() - 1], chain[chain.len() - 2]) };
+    let (first, second) =
+        if h % 2 == 0 { (chain[0], chain[1]) } else { (chain[chain.len() - 1], chain[chain.len() - 2]) };
     let (Place::Vertex(v), Place::Vertex(w)) = (first, second) else { return std::f64::consts::PI };
     let fixed = fixed_neighbours(complex, v);
     let Some(mut e) = half_edge(&mesh.triangles, adjacency, v, w) else { return std::f64::consts::PI };
@@ -287,10 +293,8 @@ pub(super) fn quadrangulate(mesh: &TriMesh, adjacency: &Adjacency, complex: &Com
 
 /// The cheapest parting of one even cell into quads.
 fn part(mesh: &TriMesh, complex: &Complex, sides: &[u32], sectors: &Sectors) -> Vec<(usize, usize)> {
-    let n = sides.len();
     let at: Vec<DVec3> =
         sides.iter().map(|&h| mesh.points[complex.nodes[complex.from(h) as usize].vertex as usize]).collect();
-    let normal = polygon_normal(&at);
     let extra: Vec<f64> = sides
         .iter()
         .map(|&h| {
@@ -298,9 +302,17 @@ fn part(mesh: &TriMesh, complex: &Complex, sides: &[u32], sectors: &Sectors) -> 
             sectors.cost(s, 1.0) - sectors.cost(s, 0.0)
         })
         .collect();
+    part_polygon(&at, &extra)
+}
+
+/// The cheapest lines that part a polygon with an even number of corners into quads; `extra` is what another
+/// cell at a corner costs.
+pub(super) fn part_polygon(at: &[DVec3], extra: &[f64]) -> Vec<(usize, usize)> {
+    let n = at.len();
+    let normal = polygon_normal(at);
     let mut best = vec![vec![(f64::INFINITY, 0, 0); n]; n];
-    for i in 0..n - 1 {
-        best[i][i + 1] = (0.0, 0, 0);
+    for (i, row) in best.iter_mut().enumerate().take(n - 1) {
+        row[i + 1] = (0.0, 0, 0);
     }
     for span in (3..n).step_by(2) {
         for i in 0..n - span {
@@ -308,10 +320,8 @@ fn part(mesh: &TriMesh, complex: &Complex, sides: &[u32], sectors: &Sectors) -> 
             let mut least = (f64::INFINITY, 0, 0);
             for k in (i + 1..j).step_by(2) {
                 for l in (k + 1..j).step_by(2) {
-                    let mut cost = badness([at[i], at[k], at[l], at[j]], normal)
-                        + best[i][k].0
-                        + best[k][l].0
-                        + best[l][j].0;
+                    let mut cost =
+                        badness([at[i], at[k], at[l], at[j]], normal) + best[i][k].0 + best[k][l].0 + best[l][j].0;
                     for (a, b) in [(i, k), (k, l), (l, j)] {
                         if b > a + 1 {
                             cost += extra[a] + extra[b];

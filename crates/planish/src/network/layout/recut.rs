@@ -148,7 +148,7 @@ impl Embedding {
         let lines = change.lines.iter().map(|&(i, j)| line(corner(i), corner(j))).collect::<Option<Vec<_>>>()?;
         let (mut spokes, mut center) = (Vec::new(), NONE);
         if !change.spokes.is_empty() {
-            let v = self.middle(&disk, &uv, &corners)?;
+            let v = self.middle(&disk, &uv)?;
             let Place::Vertex(w) = self.cut.origin[disk.vertices[v as usize] as usize] else { return None };
             center = w;
             spokes = change.spokes.iter().map(|&i| line(v, corner(i))).collect::<Option<Vec<_>>>()?;
@@ -156,10 +156,33 @@ impl Embedding {
         Some(Drawn { outline, lines, spokes, center })
     }
 
-    /// The vertex of the working mesh, inside the disk, nearest to the mean of the disk's corners.
-    fn middle(&self, disk: &Disk, uv: &[DVec2], corners: &[usize]) -> Option<u32> {
+    /// Area and area centroid of every cell.
+    pub fn extents(&self) -> Vec<(f64, DVec3)> {
+        self.members
+            .par_iter()
+            .map(|faces| {
+                let (mut area, mut sum) = (0.0, DVec3::ZERO);
+                for &f in faces {
+                    let a = self.cut.mesh.area(f as usize);
+                    area += a;
+                    sum += self.cut.mesh.corners(f as usize).into_iter().sum::<DVec3>() / 3.0 * a;
+                }
+                (area, sum / area.max(f64::MIN_POSITIVE))
+            })
+            .collect()
+    }
+
+    /// The vertex of the working mesh, inside the disk, nearest to the centroid of the disk's area.
+    fn middle(&self, disk: &Disk, uv: &[DVec2]) -> Option<u32> {
         let at = |v: u32| self.cut.mesh.points[disk.vertices[v as usize] as usize];
-        let mean = corners.iter().map(|&i| at(disk.boundary[i])).sum::<DVec3>() / corners.len() as f64;
+        let (mut sum, mut total) = (DVec3::ZERO, 0.0);
+        for t in &disk.triangles {
+            let [a, b, c] = t.map(at);
+            let area = (b - a).cross(c - a).length();
+            sum += (a + b + c) / 3.0 * area;
+            total += area;
+        }
+        let mean = sum / total;
         let mut on_boundary = vec![false; disk.vertices.len()];
         for &v in &disk.boundary {
             on_boundary[v as usize] = true;
@@ -209,40 +232,48 @@ impl Embedding {
 
 /// The half-arcs around the union of a change, counter-clockwise.
 pub(super) fn outline(complex: &Complex, change: &Change) -> Option<Vec<u32>> {
+    Some(outline_with_cells(complex, change)?.into_iter().map(|x| x.0).collect())
+}
+
+/// The outline with the number of cells of the union at the start of each half-arc.
+pub(super) fn outline_with_cells(complex: &Complex, change: &Change) -> Option<Vec<(u32, usize)>> {
     let gone = |h: u32| change.removed.contains(&(h / 2));
     let next_of = |h: u32| {
         let sides = complex.loop_of(complex.cell(h));
         let i = sides.iter().position(|&s| s == h).expect("a side of its cell");
         sides[(i + 1) % sides.len()]
     };
-    let outer: usize =
-        change.cells.iter().map(|&c| complex.loop_of(c).iter().filter(|&&h| !gone(h)).count()).sum();
+    let outer: usize = change.cells.iter().map(|&c| complex.loop_of(c).iter().filter(|&&h| !gone(h)).count()).sum();
     let start = change.cells.iter().flat_map(|&c| complex.loop_of(c)).copied().find(|&h| !gone(h))?;
-    let mut around = vec![start];
+    let mut around: Vec<(u32, usize)> = Vec::new();
+    let mut at = start;
     loop {
-        let mut h = next_of(*around.last().expect("not empty"));
-        let mut turns = 0;
+        let mut h = next_of(at);
+        let mut cells = 1;
         while gone(h) {
             h = next_of(h ^ 1);
-            turns += 1;
-            if turns > 4 * change.removed.len() + 4 {
+            cells += 1;
+            if cells > 4 * change.removed.len() + 4 {
                 return None;
             }
         }
+        around.push((h, cells));
         if h == start {
             break;
         }
-        around.push(h);
         if around.len() > outer {
             return None;
         }
+        at = h;
     }
+    around.rotate_right(1);
     (around.len() == outer).then_some(around)
 }
 
 /// Takes out of a chain what turns back in the edge it came from.
 fn tighten(mesh: &TriMesh, adjacency: &Adjacency, chain: Vec<Place>) -> Vec<Place> {
-    let ends = |h: u32| [mesh.triangles[h as usize / 3][h as usize % 3], mesh.triangles[h as usize / 3][next(h) as usize % 3]];
+    let ends =
+        |h: u32| [mesh.triangles[h as usize / 3][h as usize % 3], mesh.triangles[h as usize / 3][next(h) as usize % 3]];
     let named = |p: Place| match p {
         Place::Edge(h, t) => canonical(adjacency, h, t),
         other => other,
@@ -284,9 +315,12 @@ impl<'a> Bench<'a> {
         Some(Bench { mesh, adjacency, complex, embedding })
     }
 
-    /// Makes `changes`, whose cells must be disjoint, each if it can be drawn. Returns how many were made; the
-    /// complex stays as it was if the result does not hold together.
+    /// Makes `changes`, whose cells must be disjoint, each if it can be drawn. Returns how many were made; where
+    /// the result does not hold together, the change at fault is left out.
     pub fn apply(&mut self, changes: &[Change]) -> usize {
+        if changes.is_empty() {
+            return 0;
+        }
         let drawn: Vec<Option<Drawn>> = changes
             .par_iter()
             .map(|change| self.embedding.draw(self.mesh, self.adjacency, &self.complex, change))
@@ -303,16 +337,16 @@ impl<'a> Bench<'a> {
             return 0;
         }
         spread(&mut self.complex);
-        match Embedding::new(self.mesh, self.adjacency, &self.complex) {
-            Some(embedding) => {
-                self.embedding = embedding;
-                made
-            }
-            None => {
-                self.complex = before;
-                0
-            }
+        if let Some(embedding) = Embedding::new(self.mesh, self.adjacency, &self.complex) {
+            self.embedding = embedding;
+            return made;
         }
+        self.complex = before;
+        if changes.len() == 1 {
+            return 0;
+        }
+        let (head, tail) = changes.split_at(changes.len() / 2);
+        self.apply(head) + self.apply(tail)
     }
 
     /// Makes `changes` in rounds of disjoint ones, each built by `plan` when its turn comes.

@@ -43,11 +43,10 @@ pub(super) fn refine(mesh: &TriMesh, longest: f64) -> Refined {
         let mut parent = Vec::with_capacity(out.parent.len());
         for (f, (&tri, &(face, bary))) in out.mesh.triangles.iter().zip(&out.parent).enumerate() {
             let mids: [Option<u32>; 3] = std::array::from_fn(|k| middle.get(&(3 * f as u32 + k as u32)).copied());
-            let half = |k: usize| -> [f64; 3] {
-                std::array::from_fn(|i| (bary[k][i] + bary[(k + 1) % 3][i]) / 2.0)
-            };
+            let half = |k: usize| -> [f64; 3] { std::array::from_fn(|i| (bary[k][i] + bary[(k + 1) % 3][i]) / 2.0) };
             // Corners 0..3 are the triangle's, 3..6 the middles of its edges.
-            let names = [tri[0], tri[1], tri[2], mids[0].unwrap_or(NONE), mids[1].unwrap_or(NONE), mids[2].unwrap_or(NONE)];
+            let names =
+                [tri[0], tri[1], tri[2], mids[0].unwrap_or(NONE), mids[1].unwrap_or(NONE), mids[2].unwrap_or(NONE)];
             let places = [bary[0], bary[1], bary[2], half(0), half(1), half(2)];
             let split: Vec<usize> = (0..3).filter(|&k| mids[k].is_some()).collect();
             let pieces: Vec<[usize; 3]> = match split[..] {

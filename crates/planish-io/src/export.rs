@@ -1,0 +1,67 @@
+//! A model as what its file name asks for.
+
+use crate::{MeshFormat, StepInput, WriteError, WriteOptions, write_mesh, write_relief, write_step};
+use planish::Model;
+use planish::mesh::TriMesh;
+use std::path::Path;
+
+/// What a file name asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExportKind {
+    /// `.step`, `.stp`: the surfaces.
+    Step,
+    /// `.ply`, `.obj`, `.stl`, `.glb`: the displaced surface as a mesh.
+    Mesh,
+    /// No extension, or a folder that is there: a folder with the displacement maps.
+    Relief,
+}
+
+/// What the name of `path` asks for.
+/// # Errors
+/// `WriteError::UnknownExtension`, which lists the known ones.
+pub fn export_kind(path: impl AsRef<Path>) -> Result<ExportKind, WriteError> {
+    let path = path.as_ref();
+    let extension = crate::mesh_file::extension(path);
+    match extension.to_ascii_lowercase().as_str() {
+        "step" | "stp" => Ok(ExportKind::Step),
+        _ if MeshFormat::of(path).is_some_and(|f| f != MeshFormat::Gltf) => Ok(ExportKind::Mesh),
+        "" => Ok(ExportKind::Relief),
+        _ if path.is_dir() => Ok(ExportKind::Relief),
+        _ => Err(WriteError::UnknownExtension {
+            extension,
+            known: ".step, .stp, .ply, .obj, .stl, .glb, or a folder for the displacement maps".into(),
+        }),
+    }
+}
+
+/// Writes `model` as the name of `path` asks for (see [`ExportKind`]).
+/// * `displaced` - makes the displaced surface; called only if a mesh is asked for
+/// # Errors
+/// Those of [`write_step`], [`write_mesh`], [`write_relief`] and [`export_kind`].
+pub fn export(
+    path: impl AsRef<Path>,
+    model: &Model,
+    displaced: impl FnOnce() -> TriMesh,
+) -> Result<ExportKind, WriteError> {
+    let path = path.as_ref();
+    let kind = export_kind(path)?;
+    match kind {
+        ExportKind::Step => {
+            let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+            let (network, surfaces) = (&model.network, model.surfaces.as_slice());
+            write_step(path, &StepInput { network, surfaces, units: model.units, name: &name, time: None })?;
+        }
+        ExportKind::Mesh => export_mesh(path, &displaced(), model)?,
+        ExportKind::Relief => write_relief(path, &model.reliefs, model.units)?,
+    }
+    Ok(kind)
+}
+
+/// Writes a mesh of `model` with its unit; the object is named after the file.
+/// # Errors
+/// Those of [`write_mesh`].
+pub fn export_mesh(path: impl AsRef<Path>, mesh: &TriMesh, model: &Model) -> Result<(), WriteError> {
+    let path = path.as_ref();
+    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    write_mesh(path, mesh, &WriteOptions { units: model.units, name, ..Default::default() })
+}

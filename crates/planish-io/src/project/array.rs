@@ -1,0 +1,180 @@
+//! Arrays of a project: numbers to compressed little-endian blobs and back.
+
+use super::ProjectError;
+use planish::DVec3;
+use rayon::prelude::*;
+use rusqlite::{Connection, Transaction, params};
+use std::io::Read;
+
+/// The fastest level: scans compress little better at higher ones, and saving must not be felt.
+const LEVEL: i32 = 1;
+
+/// An array of numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Array {
+    F64(Vec<f64>),
+    F32(Vec<f32>),
+    U32(Vec<u32>),
+}
+
+impl Array {
+    /// Coordinates of points, one after the other.
+    pub fn points(points: &[DVec3]) -> Array {
+        Array::F64(points.iter().flat_map(|p| p.to_array()).collect())
+    }
+
+    fn kind(&self) -> &'static str {
+        match self {
+            Array::F64(_) => "f64",
+            Array::F32(_) => "f32",
+            Array::U32(_) => "u32",
+        }
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Array::F64(x) => x.len(),
+            Array::F32(x) => x.len(),
+            Array::U32(x) => x.len(),
+        }
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        match self {
+            Array::F64(x) => x.iter().flat_map(|x| x.to_le_bytes()).collect(),
+            Array::F32(x) => x.iter().flat_map(|x| x.to_le_bytes()).collect(),
+            Array::U32(x) => x.iter().flat_map(|x| x.to_le_bytes()).collect(),
+        }
+    }
+}
+
+/// Arrays gathered for writing; their numbers in the file are their order, from 1.
+#[derive(Default)]
+pub(super) struct Arrays {
+    arrays: Vec<Array>,
+}
+
+impl Arrays {
+    /// Adds an array; returns its number.
+    pub fn add(&mut self, array: Array) -> i64 {
+        self.arrays.push(array);
+        self.arrays.len() as i64
+    }
+
+    /// Compresses all arrays, in parallel, and writes them.
+    pub fn write(self, transaction: &Transaction) -> Result<(), ProjectError> {
+        let compressed: Vec<Vec<u8>> =
+            self.arrays.par_iter().map(|a| zstd::bulk::compress(&a.bytes(), LEVEL)).collect::<Result<_, _>>()?;
+        let mut insert =
+            transaction.prepare("INSERT INTO array (id, kind, count, checksum, data) VALUES (?1, ?2, ?3, ?4, ?5)")?;
+        for (k, (array, data)) in self.arrays.iter().zip(&compressed).enumerate() {
+            let checksum = checksum(array.kind(), array.len() as u64, data);
+            insert.execute(params![k as i64 + 1, array.kind(), array.len() as i64, checksum, data])?;
+        }
+        Ok(())
+    }
+}
+
+/// CRC-32 over type, count and compressed bytes: a damaged blob never reaches the decompressor.
+fn checksum(kind: &str, count: u64, data: &[u8]) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(kind.as_bytes());
+    hasher.update(&count.to_le_bytes());
+    hasher.update(data);
+    hasher.finalize()
+}
+
+/// Arrays read from a file; each is taken once.
+pub(super) struct Loaded {
+    arrays: Vec<Option<Array>>,
+}
+
+struct Row {
+    id: i64,
+    kind: String,
+    count: i64,
+    checksum: u32,
+    data: Vec<u8>,
+}
+
+impl Loaded {
+    /// Reads, checks and expands all arrays, in parallel.
+    pub fn read(connection: &Connection) -> Result<Loaded, ProjectError> {
+        let mut select = connection.prepare("SELECT id, kind, count, checksum, data FROM array ORDER BY id")?;
+        let rows = select.query_map([], |row| {
+            let (id, kind, count) = (row.get(0)?, row.get(1)?, row.get(2)?);
+            Ok(Row { id, kind, count, checksum: row.get(3)?, data: row.get(4)? })
+        })?;
+        let rows: Vec<Row> = rows.collect::<Result<_, _>>()?;
+        if let Some((k, row)) = rows.iter().enumerate().find(|(k, row)| row.id != *k as i64 + 1) {
+            return Err(damaged(format!("array {} stands where {} should", row.id, k + 1), "array", row.id));
+        }
+        let arrays = rows.into_par_iter().map(|row| expand(row).map(Some)).collect::<Result<_, _>>()?;
+        Ok(Loaded { arrays })
+    }
+
+    fn take(&mut self, id: i64) -> Option<Array> {
+        self.arrays.get_mut(usize::try_from(id).ok()?.checked_sub(1)?)?.take()
+    }
+
+    /// Array `id`, which must hold `f64`.
+    pub fn f64(&mut self, id: i64) -> Result<Vec<f64>, ProjectError> {
+        match self.take(id) {
+            Some(Array::F64(x)) => Ok(x),
+            _ => Err(damaged("it is missing or not of 64-bit reals".into(), "array", id)),
+        }
+    }
+
+    /// Array `id`, which must hold `f32`.
+    pub fn f32(&mut self, id: i64) -> Result<Vec<f32>, ProjectError> {
+        match self.take(id) {
+            Some(Array::F32(x)) => Ok(x),
+            _ => Err(damaged("it is missing or not of 32-bit reals".into(), "array", id)),
+        }
+    }
+
+    /// Array `id`, which must hold `u32`.
+    pub fn u32(&mut self, id: i64) -> Result<Vec<u32>, ProjectError> {
+        match self.take(id) {
+            Some(Array::U32(x)) => Ok(x),
+            _ => Err(damaged("it is missing or not of 32-bit whole numbers".into(), "array", id)),
+        }
+    }
+
+    /// Array `id` as points with finite coordinates; `count` of them if that is given.
+    pub fn points(&mut self, id: i64, count: Option<usize>) -> Result<Vec<DVec3>, ProjectError> {
+        let x = self.f64(id)?;
+        if x.len() % 3 != 0 || count.is_some_and(|count| 3 * count != x.len()) || !x.iter().all(|x| x.is_finite()) {
+            return Err(damaged(format!("{} numbers are not the points expected", x.len()), "array", id));
+        }
+        Ok(x.chunks_exact(3).map(DVec3::from_slice).collect())
+    }
+}
+
+pub(super) fn damaged(what: String, table: &str, row: i64) -> ProjectError {
+    ProjectError::Damaged { what, place: format!("{table} {row}") }
+}
+
+fn expand(row: Row) -> Result<Array, ProjectError> {
+    let count = u64::try_from(row.count).map_err(|_| damaged("its count is negative".into(), "array", row.id))?;
+    if checksum(&row.kind, count, &row.data) != row.checksum {
+        return Err(ProjectError::Checksum { array: row.id });
+    }
+    let size = if row.kind == "f64" { 8 } else { 4 };
+    let needed = count.saturating_mul(size);
+    // Grows as bytes come, and stops one after the count: a false count cannot take memory.
+    let mut bytes = Vec::new();
+    zstd::stream::read::Decoder::new(row.data.as_slice())?.take(needed.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 != needed {
+        return Err(damaged(format!("it holds {} bytes instead of {needed}", bytes.len()), "array", row.id));
+    }
+    Ok(match row.kind.as_str() {
+        "f64" => {
+            let number = |b: &[u8]| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]);
+            Array::F64(bytes.chunks_exact(8).map(number).collect())
+        }
+        "f32" => Array::F32(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()),
+        "u32" => Array::U32(bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()),
+        other => return Err(damaged(format!("unknown type \"{other}\""), "array", row.id)),
+    })
+}

@@ -1,0 +1,227 @@
+//! How far two surfaces are from each other: distances both ways and angles between normals.
+//!
+//! Samples are drawn evenly by area (the square-root map of Osada et al., *Shape Distributions*, 2002, eq. 1) and
+//! each is measured against the closest place of the other surface, in the sense of Metro (Cignoni, Rocchini,
+//! Scopigno 1998).
+
+use super::{TriMesh, check};
+use crate::geom::{Aabb, Bvh, random};
+use crate::observe::Observer;
+use glam::DVec3;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How to compare.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CompareParams {
+    /// Samples drawn on each surface.
+    #[schemars(range(min = 1), extend("unit" = "count"))]
+    pub samples: usize,
+    /// Seed of the samples.
+    pub seed: u64,
+}
+
+impl Default for CompareParams {
+    fn default() -> Self {
+        CompareParams { samples: 200_000, seed: 0 }
+    }
+}
+
+/// Why surfaces cannot be compared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CompareError {
+    /// A mesh is damaged.
+    #[error("mesh {which}: {error}")]
+    Mesh {
+        /// `a` or `b`.
+        which: char,
+        /// What is wrong with it.
+        error: super::MeshError,
+    },
+    /// A mesh has no area.
+    #[error("mesh {which} has no area ({triangles} triangles); a surface is needed")]
+    NoArea {
+        /// `a` or `b`.
+        which: char,
+        /// Number of its triangles.
+        triangles: usize,
+    },
+    /// No samples are asked for.
+    #[error("0 samples asked for; at least 1 is needed")]
+    NoSamples,
+    /// The observer wants no result any more.
+    #[error("comparison cancelled")]
+    Cancelled,
+}
+
+/// Spread of distances, world units unless said.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Mean.
+    pub mean: f64,
+    /// Root of the mean square.
+    pub rms: f64,
+    /// 95 of 100 samples are nearer.
+    pub p95: f64,
+    /// Greatest of the samples.
+    pub max: f64,
+}
+
+/// The result of [`compare`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// Bounding-box diagonal of `a`, world units.
+    pub diagonal: f64,
+    /// Samples on each surface.
+    pub samples: usize,
+    /// From samples of `a` to `b`.
+    pub a_to_b: Spread,
+    /// From samples of `b` to `a`.
+    pub b_to_a: Spread,
+    /// All samples of both.
+    pub both: Spread,
+    /// `both` as fractions of the diagonal.
+    pub both_rel: Spread,
+    /// Angle between the normals at a sample and at its closest place, degrees; of all samples of both.
+    pub normal_deg: Spread,
+    /// Share of samples whose normals differ by more than 90 degrees.
+    pub flipped_share: f64,
+}
+
+/// Samples between two looks at the observer.
+const CHUNK: usize = 1 << 14;
+
+/// Compares two surfaces both ways.
+/// # Errors
+/// [`CompareError`] for damaged or empty meshes, no samples, or if cancelled.
+pub fn compare(
+    a: &TriMesh,
+    b: &TriMesh,
+    params: &CompareParams,
+    observer: &dyn Observer,
+) -> Result<Comparison, CompareError> {
+    if params.samples == 0 {
+        return Err(CompareError::NoSamples);
+    }
+    for (which, mesh) in [('a', a), ('b', b)] {
+        check(mesh).map_err(|error| CompareError::Mesh { which, error })?;
+    }
+    let (a, b) = (Side::new(a, 'a')?, Side::new(b, 'b')?);
+    let diagonal = Aabb::of(&a.mesh.points).diagonal();
+    let ab = measure(&a, &b, params, 0, observer)?;
+    let ba = measure(&b, &a, params, 1, observer)?;
+    observer.progress(1.0);
+
+    let spread_of = |part: fn(&(f64, f64)) -> f64, sides: &[&[(f64, f64)]]| {
+        spread(sides.iter().flat_map(|s| s.iter().map(part)).collect())
+    };
+    let both = spread_of(|s| s.0, &[&ab, &ba]);
+    let flipped = ab.iter().chain(&ba).filter(|s| s.1 > 90.0).count();
+    Ok(Comparison {
+        diagonal,
+        samples: params.samples,
+        a_to_b: spread_of(|s| s.0, &[&ab]),
+        b_to_a: spread_of(|s| s.0, &[&ba]),
+        both,
+        both_rel: Spread {
+            mean: both.mean / diagonal,
+            rms: both.rms / diagonal,
+            p95: both.p95 / diagonal,
+            max: both.max / diagonal,
+        },
+        normal_deg: spread_of(|s| s.1, &[&ab, &ba]),
+        flipped_share: flipped as f64 / (ab.len() + ba.len()) as f64,
+    })
+}
+
+/// One of the two surfaces: its triangles of some area, their summed areas, and the tree.
+struct Side {
+    mesh: TriMesh,
+    sums: Vec<f64>,
+    bvh: Bvh,
+}
+
+impl Side {
+    fn new(mesh: &TriMesh, which: char) -> Result<Side, CompareError> {
+        let triangles: Vec<[u32; 3]> =
+            (0..mesh.triangles.len()).filter(|&t| mesh.area(t) > 0.0).map(|t| mesh.triangles[t]).collect();
+        if triangles.is_empty() {
+            return Err(CompareError::NoArea { which, triangles: mesh.triangles.len() });
+        }
+        // Only the vertices in use, so that the box is that of the surface.
+        let mut id = vec![u32::MAX; mesh.points.len()];
+        let mut points = Vec::new();
+        let triangles = triangles
+            .into_iter()
+            .map(|t| {
+                t.map(|v| {
+                    if id[v as usize] == u32::MAX {
+                        id[v as usize] = points.len() as u32;
+                        points.push(mesh.points[v as usize]);
+                    }
+                    id[v as usize]
+                })
+            })
+            .collect();
+        let mesh = TriMesh::new(points, triangles);
+        let mut total = 0.0;
+        let sums = (0..mesh.triangles.len())
+            .map(|t| {
+                total += mesh.area(t);
+                total
+            })
+            .collect();
+        let bvh = Bvh::new(&mesh);
+        Ok(Side { mesh, sums, bvh })
+    }
+
+    /// Sample number `n` of the stream `seed`: position and normal.
+    fn sample(&self, seed: u64, n: u64) -> (DVec3, DVec3) {
+        let [pick, r, s] = [0, 1, 2].map(|k| random::unit(seed, 3 * n + k));
+        let goal = pick * self.sums[self.sums.len() - 1];
+        let t = self.sums.partition_point(|&sum| sum <= goal).min(self.sums.len() - 1);
+        let [a, b, c] = self.mesh.corners(t);
+        let r = r.sqrt();
+        (a * (1.0 - r) + b * (r * (1.0 - s)) + c * (r * s), self.mesh.normal(t))
+    }
+}
+
+/// Distance and normal angle (degrees) of samples of `from` against `to`.
+fn measure(
+    from: &Side,
+    to: &Side,
+    params: &CompareParams,
+    pass: u64,
+    observer: &dyn Observer,
+) -> Result<Vec<(f64, f64)>, CompareError> {
+    // The two directions draw from different streams.
+    let seed = random::bits(params.seed, pass);
+    let mut result = Vec::with_capacity(params.samples);
+    while result.len() < params.samples {
+        if observer.cancelled() {
+            return Err(CompareError::Cancelled);
+        }
+        observer.progress((pass as f64 + result.len() as f64 / params.samples as f64) / 2.0);
+        let range = result.len()..(result.len() + CHUNK).min(params.samples);
+        result.par_extend(range.into_par_iter().map(|n| {
+            let (p, m) = from.sample(seed, n as u64);
+            let hit = to.bvh.closest(p);
+            let n = to.mesh.normal(hit.place.face as usize);
+            (hit.distance, m.cross(n).length().atan2(m.dot(n)).to_degrees())
+        }));
+    }
+    Ok(result)
+}
+
+fn spread(mut values: Vec<f64>) -> Spread {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let rms = (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
+    values.sort_unstable_by(f64::total_cmp);
+    // Between the two order statistics around 95 %.
+    let x = 0.95 * (n - 1.0);
+    let (low, high) = (values[x.floor() as usize], values[x.ceil() as usize]);
+    Spread { mean, rms, p95: low + (high - low) * x.fract(), max: values[values.len() - 1] }
+}

@@ -1,0 +1,117 @@
+//! Edges of any triangle soup: what repair and diagnosis stand on, where half-edge adjacency does not exist yet.
+
+use super::{MeshError, NONE, TriMesh};
+use rayon::prelude::*;
+
+/// Checks that all triangles name existing vertices and that those are finite.
+/// # Errors
+/// [`MeshError::BadIndex`], [`MeshError::NotFinite`] for the first offending triangle.
+pub fn check(mesh: &TriMesh) -> Result<(), MeshError> {
+    for (triangle, t) in mesh.triangles.iter().enumerate() {
+        for &vertex in t {
+            match mesh.points.get(vertex as usize) {
+                None => return Err(MeshError::BadIndex { triangle, vertex, count: mesh.points.len() }),
+                Some(p) if !p.is_finite() => return Err(MeshError::NotFinite { vertex }),
+                _ => {}
+            }
+        }
+    }
+    Ok(())
+}
+
+/// All half-edges of triangles with three different vertices, sorted by undirected edge: `(edge, half-edge)`.
+pub(super) fn keyed_edges(triangles: &[[u32; 3]]) -> Vec<(u64, u32)> {
+    let mut keyed: Vec<(u64, u32)> = triangles
+        .par_iter()
+        .enumerate()
+        .filter(|(_, t)| !repeats(t))
+        .flat_map_iter(|(t, tri)| {
+            (0..3).map(move |k| {
+                let (a, b) = (tri[k], tri[(k + 1) % 3]);
+                (((a.min(b) as u64) << 32) | a.max(b) as u64, (3 * t + k) as u32)
+            })
+        })
+        .collect();
+    keyed.par_sort_unstable();
+    keyed
+}
+
+/// True if a triangle names a vertex twice.
+pub(super) fn repeats(t: &[u32; 3]) -> bool {
+    t[0] == t[1] || t[1] == t[2] || t[2] == t[0]
+}
+
+/// For each half-edge the other one of its edge where exactly two triangles meet, whatever their directions.
+pub(super) fn mates(keyed: &[(u64, u32)], half_edges: usize) -> Vec<u32> {
+    let mut mate = vec![NONE; half_edges];
+    for run in keyed.chunk_by(|x, y| x.0 == y.0) {
+        if let [(_, g), (_, h)] = *run {
+            mate[g as usize] = h;
+            mate[h as usize] = g;
+        }
+    }
+    mate
+}
+
+/// Vertex at the start of half-edge `h`.
+pub(super) fn origin(triangles: &[[u32; 3]], h: u32) -> u32 {
+    triangles[h as usize / 3][h as usize % 3]
+}
+
+/// Orientation of the pieces that mates connect.
+pub(super) struct Orientation {
+    /// For each triangle its piece.
+    pub piece: Vec<u32>,
+    /// For each triangle whether it must be turned to agree with the first of its piece.
+    pub turned: Vec<bool>,
+    /// Number of pieces.
+    pub pieces: usize,
+}
+
+/// Flood fill over mates. Half-edges of one edge should run against each other.
+pub(super) fn orient(triangles: &[[u32; 3]], mate: &[u32]) -> Orientation {
+    let mut piece = vec![NONE; triangles.len()];
+    let mut turned = vec![false; triangles.len()];
+    let mut pieces = 0;
+    let mut queue = std::collections::VecDeque::new();
+    for start in 0..triangles.len() {
+        if piece[start] != NONE {
+            continue;
+        }
+        piece[start] = pieces;
+        queue.push_back(start);
+        while let Some(t) = queue.pop_front() {
+            for h in 3 * t as u32..3 * t as u32 + 3 {
+                let g = mate[h as usize];
+                if g != NONE && piece[g as usize / 3] == NONE {
+                    piece[g as usize / 3] = pieces;
+                    turned[g as usize / 3] = turned[t] ^ (origin(triangles, g) == origin(triangles, h));
+                    queue.push_back(g as usize / 3);
+                }
+            }
+        }
+        pieces += 1;
+    }
+    Orientation { piece, turned, pieces: pieces as usize }
+}
+
+/// For each corner `3 t + k` the least corner of the same fan: corners of neighbouring triangles at a shared
+/// vertex, connected over mates.
+pub(super) fn fans(triangles: &[[u32; 3]], mate: &[u32]) -> Vec<u32> {
+    let mut sets = super::sets::Sets::new(mate.len());
+    for h in 0..mate.len() as u32 {
+        let g = mate[h as usize];
+        if g == NONE || g < h {
+            continue;
+        }
+        let (h_end, g_end) = (super::next(h), super::next(g));
+        if origin(triangles, h) == origin(triangles, g) {
+            sets.join(h, g);
+            sets.join(h_end, g_end);
+        } else {
+            sets.join(h, g_end);
+            sets.join(h_end, g);
+        }
+    }
+    (0..mate.len() as u32).map(|c| sets.root(c)).collect()
+}

@@ -1,0 +1,176 @@
+//! Seam curves that keep to the planes at their ends, and the normals along them.
+//!
+//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §8.1.3.
+//!
+//! Departs from [K98]: the curve's control points near a corner are not projected one by one; the whole curve moves as
+//! little as it can in the metric of its own fit.
+
+use super::FitError;
+use super::basis::{BasisRows, uniform_knots, uniform_parameters};
+use super::corner::{Plane, Planes, end_derivatives, end_weights};
+use super::fit::Direction;
+use super::sides::place;
+use super::{Jet, Surface};
+use crate::linalg::{Banded, BandedCholesky};
+use crate::network::Network;
+use glam::DVec3;
+
+/// Cosine above which the two planes beside a feature count as one: their own line of intersection would be no
+/// direction for the curve any more.
+const ALIKE: f64 = 0.94;
+/// Damping of the conditions at the ends, each of diagonal 1: contradicting ones share their miss.
+const DAMPING: f64 = 1e-7;
+/// Conditions depend on the direction that they change a little; the second pass sees to that.
+const PASSES: usize = 2;
+/// Samples per knot span of a field of normals, enough for its cubic and the products with cubics.
+pub(crate) const SPAN_SAMPLES: usize = 6;
+
+/// Number of samples along a curve of `control` control points.
+pub(crate) fn sample_count(control: usize) -> usize {
+    (control - 3) * SPAN_SAMPLES + 1
+}
+
+/// One linear condition on a curve: `<normal, sum of weight * control point> = value`.
+struct Condition {
+    weights: Vec<(usize, f64)>,
+    normal: DVec3,
+    value: f64,
+}
+
+/// Moves a curve so that at its ends it runs in the planes there and bends as they say.
+pub(crate) fn constrain(curve: &[DVec3], planes: [Vec<Plane>; 2], direction: &Direction) -> Vec<DVec3> {
+    let mut moved = curve.to_vec();
+    if planes.iter().all(Vec::is_empty) {
+        return moved;
+    }
+    for _ in 0..PASSES {
+        moved = meet(curve, &conditions(&moved, &planes), direction);
+    }
+    moved
+}
+
+fn conditions(curve: &[DVec3], planes: &[Vec<Plane>; 2]) -> Vec<Condition> {
+    let n = curve.len();
+    let (first, second) = end_weights(n);
+    let mut list = Vec::new();
+    for (end, planes) in planes.iter().enumerate() {
+        let index = |k: usize| if end == 0 { k } else { n - 1 - k };
+        let tangent = end_derivatives(curve, end).0;
+        let mut tangency = |normal: DVec3| {
+            list.push(Condition {
+                weights: vec![(index(1), first[1])],
+                normal,
+                value: -first[0] * normal.dot(curve[index(0)]),
+            });
+        };
+        if let [a, b] = planes[..]
+            && a.normal.dot(b.normal) > ALIKE
+        {
+            tangency((a.normal + b.normal).normalize());
+            continue;
+        }
+        planes.iter().for_each(|p| tangency(p.normal));
+        for plane in planes {
+            list.push(Condition {
+                weights: vec![(index(1), second[1]), (index(2), second[2])],
+                normal: plane.normal,
+                value: plane.bend(plane.flatten(tangent)) - second[0] * plane.normal.dot(curve[index(0)]),
+            });
+        }
+    }
+    list
+}
+
+/// The curve nearest to `curve`, in the metric of its fit, that meets the conditions.
+fn meet(curve: &[DVec3], conditions: &[Condition], direction: &Direction) -> Vec<DVec3> {
+    let n = curve.len();
+    let answers: Vec<Vec<f64>> = conditions
+        .iter()
+        .map(|condition| {
+            let mut y = vec![0.0; n - 2];
+            condition.weights.iter().for_each(|&(k, w)| y[k - 1] += w);
+            direction.factor(1).solve(&mut y);
+            y
+        })
+        .collect();
+    let couple = |i: usize, j: usize| {
+        let reach: f64 = conditions[i].weights.iter().map(|&(k, w)| w * answers[j][k - 1]).sum();
+        reach * conditions[i].normal.dot(conditions[j].normal)
+    };
+    let scale: Vec<f64> = (0..conditions.len()).map(|i| couple(i, i).sqrt()).collect();
+    let mut matrix = Banded::zero(conditions.len(), conditions.len() - 1);
+    let mut rhs = Vec::new();
+    for (i, condition) in conditions.iter().enumerate() {
+        for j in 0..=i {
+            matrix.add(i, j, couple(i, j) / (scale[i] * scale[j]) + if i == j { DAMPING } else { 0.0 });
+        }
+        let now: f64 = condition.weights.iter().map(|&(k, w)| w * condition.normal.dot(curve[k])).sum();
+        rhs.push((condition.value - now) / scale[i]);
+    }
+    let mut moved = curve.to_vec();
+    if let Some(factor) = BandedCholesky::factor(matrix) {
+        factor.solve(&mut rhs);
+        for (i, condition) in conditions.iter().enumerate() {
+            for (point, y) in moved[1..n - 1].iter_mut().zip(&answers[i]) {
+                *point += condition.normal * (rhs[i] / scale[i] * y);
+            }
+        }
+    }
+    moved
+}
+
+/// Unit normals along a smooth seam at [`sample_count`] uniform parameters, perpendicular to the curve: a cubic
+/// spline through the mean of both patches' normals that starts and turns at the corners as their planes say.
+pub(crate) fn normals(
+    network: &Network,
+    surfaces: &[Surface],
+    curve: usize,
+    uses: [(u32, u8); 2],
+    control: &[DVec3],
+    planes: &Planes,
+) -> Result<Vec<DVec3>, FitError> {
+    let n = control.len();
+    let parameters = uniform_parameters(sample_count(n));
+    let mut last = DVec3::Z;
+    let mean: Vec<DVec3> = parameters
+        .iter()
+        .map(|&t| {
+            let sum: DVec3 = uses
+                .iter()
+                .map(|&(p, k)| {
+                    let side = network.patches[p as usize].sides[k as usize];
+                    let (u, v) = place(k as usize, side.reversed, t);
+                    let jet: Jet = surfaces[p as usize].jet(u, v);
+                    jet.area_vector().normalize_or_zero()
+                })
+                .sum();
+            last = sum.try_normalize().unwrap_or(last);
+            last
+        })
+        .collect();
+    let direction = Direction::new(parameters.len(), n)?;
+    let mut net = vec![DVec3::ZERO; n];
+    direction.fit_curve(mean.iter().copied(), &mut net, 0);
+    for end in 0..2 {
+        if let Some(plane) = planes.at(curve, end).next() {
+            let outgoing = plane.flatten(end_derivatives(control, end).0);
+            let (first, _) = end_weights(n);
+            let (at, beside) = if end == 0 { (0, 1) } else { (n - 1, n - 2) };
+            net[at] = plane.normal;
+            net[beside] = plane.normal + plane.turn(outgoing) / first[1];
+        }
+    }
+    direction.fit_curve(mean.iter().copied(), &mut net, 2);
+    let knots = uniform_knots(n);
+    let (at, along) = (BasisRows::new(&knots, &parameters, 0), BasisRows::new(&knots, &parameters, 1));
+    let sum = |rows: &BasisRows, s: usize, net: &[DVec3]| -> DVec3 {
+        (0..4).map(|a| net[rows.first[s] + a] * rows.weights[s][a]).sum()
+    };
+    Ok((0..parameters.len())
+        .map(|s| {
+            let tangent = sum(&along, s, control).normalize_or_zero();
+            let n = sum(&at, s, &net);
+            (n - tangent * tangent.dot(n)).try_normalize().unwrap_or(mean[s])
+        })
+        .collect())
+}

@@ -1,0 +1,239 @@
+//! Makes smooth seams smooth: neighbours get one tangent plane along them.
+//!
+//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §8.1.3.
+//! 1. a plane for each corner - `corner`      2. curves that respect it, a normal along each - `seam_curve`
+//! 3. the ring of control points inside a patch's boundary turned into those normals
+//! 4. everything further inside fitted again for that
+//!
+//! Departs from [K98]: there the seam's control point is moved onto the line between its two neighbours at equal
+//! spacing, which asks every seam to leave a corner as the continuation of another; around corners of valence 3, 5 or
+//! more it cannot. Here both patches are fitted to one field of normals instead: least squares over the ring, whose
+//! miss falls with the fourth power of the knot spacing. With simple knots it does not vanish around corners of
+//! valence other than 4 (Peters and Fan): the seams are smooth within the angle that `measure_seams` tells.
+
+use super::basis::{basis_at, is_uniform, uniform_knots, uniform_parameters};
+use super::corner::{Plane, planes};
+use super::fit::{Directions, project, solve_inside, surface_of};
+use super::network_fit::{fill, patch_directions};
+use super::seam_curve::{SPAN_SAMPLES, constrain, normals};
+use super::sides::{along_curve, check, check_grids, is_smooth, node, side_len};
+use super::{FitError, Surface};
+use crate::grid::Grid;
+use crate::linalg::{Banded, BandedCholesky};
+use crate::network::{Network, Patch};
+use crate::observe::Observer;
+use glam::DVec3;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Diagonals of the ring's matrix: samples couple four neighbours of three numbers, and folding the ring into a
+/// line doubles the distance.
+const RING_BAND: usize = 23;
+
+/// How to smooth seams.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct StitchParams {
+    /// How much a radian of angle between normals counts against moving a control point by its distance from the
+    /// seam. Large values give smaller angles, small ones leave the fit as it is.
+    #[schemars(range(min = 0.0, max = 1e5))]
+    pub stiffness: f64,
+}
+
+impl Default for StitchParams {
+    fn default() -> StitchParams {
+        StitchParams { stiffness: 1e3 }
+    }
+}
+
+/// Gives the patches on both sides of every smooth seam one tangent plane along it, as nearly as simple knots can.
+///
+/// * `grids` - those that `surfaces` were fitted to
+/// * `surfaces` - as [`super::fit_network`] returns them
+///
+/// Corners stay where they are and seams stay without gaps; control points near smooth seams move and all others
+/// are fitted again for that. A network without smooth seams comes back as it is.
+///
+/// # Errors
+/// Lists that do not fit the network or each other, knots that are not uniform, or the observer's wish.
+///
+/// Source: [K98] §8.1.3.
+pub fn stitch(
+    network: &Network,
+    grids: &[Grid],
+    surfaces: &[Surface],
+    params: &StitchParams,
+    observer: &dyn Observer,
+) -> Result<Vec<Surface>, FitError> {
+    if !(params.stiffness >= 0.0 && params.stiffness.is_finite()) {
+        return Err(FitError::Parameter { name: "stiffness", value: params.stiffness, wanted: "0 or more" });
+    }
+    let nodes = check_grids(network, grids)?;
+    let shapes: Vec<_> = surfaces.iter().map(|s| (s.rows, s.cols, s.control.len())).collect();
+    let counts = check(network, "surfaces", &shapes)?;
+    let uneven = |s: &Surface| {
+        s.knots_u.len() != s.cols + 4
+            || s.knots_v.len() != s.rows + 4
+            || !is_uniform(&s.knots_u)
+            || !is_uniform(&s.knots_v)
+    };
+    if let Some(patch) = surfaces.iter().position(uneven) {
+        return Err(FitError::Knots { patch });
+    }
+    let uses = network.uses();
+    let is_seam = |c: usize| is_smooth(&network.curves[c]) && uses[c].len() == 2;
+    if !(0..uses.len()).any(is_seam) {
+        return Ok(surfaces.to_vec());
+    }
+    let directions = Directions::new(nodes.iter().zip(&counts).filter(|(n, _)| **n > 0).map(|(&n, &c)| (n, c)))?;
+    let fitted: Vec<Vec<DVec3>> = uses
+        .iter()
+        .map(|uses| {
+            uses.first().map_or_else(Vec::new, |&(p, k)| {
+                let (s, side) = (&surfaces[p as usize], network.patches[p as usize].sides[k as usize]);
+                along_curve(&s.control, s.rows, s.cols, k as usize, side.reversed, 0)
+            })
+        })
+        .collect();
+    let planes = planes(network, surfaces, &fitted);
+    let curves: Vec<Vec<DVec3>> = (0..uses.len())
+        .into_par_iter()
+        .map(|c| {
+            let ends: [Vec<Plane>; 2] = [0, 1].map(|e| planes.at(c, e).copied().collect());
+            if uses[c].is_empty() {
+                Vec::new()
+            } else {
+                constrain(&fitted[c], ends, directions.get(nodes[c], counts[c]))
+            }
+        })
+        .collect();
+    let stop = || if observer.cancelled() { Err(FitError::Cancelled) } else { Ok(()) };
+    stop()?;
+    // The inside for the moved curves: what the normals are taken from.
+    let projected: Vec<Option<(Surface, Vec<DVec3>)>> = network
+        .patches
+        .par_iter()
+        .zip(grids)
+        .map(|(patch, grid)| {
+            if observer.cancelled() {
+                return None;
+            }
+            let [along_u, along_v] = patch_directions(patch, grid, &directions, &counts);
+            let projection = project(&grid.points, along_u, along_v);
+            let net = fill(patch, &curves, &projection, along_u, along_v);
+            Some((surface_of(net, along_u, along_v), projection))
+        })
+        .collect();
+    let (filled, projections): (Vec<Surface>, Vec<Vec<DVec3>>) =
+        projected.into_iter().collect::<Option<Vec<_>>>().ok_or(FitError::Cancelled)?.into_iter().unzip();
+    observer.progress(0.5);
+    let fields: Vec<Result<Vec<DVec3>, FitError>> = (0..uses.len())
+        .into_par_iter()
+        .map(|c| match uses[c][..] {
+            [a, b] if is_seam(c) => normals(network, &filled, c, [a, b], &curves[c], &planes),
+            _ => Ok(Vec::new()),
+        })
+        .collect();
+    let fields = fields.into_iter().collect::<Result<Vec<_>, _>>()?;
+    stop()?;
+    let stitched: Vec<Surface> = network
+        .patches
+        .par_iter()
+        .enumerate()
+        .map(|(p, patch)| {
+            let [along_u, along_v] = patch_directions(patch, &grids[p], &directions, &counts);
+            let mut net = filled[p].control.clone();
+            turn_ring(&mut net, along_v.control(), along_u.control(), patch, &fields, params.stiffness);
+            solve_inside(&mut net, &projections[p], along_u, along_v, 2);
+            surface_of(net, along_u, along_v)
+        })
+        .collect();
+    stop()?;
+    observer.progress(1.0);
+    Ok(stitched)
+}
+
+/// Moves the ring of control points next to the boundary so that along every smooth side the derivative across it is
+/// perpendicular to the normals there, and as little as that allows.
+fn turn_ring(net: &mut [DVec3], rows: usize, cols: usize, patch: &Patch, fields: &[Vec<DVec3>], stiffness: f64) {
+    let mut ring = Vec::new();
+    let mut rank = vec![usize::MAX; net.len()];
+    for k in 0..4 {
+        for i in 1..side_len(rows, cols, k) - 1 {
+            let at = node(rows, cols, k, i, 1);
+            if rank[at] == usize::MAX {
+                rank[at] = ring.len();
+                ring.push(at);
+            }
+        }
+    }
+    // Fold the ring into a line: 0, L-1, 1, L-2, ...
+    let length = ring.len();
+    let mut reach = vec![f64::INFINITY; length];
+    for r in rank.iter_mut().filter(|r| **r != usize::MAX) {
+        *r = if *r < length.div_ceil(2) { 2 * *r } else { 2 * (length - 1 - *r) + 1 };
+    }
+    let mut matrix = Banded::zero(3 * length, RING_BAND.min(3 * length - 1));
+    let mut rhs = vec![0.0; 3 * length];
+    let mut any = false;
+    for (k, side) in patch.sides.iter().enumerate() {
+        let n = side_len(rows, cols, k);
+        for i in 1..n - 1 {
+            let (rim, inner) = (node(rows, cols, k, i, 0), node(rows, cols, k, i, 1));
+            let entry = &mut reach[rank[inner]];
+            *entry = entry.min(net[rim].distance(net[inner]));
+        }
+        let field = &fields[side.curve as usize];
+        if field.is_empty() {
+            continue;
+        }
+        any = true;
+        let knots = uniform_knots(n);
+        for (s, t) in uniform_parameters(field.len()).into_iter().enumerate() {
+            let normal = field[if side.reversed { field.len() - 1 - s } else { s }];
+            let (first, [weights, ..]) = basis_at(&knots, t);
+            let across: DVec3 = (0..4)
+                .map(|a| {
+                    let (rim, inner) = (node(rows, cols, k, first + a, 0), node(rows, cols, k, first + a, 1));
+                    (net[inner] - net[rim]) * weights[a]
+                })
+                .sum();
+            let size = across.length_squared();
+            if size == 0.0 {
+                continue;
+            }
+            let weight = stiffness * stiffness / (size * SPAN_SAMPLES as f64);
+            for a in (0..4).filter(|a| (1..n - 1).contains(&(first + a))) {
+                let i = 3 * rank[node(rows, cols, k, first + a, 1)];
+                for x in 0..3 {
+                    rhs[i + x] -= weight * weights[a] * normal[x] * across.dot(normal);
+                }
+                for b in (0..4).filter(|b| (1..n - 1).contains(&(first + b))) {
+                    let j = 3 * rank[node(rows, cols, k, first + b, 1)];
+                    for x in 0..3 {
+                        for y in (0..3).filter(|y| i + x >= j + y) {
+                            matrix.add(i + x, j + y, weight * weights[a] * weights[b] * normal[x] * normal[y]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+    let longest = reach.iter().copied().fold(0.0, f64::max);
+    if !any || longest == 0.0 {
+        return;
+    }
+    for (r, reach) in reach.iter().enumerate() {
+        // A control point that lies on the boundary may move as one at a thousandth of the longest reach.
+        let hold = reach.max(1e-3 * longest).powi(-2);
+        (0..3).for_each(|x| matrix.add(3 * r + x, 3 * r + x, hold));
+    }
+    if let Some(factor) = BandedCholesky::factor(matrix) {
+        factor.solve(&mut rhs);
+        for at in ring {
+            let r = 3 * rank[at];
+            net[at] += DVec3::new(rhs[r], rhs[r + 1], rhs[r + 2]);
+        }
+    }
+}
