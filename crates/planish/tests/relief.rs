@@ -7,7 +7,7 @@ use patchworks::*;
 use planish::Silent;
 use planish::mesh::{Adjacency, NONE, TriMesh};
 use planish::network::CurveKind;
-use planish::relief::{self, Relief};
+use planish::relief::{self, Relief, ReliefError};
 use planish::surface::{self, FitParams, Resolution, Surface};
 
 fn fitted(work: &Patchwork, control: usize) -> (Vec<Surface>, Vec<Relief>) {
@@ -168,6 +168,9 @@ fn lists_that_do_not_fit_are_errors() {
     reliefs[3].vectors.pop();
     let error = relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap_err();
     assert!(error.to_string().contains("patch 3"), "{error}");
+    let mut broken = surfaces[0].clone();
+    broken.control.pop();
+    assert!(matches!(relief::bake(&work.grids[0], &broken), Err(ReliefError::Surface(_))));
 }
 
 #[test]

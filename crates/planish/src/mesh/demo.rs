@@ -1,13 +1,13 @@
 //! The demonstration model: an organic body with machined parts.
 //!
 //! A lobed, bumpy gourd with scales on one side and ripples on the other, cut flat at top and bottom, drilled
-//! through along its axis with a counterbore (so the genus is 1), with two milled flats, one of them with a
-//! blind hole.
+//! through along its axis with a counterbore (so the genus is 1), with two round pockets milled into its side, one
+//! of them with a blind hole.
 //!
 //! 1. The body is grown ring by ring, so the cut outlines and the circles of the bore are rings of vertices.
-//! 2. A flat is milled by cutting the closed mesh with a plane: vertices near the plane slide along their edges
-//!    onto it, the other crossing edges are split, what is above goes, and the loop that is left is filled with
-//!    rings. So all sharp edges are exact chains of mesh edges.
+//! 2. A pocket is milled by cutting the closed mesh with a round cutter: vertices near the cutter slide along
+//!    their edges onto it, the other crossing edges are split, what is inside goes, and wall and floor are grown
+//!    from the loop that is left. So all sharp edges are exact chains of mesh edges.
 
 use super::rings::{Ring, add_ring, grow, grow_disk};
 use super::{Adjacency, NONE, TriMesh, next};
@@ -17,12 +17,12 @@ use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 /// The demonstration model with about `triangles` triangles (at least 2 000, or the relief would be lost), about
-/// two units tall. The seed moves bumps, lobes, relief and flats.
+/// two units tall. The seed moves bumps, lobes, relief and pockets.
 pub fn demo(seed: u64, triangles: usize) -> TriMesh {
     let wanted = triangles.max(2_000) as f64;
     let body = Body::new(seed);
-    // The model's area is near 19; two corrections bring the count within a per cent.
-    let mut step = (19.0 / wanted / (3f64.sqrt() / 4.0)).sqrt();
+    // The model's area is near 16; two corrections bring the count within a per cent.
+    let mut step = (16.0 / wanted / (3f64.sqrt() / 4.0)).sqrt();
     for _ in 0..2 {
         step *= (body.mesh(step).triangles.len() as f64 / wanted).sqrt();
     }
@@ -33,15 +33,19 @@ pub fn demo(seed: u64, triangles: usize) -> TriMesh {
 const ACROSS: f64 = 1.0;
 const ALONG: f64 = 1.2;
 /// Heights of the bottom and top cut.
-const BOTTOM: f64 = -0.86;
-const TOP: f64 = 0.84;
+const BOTTOM: f64 = -0.72;
+const TOP: f64 = 0.70;
 /// Bore and counterbore.
 const BORE: f64 = 0.25;
 const COUNTERBORE: f64 = 0.38;
 const COUNTERBORE_DEPTH: f64 = 0.16;
-/// Blind hole in the first flat.
-const HOLE: f64 = 0.17;
-const HOLE_DEPTH: f64 = 0.26;
+/// Where a cutter stops at the latest: outside the counterbore, inside the body's outer wall.
+const REACH: f64 = 0.5;
+/// The least depth of a pocket.
+const POCKET_DEPTH: f64 = 0.05;
+/// Blind hole in the first pocket.
+const HOLE: f64 = 0.16;
+const HOLE_DEPTH: f64 = 0.24;
 /// Scales around the girth, and their height.
 const SCALES: f64 = 34.0;
 const SCALE_HEIGHT: f64 = 0.026;
@@ -51,10 +55,27 @@ const RIPPLE_HEIGHT: f64 = 0.007;
 /// The relief fades out over this distance before a machined edge, so that the edge is a clean line.
 const FADE: f64 = 0.12;
 
-struct Flat {
-    normal: DVec3,
-    offset: f64,
+/// A round pocket: the cutter comes from far outside along the axis.
+struct Pocket {
+    /// Unit vector out of the pocket; the axis of the cutter goes through the origin.
+    axis: DVec3,
+    radius: f64,
     holed: bool,
+}
+
+impl Pocket {
+    /// Distance from the wall, negative inside the cutter.
+    fn outside(&self, p: DVec3) -> f64 {
+        let along = p.dot(self.axis);
+        // The bore and what lies on its far side are out of reach.
+        if along <= REACH { f64::MAX } else { (p - self.axis * along).length() - self.radius }
+    }
+
+    /// The nearest point of the wall.
+    fn on_wall(&self, p: DVec3) -> DVec3 {
+        let foot = self.axis * p.dot(self.axis);
+        foot + (p - foot).normalize_or_zero() * self.radius
+    }
 }
 
 struct Body {
@@ -63,7 +84,7 @@ struct Body {
     lobe_phase: f64,
     scale_side: DVec3,
     ripple_pole: DVec3,
-    flats: Vec<Flat>,
+    pockets: Vec<Pocket>,
     /// Latitude at even steps of arc length from the bottom cut to the top cut.
     latitudes: Vec<f64>,
     meridian: f64,
@@ -84,7 +105,7 @@ impl Body {
             lobe_phase: TAU * draw(1000),
             scale_side: DVec3::ZERO,
             ripple_pole: DVec3::ZERO,
-            flats: Vec::new(),
+            pockets: Vec::new(),
             latitudes,
             meridian,
         };
@@ -92,14 +113,10 @@ impl Body {
         let around = |turn: f64, z: f64| DVec3::new((azimuth + turn).cos(), (azimuth + turn).sin(), z).normalize();
         body.scale_side = around(PI * 0.55, 0.15);
         body.ripple_pole = around(-PI * 0.6, 0.3);
-        for (normal, depth, holed) in [(around(0.0, -0.06), 0.13, true), (around(1.25 * PI, 0.05), 0.09, false)] {
-            // The support of the body along the normal sets how deep the cutter goes.
-            let support = (0..=64)
-                .flat_map(|i| (0..128).map(move |j| (i as f64 / 64.0, TAU * j as f64 / 128.0)))
-                .map(|(s, a)| body.smooth(s, a).dot(normal))
-                .fold(f64::NEG_INFINITY, f64::max);
-            body.flats.push(Flat { normal, offset: support - depth, holed });
-        }
+        body.pockets = vec![
+            Pocket { axis: around(0.0, -0.06), radius: 0.37, holed: true },
+            Pocket { axis: around(1.25 * PI, 0.05), radius: 0.25, holed: false },
+        ];
         body
     }
 
@@ -130,8 +147,8 @@ impl Body {
         let p = self.smooth(s, angle);
         let along = s * self.meridian;
         let rims = along.min(self.meridian - along);
-        let flats = self.flats.iter().map(|f| (f.normal.dot(p) - f.offset).abs()).fold(f64::INFINITY, f64::min);
-        let fade = smooth_step(rims / FADE) * smooth_step(flats / FADE);
+        let pockets = self.pockets.iter().map(|k| k.outside(p).abs()).fold(f64::INFINITY, f64::min);
+        let fade = smooth_step(rims / FADE) * smooth_step(pockets / FADE);
         if fade == 0.0 {
             return p;
         }
@@ -177,8 +194,8 @@ impl Body {
         grow(&mut mesh, ring, Some(first), step, wide - BORE, between(BORE, wide), |s, a| {
             circle(BORE, a, BOTTOM).lerp(self.smooth(0.0, a), s)
         });
-        for flat in &self.flats {
-            if let Some(milled) = mill(&mesh, flat, step) {
+        for pocket in &self.pockets {
+            if let Some(milled) = mill(&mesh, pocket, step) {
                 mesh = milled;
             }
         }
@@ -231,58 +248,58 @@ fn scale(u: f64, v: f64) -> f64 {
     sum.ln() / SHARPNESS - 0.6
 }
 
-/// A vertex this near to the plane, as a fraction of a crossing edge, slides onto it.
+/// A vertex this near to the cutter, as a fraction of a crossing edge, slides onto it.
 const SNAP: f64 = 0.4;
 
-/// Cuts the part of a closed mesh above the plane off and fills the hole with a flat (with a blind hole if
-/// asked). `None` if the outline is not one loop that is star-shaped around its middle.
-fn mill(mesh: &TriMesh, flat: &Flat, step: f64) -> Option<TriMesh> {
-    let (mut cut, outline) = cut_off(mesh, flat.normal, flat.offset)?;
-    let center = outline.iter().map(|&v| cut.points[v as usize]).sum::<DVec3>() / outline.len() as f64;
-    let tangent = flat.normal.any_orthonormal_vector();
-    let bitangent = flat.normal.cross(tangent);
-    let polar = |v: u32| {
-        let d = cut.points[v as usize] - center;
-        (d.dot(bitangent).atan2(d.dot(tangent)).rem_euclid(TAU), d.length())
-    };
-    // The outline, counter-clockwise, beginning at its least angle.
-    let mut loop_points: Vec<(f64, f64, u32)> = outline.iter().map(|&v| (polar(v).0, polar(v).1, v)).collect();
-    let least = (0..loop_points.len()).min_by(|&a, &b| loop_points[a].0.total_cmp(&loop_points[b].0))?;
-    loop_points.rotate_left(least);
-    if loop_points.windows(2).any(|w| w[1].0 <= w[0].0) {
+/// Mills a pocket into a closed mesh. `None` if its outline is not one loop around the axis.
+fn mill(mesh: &TriMesh, pocket: &Pocket, step: f64) -> Option<TriMesh> {
+    let (mut cut, outline) = cut_out(mesh, pocket)?;
+    let tangent = pocket.axis.any_orthonormal_vector();
+    let bitangent = pocket.axis.cross(tangent);
+    // The outline by angle and height, counter-clockwise, beginning at its least angle.
+    let mut rim: Vec<(f64, f64, u32)> = outline
+        .iter()
+        .map(|&v| {
+            let p = cut.points[v as usize];
+            (p.dot(bitangent).atan2(p.dot(tangent)).rem_euclid(TAU), p.dot(pocket.axis), v)
+        })
+        .collect();
+    let least = (0..rim.len()).min_by(|&a, &b| rim[a].0.total_cmp(&rim[b].0))?;
+    rim.rotate_left(least);
+    if rim.windows(2).any(|w| w[1].0 <= w[0].0) {
         return None;
     }
-    let on = |r: f64, a: f64, deep: f64| center + (tangent * a.cos() + bitangent * a.sin()) * r - flat.normal * deep;
-    let rim = |angle: f64| {
+    let height = |angle: f64| {
         let a = angle.rem_euclid(TAU);
-        let k = loop_points.partition_point(|p| p.0 <= a);
-        let n = loop_points.len();
-        let (low, high) = (loop_points[(k + n - 1) % n], loop_points[k % n]);
-        let span = (high.0 - low.0).rem_euclid(TAU);
-        low.1 + (high.1 - low.1) * (a - low.0).rem_euclid(TAU) / span
+        let k = rim.partition_point(|p| p.0 <= a);
+        let (low, high) = (rim[(k + rim.len() - 1) % rim.len()], rim[k % rim.len()]);
+        low.1 + (high.1 - low.1) * (a - low.0).rem_euclid(TAU) / (high.0 - low.0).rem_euclid(TAU)
     };
-    let radius = loop_points.iter().map(|p| p.1).sum::<f64>() / loop_points.len() as f64;
+    let on = |r: f64, a: f64, h: f64| (tangent * a.cos() + bitangent * a.sin()) * r + pocket.axis * h;
+    let floor = rim.iter().map(|p| p.1).fold(f64::INFINITY, f64::min) - POCKET_DEPTH;
+    let deep = rim.iter().map(|p| p.1).sum::<f64>() / rim.len() as f64 - floor;
+    let ring = Ring { vertices: rim.iter().map(|p| p.2).collect(), angles: rim.iter().map(|p| p.0).collect() };
+    let (wide, middle) = (pocket.radius, pocket.axis * floor);
     let ring =
-        Ring { vertices: loop_points.iter().map(|p| p.2).collect(), angles: loop_points.iter().map(|p| p.0).collect() };
-    if flat.holed && radius > 1.5 * HOLE {
-        let width = |s: f64| TAU * (radius + (HOLE - radius) * s);
+        grow(&mut cut, ring, None, step, deep, |_| TAU * wide, |s, a| on(wide, a, height(a) + (floor - height(a)) * s));
+    if pocket.holed {
+        let radius = |s: f64| wide + (HOLE - wide) * s;
+        let ring = grow(&mut cut, ring, None, step, wide - HOLE, |s| TAU * radius(s), |s, a| on(radius(s), a, floor));
         let ring =
-            grow(&mut cut, ring, None, step, radius - HOLE, width, |s, a| on(rim(a) * (1.0 - s) + HOLE * s, a, 0.0));
-        let ring = grow(&mut cut, ring, None, step, HOLE_DEPTH, |_| TAU * HOLE, |s, a| on(HOLE, a, s * HOLE_DEPTH));
-        let bottom = center - flat.normal * HOLE_DEPTH;
-        grow_disk(&mut cut, ring, step, HOLE, bottom, |a| on(HOLE, a, HOLE_DEPTH));
+            grow(&mut cut, ring, None, step, HOLE_DEPTH, |_| TAU * HOLE, |s, a| on(HOLE, a, floor - s * HOLE_DEPTH));
+        let bottom = floor - HOLE_DEPTH;
+        grow_disk(&mut cut, ring, step, HOLE, pocket.axis * bottom, |a| on(HOLE, a, bottom));
     } else {
-        grow_disk(&mut cut, ring, step, radius, center, |a| on(rim(a), a, 0.0));
+        grow_disk(&mut cut, ring, step, wide, middle, |a| on(wide, a, floor));
     }
     Some(cut)
 }
 
-/// The part of a closed mesh below a plane, and its outline, counter-clockwise seen from above.
-fn cut_off(mesh: &TriMesh, normal: DVec3, offset: f64) -> Option<(TriMesh, Vec<u32>)> {
-    let height = |p: DVec3| p.dot(normal) - offset;
+/// The part of a closed mesh outside the cutter, and its outline, counter-clockwise seen from outside.
+fn cut_out(mesh: &TriMesh, pocket: &Pocket) -> Option<(TriMesh, Vec<u32>)> {
     // 1. Slide near vertices along their nearest crossing edge.
     let mut points = mesh.points.clone();
-    let mut level: Vec<f64> = points.iter().map(|&p| height(p)).collect();
+    let mut level: Vec<f64> = points.iter().map(|&p| -pocket.outside(p)).collect();
     let mut nearest = vec![(SNAP, u32::MAX); points.len()];
     for t in &mesh.triangles {
         for k in 0..3 {
@@ -296,12 +313,11 @@ fn cut_off(mesh: &TriMesh, normal: DVec3, offset: f64) -> Option<(TriMesh, Vec<u
     }
     for (v, &(s, other)) in nearest.iter().enumerate() {
         if other != u32::MAX {
-            let p = mesh.points[v].lerp(mesh.points[other as usize], s);
-            points[v] = p - normal * height(p);
+            points[v] = pocket.on_wall(mesh.points[v].lerp(mesh.points[other as usize], s));
             level[v] = 0.0;
         }
     }
-    // 2. Split the other crossing edges, keep what is below.
+    // 2. Split the other crossing edges, keep what is outside.
     let mut splits: BTreeMap<(u32, u32), u32> = BTreeMap::new();
     let mut kept = Vec::new();
     for &t in &mesh.triangles {
@@ -320,8 +336,7 @@ fn cut_off(mesh: &TriMesh, normal: DVec3, offset: f64) -> Option<(TriMesh, Vec<u
                 polygon.push(*splits.entry(key).or_insert_with(|| {
                     let (p, q) = (points[key.0 as usize], points[key.1 as usize]);
                     let s = level[key.0 as usize] / (level[key.0 as usize] - level[key.1 as usize]);
-                    let r = p.lerp(q, s);
-                    points.push(r - normal * height(r));
+                    points.push(pocket.on_wall(p.lerp(q, s)));
                     points.len() as u32 - 1
                 }));
             }
@@ -361,7 +376,7 @@ fn cut_off(mesh: &TriMesh, normal: DVec3, offset: f64) -> Option<(TriMesh, Vec<u
         outline.push(v);
         v = *after.get(&v)?;
     }
-    // The body lies on the left of its open edges; seen from above that is clockwise.
+    // The body lies on the left of its open edges; seen from outside that is clockwise.
     outline.reverse();
     (outline.len() == open.len()).then_some((cut, outline))
 }

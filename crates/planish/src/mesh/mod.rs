@@ -16,7 +16,7 @@ mod soup;
 mod walk;
 
 pub use adjacency::{Adjacency, Fan, NONE, next, previous};
-pub use compare::{Comparison, CompareError, CompareParams, compare};
+pub use compare::{CompareError, CompareParams, Comparison, compare};
 pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
 pub use face_point::FacePoint;
 pub use features::{boundary_loops, components, sharp_edges};

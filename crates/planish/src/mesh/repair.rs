@@ -1,6 +1,6 @@
 //! Mends light damage, so that what comes out is always an oriented manifold (possibly with boundary).
 //!
-//! 1. weld cracks: open edges that coincide exactly     2. drop triangles with a repeated vertex, and duplicates
+//! 1. drop triangles with a repeated vertex, and duplicates     2. weld cracks: open edges that coincide exactly
 //! 3. pair edges; those of more than two triangles stay unpaired     4. orient pieces by flood fill; where that
 //!    contradicts itself (a one-sided piece) the edge is cut; turn closed pieces that are inside out
 //! 5. one vertex per fan, which cuts along all unpaired edges     6. triangles without height: collapse their
@@ -63,11 +63,14 @@ pub fn repair(mesh: &TriMesh) -> Result<(TriMesh, Repairs), MeshError> {
     // The input vertex that each vertex was made of.
     let mut source: Vec<u32> = (0..mesh.points.len() as u32).collect();
 
-    done.welded_vertices = weld_cracks(mesh, &mut triangles);
     let before = triangles.len();
+    // Before welding, as duplicates hide open edges, and after, as welding can bring about both.
     triangles.retain(|t| !repeats(t));
-    done.repeated_faces = before - triangles.len();
     done.duplicate_faces = drop_duplicates(&mut triangles);
+    done.welded_vertices = weld_cracks(mesh, &mut triangles);
+    triangles.retain(|t| !repeats(t));
+    done.duplicate_faces += drop_duplicates(&mut triangles);
+    done.repeated_faces = before - triangles.len() - done.duplicate_faces;
     if triangles.is_empty() {
         return Err(MeshError::Empty);
     }
@@ -115,8 +118,7 @@ const FOLDED: f64 = 0.999;
 /// that merely touch at points, and two-sided sheets, stay as they are.
 fn weld_cracks(mesh: &TriMesh, triangles: &mut [[u32; 3]]) -> usize {
     let keyed = keyed_edges(triangles);
-    let open: Vec<u32> =
-        keyed.chunk_by(|x, y| x.0 == y.0).filter(|run| run.len() == 1).map(|run| run[0].1).collect();
+    let open: Vec<u32> = keyed.chunk_by(|x, y| x.0 == y.0).filter(|run| run.len() == 1).map(|run| run[0].1).collect();
     if open.is_empty() {
         return 0;
     }

@@ -357,21 +357,23 @@ mod tests {
     }
 
     #[test]
-    fn demo_has_both_flats_for_20_seeds() {
+    fn demo_has_12_closed_sharp_lines_over_40_degrees_for_20_seeds() {
         for seed in 0..20 {
             let mesh = demo(seed, 20_000);
-            // Exactly planar regions besides the three that are across the axis: count distinct steep normals
-            // that many triangles share.
-            let mut shared: BTreeMap<[i64; 3], usize> = BTreeMap::new();
-            for t in 0..mesh.triangles.len() {
-                let n = mesh.normal(t);
-                if n.z.abs() < 0.9 {
-                    *shared.entry((n * 1e7).round().to_array().map(|x| x as i64)).or_default() += 1;
-                }
+            let adjacency = Adjacency::new(&mesh);
+            let sharp = crate::mesh::sharp_edges(&mesh, &adjacency, 40.0);
+            // Every vertex of a sharp line has two sharp edges: the lines are closed, without gap or branch.
+            let mut degree = vec![0; mesh.points.len()];
+            let mut lines = crate::mesh::sets::Sets::new(mesh.points.len());
+            for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
+                degree[mesh.origin(h) as usize] += 1;
+                lines.join(mesh.origin(h), mesh.origin(crate::mesh::next(h)));
             }
-            let mut counts: Vec<usize> = shared.into_values().collect();
-            counts.sort_unstable();
-            assert!(counts[counts.len() - 2] > 100, "seed {seed}: {:?}", &counts[counts.len() - 3..]);
+            assert!(degree.iter().all(|&d| d == 0 || d == 2), "seed {seed}");
+            let roots = (0..mesh.points.len() as u32).filter(|&v| degree[v as usize] > 0 && lines.root(v) == v);
+            // Two outlines, two circles each of counterbore and bore, of two pockets their rim and floor, of the
+            // hole its mouth and floor; the mouth of the bore lies in the counterbore's floor.
+            assert_eq!(roots.count(), 2 + 4 + 4 + 2, "seed {seed}");
         }
     }
 }

@@ -81,10 +81,10 @@ fn inside(mesh: &TriMesh, at: FacePoint, rest: DVec3) -> Option<Step> {
         return Some(Step { from: at, rates, rest: d });
     }
     // No plane: go to the nearest edge, which costs nothing as the triangle has no width.
-    let k = (0..3).min_by(|&i, &j| at.bary[i].total_cmp(&at.bary[j]))?;
-    let mut bary = at.bary;
-    bary[k] = 0.0;
-    let from = cleaned(FacePoint { face: at.face, bary });
+    let p = at.position(mesh);
+    let (_, near) = (0..3).map(|k| nearest_on_edge(mesh, at.face, k, p)).min_by(|x, y| x.0.total_cmp(&y.0))?;
+    let from = cleaned(near);
+    let k = from.bary.iter().position(|&b| b == 0.0)?;
     // Against a weight that is zero already: the step ends where it begins.
     let mut rates = [0.0; 3];
     rates[k] = -1.0;
@@ -96,15 +96,19 @@ fn on_edge(mesh: &TriMesh, adjacency: &Adjacency, at: FacePoint, rest: DVec3) ->
     // The half-edge that the point is on.
     let h = 3 * at.face + ((k as u32) + 1) % 3;
     let mut best: Option<Step> = None;
-    for candidate in [beside(mesh, adjacency, at), across(mesh, adjacency, at)].into_iter().flatten() {
-        let Some((d, rates)) = project(mesh, candidate.face, rest) else { continue };
-        let enters = (0..3).all(|i| candidate.bary[i] > 0.0 || rates[i] > 0.0);
-        let longer = best.as_ref().is_none_or(|b| d.length_squared() > b.rest.length_squared());
-        if enters && longer {
-            best = Some(Step { from: candidate, rates, rest: d });
-        }
+    for candidate in [beside(mesh, adjacency, at), across(mesh, adjacency, at)] {
+        best = better(mesh, best, candidate, rest);
     }
     best.or_else(|| slide(mesh, h, at, rest))
+}
+
+/// The step from `candidate` if its face takes the vector and takes more of it than `best`.
+fn better(mesh: &TriMesh, best: Option<Step>, candidate: Option<FacePoint>, rest: DVec3) -> Option<Step> {
+    let Some(from) = candidate else { return best };
+    let Some((d, rates)) = project(mesh, from.face, rest) else { return best };
+    let enters = (0..3).all(|i| from.bary[i] > 0.0 || rates[i] > 0.0);
+    let longer = best.as_ref().is_none_or(|b| d.length_squared() > b.rest.length_squared());
+    if enters && longer { Some(Step { from, rates, rest: d }) } else { best }
 }
 
 /// The place itself if its face has a plane, else the same place on the first face with one on that side.
@@ -178,7 +182,13 @@ fn on_vertex(mesh: &TriMesh, adjacency: &Adjacency, at: FacePoint, rest: DVec3) 
     let v = mesh.triangles[at.face as usize][k];
     let mut best: Option<Step> = None;
     for h in adjacency.fan(v) {
-        let Some((d, rates)) = project(mesh, h / 3, rest) else { continue };
+        let Some((d, rates)) = project(mesh, h / 3, rest) else {
+            // A triangle without area whose opposite edge passes through the vertex: look beyond that edge.
+            let (_, near) = nearest_on_edge(mesh, h / 3, h as usize % 3, mesh.points[v as usize]);
+            let beyond = (near.bary.iter().filter(|&&b| b == 0.0).count() == 1).then(|| across(mesh, adjacency, near));
+            best = better(mesh, best, beyond.flatten(), rest);
+            continue;
+        };
         // The direction lies between the two edges at the vertex.
         let enters = rates[next(h) as usize % 3] >= 0.0 && rates[previous(h) as usize % 3] >= 0.0;
         let longer = best.as_ref().is_none_or(|b| d.length_squared() > b.rest.length_squared());

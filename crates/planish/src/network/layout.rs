@@ -14,6 +14,7 @@ mod partition;
 mod polygon;
 mod recut;
 mod refine;
+mod slide;
 
 use super::imprint::Shared;
 use super::{Corner, Curve, CurveKind, Network, Patch, Side, imprint};
@@ -33,6 +34,9 @@ const ATTEMPTS: usize = 5;
 
 /// Attempts at the number of patches asked for: the features decide how many patches a partition gives.
 const COUNT_ATTEMPTS: usize = 3;
+
+/// Part of the patches of the first draft that counts as forced by the features.
+const FORCED: f64 = 0.85;
 
 /// Parameters of [`layout`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -100,8 +104,10 @@ pub fn layout(mesh: &TriMesh, params: &LayoutParams, observer: &dyn Observer) ->
             if let Some(mut bench) = Bench::new(&work.mesh, &work_adjacency, complex)
                 && improve::quads(&mut bench)
             {
+                // Features may force more patches than asked for; shape is not given up for the number.
+                let patches = params.patches.max((FORCED * bench.complex.live_cells().count() as f64) as usize);
                 improve::relax(&mut bench, 1, observer)?;
-                improve::improve(&mut bench, params.patches, observer)?;
+                improve::improve(&mut bench, patches, observer)?;
                 improve::relax(&mut bench, params.smoothing, observer)?;
                 observer.progress(1.0);
                 return Ok(network(&work, &work_adjacency, &bench.complex));

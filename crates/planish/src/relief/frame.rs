@@ -1,8 +1,9 @@
 //! The orthonormal frame that displacements are meant in.
 
-use crate::surface::basis::uniform_parameters;
-use crate::surface::{Jet, Surface};
+use crate::surface::basis::{BasisRows, uniform_parameters};
+use crate::surface::{Jet, RowSampler, Surface};
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// Relative size below which `S_u` (against the control net) or the sine between `S_u` and `S_v` counts as zero:
 /// above it a frame has at least half of its digits.
@@ -73,18 +74,35 @@ fn frame_or_near(surface: &Surface, jet: &Jet, u: f64, v: f64, size: f64) -> Fra
 
 /// The frames of `surface` at the nodes of a `rows x cols` grid, row-major.
 pub fn frames(surface: &Surface, rows: usize, cols: usize) -> Vec<Frame> {
+    let mut out = vec![Frame { tangent: DVec3::X, bitangent: DVec3::Y, normal: DVec3::Z }; rows * cols];
+    at_nodes(surface, rows, cols, &mut out, |out, _, frame| *out = frame);
+    out
+}
+
+/// Calls `visit` with each of the `rows * cols` items, the surface point and the frame at its node.
+pub(super) fn at_nodes<T: Send>(
+    surface: &Surface,
+    rows: usize,
+    cols: usize,
+    items: &mut [T],
+    visit: impl Fn(&mut T, DVec3, Frame) + Sync,
+) {
     let (us, vs) = (uniform_parameters(cols), uniform_parameters(rows));
+    let along_u = [0, 1].map(|order| BasisRows::new(&surface.knots_u, &us, order));
+    let sampler = RowSampler::new(surface, &along_u);
     let size = size_of(surface);
-    let s_u = surface.sample(&us, &vs, [1, 0]);
-    let s_v = surface.sample(&us, &vs, [0, 1]);
-    s_u.into_iter()
-        .zip(s_v)
-        .enumerate()
-        .map(|(i, (a, b))| {
-            let jet = Jet { u: a, v: b, ..Jet::default() };
-            frame_or_near(surface, &jet, us[i % cols], vs[i / cols], size)
-        })
-        .collect()
+    items.par_chunks_mut(cols).zip(vs).for_each(|(row, v)| {
+        let (narrow, slope) = (sampler.narrow(v, 0), sampler.narrow(v, 1));
+        for (i, item) in row.iter_mut().enumerate() {
+            let jet = Jet {
+                point: sampler.node(&narrow, i, 0),
+                u: sampler.node(&narrow, i, 1),
+                v: sampler.node(&slope, i, 0),
+                ..Jet::default()
+            };
+            visit(item, jet.point, frame_or_near(surface, &jet, us[i], v, size));
+        }
+    });
 }
 
 /// Diagonal of the control net: what "short" is measured against.

@@ -17,6 +17,7 @@ pub use frame::{Frame, frame_at, frames};
 pub use scalar::{fold_over, length, normal_component};
 pub use weld::{displaced_mesh, patch_mesh, span_shapes, surface_mesh};
 
+use crate::surface::FitError;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -69,6 +70,9 @@ pub enum ReliefError {
         /// Nodes on another.
         second: usize,
     },
+    /// A surface that cannot be evaluated.
+    #[error(transparent)]
+    Surface(#[from] FitError),
     /// A side names a curve or a corner that does not exist.
     #[error("patch {patch} uses a curve or corner that the network does not have")]
     Network {

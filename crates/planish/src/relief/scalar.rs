@@ -20,10 +20,11 @@ pub fn length(relief: &Relief) -> Vec<f64> {
 /// cross and the displaced surface may fold over: `n k >= 1` for a principal curvature `k` by the normal.
 ///
 /// # Errors
-/// [`ReliefError::Shape`] if the relief's vectors are not `rows * cols`.
+/// [`ReliefError::Shape`] if the relief's vectors are not `rows * cols`, [`ReliefError::Surface`] if the surface is malformed.
 pub fn fold_over(surface: &Surface, relief: &Relief) -> Result<Vec<usize>, ReliefError> {
     let Relief { rows, cols, ref vectors } = *relief;
     check(rows, cols, vectors.len())?;
+    surface.check()?;
     let (us, vs) = (uniform_parameters(cols), uniform_parameters(rows));
     let [u, v, uu, uv, vv] = [[1, 0], [0, 1], [2, 0], [1, 1], [0, 2]].map(|order| surface.sample(&us, &vs, order));
     let folds = |i: usize| {

@@ -53,6 +53,7 @@ pub fn surface_mesh(network: &Network, surfaces: &[Surface], shapes: &[[usize; 2
             return Err(ReliefError::Count { what, found, wanted: patches });
         }
     }
+    surfaces.iter().try_for_each(Surface::check)?;
     let nodes: Vec<Grid> = surfaces
         .par_iter()
         .zip(shapes)

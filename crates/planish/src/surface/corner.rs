@@ -20,6 +20,9 @@ const SPREAD: f64 = 1.3;
 const SPAN: f64 = 0.5;
 /// How far a plane spanned by features may lean from the mean of the tangent planes, cosine.
 const LEAN: f64 = 0.8;
+/// Largest turn of the normal within the first knot span, radians: more cannot be told from noise. Seams are not
+/// made to bend by it then, and the normals turn by this much.
+const TURN: f64 = 1.0;
 /// Weight of "no curvature" in the second fundamental form, against one for each seam: only decides for sectors
 /// too thin to say.
 const CALM: f64 = 1e-6;
@@ -31,6 +34,8 @@ pub(crate) struct Plane {
     axes: [DVec3; 2],
     /// `L, M, N` in `axes`.
     form: DVec3,
+    /// False where the seams bend too fast for their knots to be told how.
+    pub credible: bool,
 }
 
 impl Plane {
@@ -107,8 +112,7 @@ pub(crate) fn planes(network: &Network, surfaces: &[Surface], curves: &[Vec<DVec
         w
     }
     let mut joined = vec![false; wedges.len()];
-    for (curve, ends) in network.curves.iter().zip(&around).filter(|(c, _)| is_smooth(c)) {
-        debug_assert!(is_smooth(curve));
+    for (_, ends) in network.curves.iter().zip(&around).filter(|(c, _)| is_smooth(c)) {
         for list in ends.iter().filter(|list| list.len() > 1) {
             for pair in list.windows(2) {
                 let (a, b) = (find(&root, pair[0]), find(&root, pair[1]));
@@ -178,9 +182,10 @@ fn plane(network: &Network, sector: &[&Wedge], ends: &[(usize, usize)], curves: 
         return None;
     }
     let (x, y) = normal.any_orthonormal_pair();
-    let mut plane = Plane { normal, axes: [x, y], form: DVec3::ZERO };
+    let mut plane = Plane { normal, axes: [x, y], form: DVec3::ZERO, credible: true };
     // Least squares for L, M, N from the seams' normal curvature and the patches' twist.
-    let (mut matrix, mut rhs) = (DMat3::from_diagonal(DVec3::splat(CALM)), DVec3::ZERO);
+    // The form's own norm, L² + 2 M² + N², does not depend on the axes.
+    let (mut matrix, mut rhs) = (DMat3::from_diagonal(DVec3::new(1.0, 2.0, 1.0) * CALM), DVec3::ZERO);
     let mut row = |a: DVec3, b: DVec3, value: f64| {
         let scale = a.length() * b.length();
         if scale > 0.0 {
@@ -198,5 +203,12 @@ fn plane(network: &Network, sector: &[&Wedge], ends: &[(usize, usize)], curves: 
         row(wedge.u, wedge.v, normal.dot(wedge.twist));
     }
     plane.form = matrix.inverse() * rhs;
+    // What a noisy or very coarse fit says of curvature may be a fold within its first span.
+    let steepest = ends
+        .iter()
+        .map(|&(c, e)| plane.turn(end_derivatives(&curves[c], e).0).length() / (curves[c].len() - 3) as f64)
+        .fold(0.0, f64::max);
+    plane.credible = steepest <= TURN;
+    plane.form *= (TURN / steepest).min(1.0);
     plane.form.is_finite().then_some(plane)
 }

@@ -89,6 +89,12 @@ pub enum FitError {
         /// What it must be.
         wanted: &'static str,
     },
+    /// A surface that cannot be evaluated.
+    #[error("the surface is malformed: {what}; fit it again")]
+    Malformed {
+        /// What is wrong.
+        what: &'static str,
+    },
     /// Seams can be worked on only where the knots are uniform.
     #[error("patch {patch} does not have clamped uniform knots; fit it again before its seams are smoothed")]
     Knots {

@@ -1,8 +1,9 @@
 //! Points and derivatives of a surface: one place at a time, or a whole grid separably.
 
-use super::Surface;
 use super::basis::{BasisRows, basis_at};
+use super::{FitError, Surface};
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// A point of a surface and its derivatives by `u` and `v`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -42,6 +43,32 @@ impl Jet {
 }
 
 impl Surface {
+    /// Checks what evaluation relies on: at least `4 x 4` finite control points and clamped knots that rise from
+    /// 0 to 1, as many as they must be. Surfaces that come from outside want this before anything else.
+    ///
+    /// # Errors
+    /// [`FitError::Malformed`] with the first thing that is wrong.
+    pub fn check(&self) -> Result<(), FitError> {
+        let knots_are_bad = |knots: &[f64], control: usize| {
+            knots.len() != control + 4
+                || knots[..4] != [0.0; 4]
+                || knots[control..] != [1.0; 4]
+                || !knots.windows(2).all(|k| k[0] <= k[1])
+        };
+        let what = if self.rows < 4 || self.cols < 4 {
+            "it has fewer than 4 x 4 control points"
+        } else if self.control.len() != self.rows * self.cols {
+            "its control points are not rows x columns"
+        } else if self.control.iter().any(|p| !p.is_finite()) {
+            "a control point is not finite"
+        } else if knots_are_bad(&self.knots_u, self.cols) || knots_are_bad(&self.knots_v, self.rows) {
+            "its knots are not clamped and rising from 0 to 1"
+        } else {
+            return Ok(());
+        };
+        Err(FitError::Malformed { what })
+    }
+
     /// Control point `(i, j)`, `i` along `u`.
     pub fn at(&self, i: usize, j: usize) -> DVec3 {
         self.control[j * self.cols + i]
@@ -75,30 +102,42 @@ impl Surface {
     ///
     /// * `order` - derivatives by `u` and by `v`, each 0, 1 or 2
     pub fn sample(&self, us: &[f64], vs: &[f64], order: [usize; 2]) -> Vec<DVec3> {
-        let along_u = BasisRows::new(&self.knots_u, us, order[0]);
-        let along_v = BasisRows::new(&self.knots_v, vs, order[1]);
-        let mut out = Vec::with_capacity(us.len() * vs.len());
-        each_row(self, &along_u, &along_v, |row| out.extend_from_slice(row));
+        let along_u = [BasisRows::new(&self.knots_u, us, order[0])];
+        let sampler = RowSampler::new(self, &along_u);
+        let mut out = vec![DVec3::ZERO; us.len() * vs.len()];
+        out.par_chunks_mut(us.len().max(1)).zip(vs).for_each(|(row, &v)| {
+            let narrow = sampler.narrow(v, order[1]);
+            row.iter_mut().enumerate().for_each(|(i, p)| *p = sampler.node(&narrow, i, 0));
+        });
         out
     }
 }
 
-/// Calls `visit` with one row of surface points after another.
-pub(crate) fn each_row(surface: &Surface, along_u: &BasisRows, along_v: &BasisRows, mut visit: impl FnMut(&[DVec3])) {
-    let width = along_u.len();
-    let mut narrow = Vec::with_capacity(surface.rows * width);
-    for row in surface.control.chunks_exact(surface.cols) {
-        for (&first, w) in along_u.first.iter().zip(&along_u.weights) {
-            let c = &row[first..first + 4];
-            narrow.push(c[0] * w[0] + c[1] * w[1] + c[2] * w[2] + c[3] * w[3]);
-        }
+/// One row of a grid at a time: the control rows summed up for a `v`, then evaluated along `u`.
+pub(crate) struct RowSampler<'a> {
+    surface: &'a Surface,
+    along_u: &'a [BasisRows],
+}
+
+impl<'a> RowSampler<'a> {
+    /// `along_u[d]` are the rows of the basis for the `d`-th derivative by `u`.
+    pub fn new(surface: &'a Surface, along_u: &'a [BasisRows]) -> RowSampler<'a> {
+        RowSampler { surface, along_u }
     }
-    let mut line = vec![DVec3::ZERO; width];
-    for (&first, w) in along_v.first.iter().zip(&along_v.weights) {
-        let rows: [&[DVec3]; 4] = std::array::from_fn(|b| &narrow[(first + b) * width..(first + b + 1) * width]);
-        for (i, out) in line.iter_mut().enumerate() {
-            *out = rows[0][i] * w[0] + rows[1][i] * w[1] + rows[2][i] * w[2] + rows[3][i] * w[3];
-        }
-        visit(&line);
+
+    /// The control rows summed up for the derivative of this order by `v`.
+    pub fn narrow(&self, v: f64, order: usize) -> Vec<DVec3> {
+        let (first, basis) = basis_at(&self.surface.knots_v, v);
+        let (cols, w) = (self.surface.cols, basis[order]);
+        let row = |b: usize| &self.surface.control[(first + b) * cols..(first + b + 1) * cols];
+        let rows = [row(0), row(1), row(2), row(3)];
+        (0..cols).map(|i| rows[0][i] * w[0] + rows[1][i] * w[1] + rows[2][i] * w[2] + rows[3][i] * w[3]).collect()
+    }
+
+    /// Node `i` of the row that `narrow` was made for, for the derivative of this order by `u`.
+    pub fn node(&self, narrow: &[DVec3], i: usize, order: usize) -> DVec3 {
+        let rows = &self.along_u[order];
+        let (c, w) = (&narrow[rows.first[i]..rows.first[i] + 4], &rows.weights[i]);
+        c[0] * w[0] + c[1] * w[1] + c[2] * w[2] + c[3] * w[3]
     }
 }

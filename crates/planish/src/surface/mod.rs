@@ -19,7 +19,7 @@ mod stitch;
 
 pub use error::FitError;
 pub use evaluate::Jet;
-pub(crate) use evaluate::each_row;
+pub(crate) use evaluate::RowSampler;
 pub use fit::{FEWEST_CONTROL, fit};
 pub use network_fit::{FitParams, fit_network};
 pub use quality::{Deviation, SeamQuality, deviation, deviation_of, measure_seams};

@@ -5,7 +5,7 @@
 
 use super::basis::{BasisRows, uniform_parameters};
 use super::sides::place;
-use super::{Surface, each_row};
+use super::{RowSampler, Surface};
 use crate::grid::Grid;
 use crate::network::{CurveKind, Network};
 use rayon::prelude::*;
@@ -51,13 +51,18 @@ fn summary(mut distances: Vec<f64>) -> Deviation {
 }
 
 fn distances(surface: &Surface, grid: &Grid) -> Vec<f64> {
-    let along_u = BasisRows::new(&surface.knots_u, &uniform_parameters(grid.cols), 0);
-    let along_v = BasisRows::new(&surface.knots_v, &uniform_parameters(grid.rows), 0);
-    let mut out = Vec::with_capacity(grid.points.len());
-    each_row(surface, &along_u, &along_v, |row| {
-        let nodes = &grid.points[out.len()..];
-        out.extend(row.iter().zip(nodes).map(|(a, b)| a.distance(*b)));
-    });
+    let along_u = [BasisRows::new(&surface.knots_u, &uniform_parameters(grid.cols), 0)];
+    let sampler = RowSampler::new(surface, &along_u);
+    let mut out = vec![0.0; grid.points.len()];
+    let cols = grid.cols.max(1);
+    out.par_chunks_mut(cols).zip(grid.points.par_chunks(cols)).zip(uniform_parameters(grid.rows)).for_each(
+        |((out, nodes), v)| {
+            let narrow = sampler.narrow(v, 0);
+            for (i, (d, p)) in out.iter_mut().zip(nodes).enumerate() {
+                *d = sampler.node(&narrow, i, 0).distance(*p);
+            }
+        },
+    );
     out
 }
 

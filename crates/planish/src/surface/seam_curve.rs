@@ -18,6 +18,9 @@ use glam::DVec3;
 /// Cosine above which the two planes beside a feature count as one: their own line of intersection would be no
 /// direction for the curve any more.
 const ALIKE: f64 = 0.94;
+/// Fewest control points of a curve that is asked to bend as its planes say: each end takes two besides the corner,
+/// and a shorter curve would have nothing left to follow its nodes with.
+const FEWEST_BENT: usize = 6;
 /// Damping of the conditions at the ends, each of diagonal 1: contradicting ones share their miss.
 const DAMPING: f64 = 1e-7;
 /// Conditions depend on the direction that they change a little; the second pass sees to that.
@@ -70,7 +73,7 @@ fn conditions(curve: &[DVec3], planes: &[Vec<Plane>; 2]) -> Vec<Condition> {
             continue;
         }
         planes.iter().for_each(|p| tangency(p.normal));
-        for plane in planes {
+        for plane in planes.iter().filter(|p| p.credible && n >= FEWEST_BENT) {
             list.push(Condition {
                 weights: vec![(index(1), second[1]), (index(2), second[2])],
                 normal: plane.normal,

@@ -20,7 +20,7 @@ pub(crate) fn node(rows: usize, cols: usize, side: usize, i: usize, depth: usize
 
 /// Entries along a side.
 pub(crate) fn side_len(rows: usize, cols: usize, side: usize) -> usize {
-    if side % 2 == 0 { cols } else { rows }
+    if side.is_multiple_of(2) { cols } else { rows }
 }
 
 /// Row `depth` of an array along a side, in the direction of the side's curve.

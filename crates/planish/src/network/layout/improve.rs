@@ -7,6 +7,7 @@
 use super::LayoutError;
 use super::complex::Complex;
 use super::polygon::{self, Sectors, badness, polygon_normal};
+use super::slide;
 use super::recut::{Bench, Change, outline, outline_with_cells};
 use crate::network::CurveKind;
 use crate::observe::Observer;
@@ -57,6 +58,8 @@ fn relax_some(bench: &mut Bench, nodes: &[u32], observer: &dyn Observer) -> Resu
         .filter(|&a| bench.complex.arc(2 * a).nodes.iter().any(|&n| wanted[n as usize]))
         .collect();
     bench.sweep(&arcs, arc_change);
+    cancelled()?;
+    slide::slide(bench);
     Ok(())
 }
 

@@ -2,6 +2,7 @@
 //! straight lines of the map. New arcs can therefore neither cross nor leave the union.
 
 use super::complex::{Arc, Complex, Node};
+use super::slide::Slide;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::CurveKind;
 use crate::network::disk::{Disk, Met};
@@ -115,35 +116,8 @@ impl Embedding {
     /// Draws a change; `None` if it cannot be.
     fn draw(&self, mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex, change: &Change) -> Option<Drawn> {
         let (disk, outline, corners) = self.union(complex, change)?;
-        let points = &self.cut.mesh.points;
-        let at = |v: u32| points[disk.vertices[v as usize] as usize];
-        let n = disk.boundary.len();
-        // Half of the circle shared evenly among the sides, half by their length.
-        let step: Vec<f64> = (0..n).map(|i| at(disk.boundary[i]).distance(at(disk.boundary[(i + 1) % n]))).collect();
-        let total: f64 = step.iter().sum();
-        let mut angles = vec![0.0; n];
-        let mut angle = 0.0;
-        for (k, &from) in corners.iter().enumerate() {
-            let to = corners.get(k + 1).copied().unwrap_or(n);
-            let length: f64 = step[from..to].iter().sum();
-            let share = std::f64::consts::TAU * (0.5 / corners.len() as f64 + 0.5 * length / total);
-            let mut run = 0.0;
-            for i in from..to {
-                let even = (i - from) as f64 / (to - from) as f64;
-                // A little evenness keeps the vertices of tiny steps apart.
-                angles[i] = angle + share * (0.95 * run / length + 0.05 * even);
-                run += step[i];
-            }
-            angle += share;
-        }
-        let uv = disk.circle_map(points, &angles)?;
-        let line = |a: u32, b: u32| -> Option<Vec<Place>> {
-            let met = disk.straight(&uv, a, b)?;
-            let places = met.iter().filter_map(|m| self.on_ground(mesh, adjacency, &disk, m));
-            let name = |v: u32| self.cut.origin[disk.vertices[v as usize] as usize];
-            let chain: Vec<Place> = [name(a)].into_iter().chain(places).chain([name(b)]).collect();
-            Some(tighten(mesh, adjacency, chain))
-        };
+        let uv = disk.circle_map(&self.cut.mesh.points, &self.angles(&disk, &corners))?;
+        let line = |a: u32, b: u32| self.line(mesh, adjacency, &disk, &uv, a, b);
         let corner = |i: usize| disk.boundary[corners[i]];
         let lines = change.lines.iter().map(|&(i, j)| line(corner(i), corner(j))).collect::<Option<Vec<_>>>()?;
         let (mut spokes, mut center) = (Vec::new(), NONE);
@@ -154,6 +128,87 @@ impl Embedding {
             spokes = change.spokes.iter().map(|&i| line(v, corner(i))).collect::<Option<Vec<_>>>()?;
         }
         Some(Drawn { outline, lines, spokes, center })
+    }
+
+    /// Angles of the boundary vertices on the circle; `corners` are positions in the boundary, rising from the
+    /// first by at most one turn.
+    fn angles(&self, disk: &Disk, corners: &[usize]) -> Vec<f64> {
+        let at = |v: u32| self.cut.mesh.points[disk.vertices[v as usize] as usize];
+        let n = disk.boundary.len();
+        // Half of the circle shared evenly among the sides, half by their length.
+        let step: Vec<f64> = (0..n).map(|i| at(disk.boundary[i]).distance(at(disk.boundary[(i + 1) % n]))).collect();
+        let total: f64 = step.iter().sum();
+        let mut angles = vec![0.0; n];
+        let mut angle = 0.0;
+        for (k, &from) in corners.iter().enumerate() {
+            let to = corners.get(k + 1).copied().unwrap_or(corners[0] + n);
+            let length: f64 = (from..to).map(|i| step[i % n]).sum();
+            let share = std::f64::consts::TAU * (0.5 / corners.len() as f64 + 0.5 * length / total);
+            let mut run = 0.0;
+            for i in from..to {
+                let even = (i - from) as f64 / (to - from) as f64;
+                // A little evenness keeps the vertices of tiny steps apart.
+                let part = if length > 0.0 { 0.95 * run / length + 0.05 * even } else { even };
+                angles[i % n] = angle + share * part;
+                run += step[i % n];
+            }
+            angle += share;
+        }
+        angles
+    }
+
+    /// The straight line of the map `uv` between two vertices of the disk, as places of the working mesh.
+    fn line(
+        &self,
+        mesh: &TriMesh,
+        adjacency: &Adjacency,
+        disk: &Disk,
+        uv: &[DVec2],
+        a: u32,
+        b: u32,
+    ) -> Option<Vec<Place>> {
+        let met = disk.straight(uv, a, b)?;
+        let places = met.iter().filter_map(|m| self.on_ground(mesh, adjacency, disk, m));
+        let name = |v: u32| self.cut.origin[disk.vertices[v as usize] as usize];
+        Some(tighten(mesh, adjacency, [name(a)].into_iter().chain(places).chain([name(b)]).collect()))
+    }
+
+    /// Draws a slide: the new chain of each smooth half-arc at the node, from the node.
+    fn draw_slide(
+        &self,
+        mesh: &TriMesh,
+        adjacency: &Adjacency,
+        complex: &Complex,
+        slide: &Slide,
+    ) -> Option<Vec<(u32, Vec<Place>)>> {
+        let mut chains = Vec::new();
+        for (change, ends) in &slide.sides {
+            let (disk, outline, mut corners) = self.union(complex, change)?;
+            let n = disk.boundary.len();
+            let moved = slide.along.iter().find_map(|&h| outline.iter().position(|&g| g == h))?;
+            let k = corners.len();
+            // The new place lies between the corners before and after, cyclically.
+            let (before, after) = (corners[(moved + k - 1) % k], corners[(moved + 1) % k]);
+            let span = (after + n - before - 1) % n + 1;
+            let place = (1..span)
+                .map(|i| before + i)
+                .find(|&i| disk.vertices[disk.boundary[i % n] as usize] == slide.vertex)?;
+            corners[moved] = place % n;
+            let targets: Vec<usize> = ends.iter().map(|&(_, i)| corners[i]).collect();
+            let mut turned = corners.clone();
+            turned.rotate_left(moved);
+            for i in 1..k {
+                while turned[i] < turned[i - 1] {
+                    turned[i] += n;
+                }
+            }
+            let uv = disk.circle_map(&self.cut.mesh.points, &self.angles(&disk, &turned))?;
+            for (&(h, _), &target) in ends.iter().zip(&targets) {
+                let line = self.line(mesh, adjacency, &disk, &uv, disk.boundary[place % n], disk.boundary[target])?;
+                chains.push((h, line));
+            }
+        }
+        Some(chains)
     }
 
     /// Area and area centroid of every cell.
@@ -347,6 +402,45 @@ impl<'a> Bench<'a> {
         }
         let (head, tail) = changes.split_at(changes.len() / 2);
         self.apply(head) + self.apply(tail)
+    }
+
+    /// Makes slides of nodes whose cells are disjoint. Returns how many were made.
+    pub fn apply_slides(&mut self, slides: &[Slide]) -> usize {
+        if slides.is_empty() {
+            return 0;
+        }
+        let drawn: Vec<_> = slides
+            .par_iter()
+            .map(|slide| self.embedding.draw_slide(self.mesh, self.adjacency, &self.complex, slide))
+            .collect();
+        let before = self.complex.clone();
+        let mut made = 0;
+        for (slide, chains) in slides.iter().zip(drawn) {
+            let Some(chains) = chains else { continue };
+            made += 1;
+            self.complex.nodes[slide.node as usize].vertex = slide.vertex;
+            let at = slide.line.iter().position(|&v| v == slide.vertex).expect("a vertex of the line");
+            let places: Vec<Place> = slide.line.iter().map(|&v| Place::Vertex(v)).collect();
+            let back = places[..=at].iter().rev().copied().collect();
+            let ahead = places[at..].to_vec();
+            for (h, mut chain) in chains.into_iter().chain([(slide.along[0], back), (slide.along[1], ahead)]) {
+                if h % 2 == 1 {
+                    chain.reverse();
+                }
+                self.complex.arcs[h as usize / 2].as_mut().expect("a live arc").chain = chain;
+            }
+        }
+        spread(&mut self.complex);
+        if let Some(embedding) = Embedding::new(self.mesh, self.adjacency, &self.complex) {
+            self.embedding = embedding;
+            return made;
+        }
+        self.complex = before;
+        if slides.len() == 1 {
+            return 0;
+        }
+        let (head, tail) = slides.split_at(slides.len() / 2);
+        self.apply_slides(head) + self.apply_slides(tail)
     }
 
     /// Makes `changes` in rounds of disjoint ones, each built by `plan` when its turn comes.

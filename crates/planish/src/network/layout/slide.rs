@@ -1,0 +1,143 @@
+//! Sliding nodes along feature lines and boundaries: the line is fixed, the places where smooth arcs end on it
+//! are not.
+
+use super::complex::Complex;
+use super::recut::{Bench, Change, outline};
+use crate::mesh::TriMesh;
+use crate::network::CurveKind;
+use crate::network::imprint::Place;
+
+/// A node keeps this fraction of the line between its neighbours to either side.
+const KEEP: f64 = 0.15;
+
+/// How much even spacing along the line counts against lying across from the other ends of the smooth arcs.
+const EVEN: f64 = 0.5;
+
+/// A node's move along its line.
+#[derive(Clone, Debug)]
+pub(super) struct Slide {
+    pub node: u32,
+    /// Vertex of the working mesh that it moves to.
+    pub vertex: u32,
+    /// The line through the node, from its neighbour before to its neighbour after, as vertices.
+    pub line: Vec<u32>,
+    /// The half-arcs that leave the node along the line: back and forth.
+    pub along: [u32; 2],
+    /// Each side of the line with smooth arcs: the union of its cells, and the smooth half-arcs with the outline
+    /// position where each ends.
+    pub sides: Vec<(Change, Vec<(u32, usize)>)>,
+}
+
+/// Slides every node that lies inside a line once. Returns how many moved.
+pub(super) fn slide(bench: &mut Bench) -> usize {
+    let mut waiting: Vec<u32> = (0..bench.complex.nodes.len() as u32).collect();
+    let mut made = 0;
+    while !waiting.is_empty() {
+        let mut taken = vec![false; bench.complex.cells.len()];
+        let (mut now, mut later) = (Vec::new(), Vec::new());
+        for &node in &waiting {
+            let star = bench.complex.star(node);
+            if star.iter().any(|&h| {
+                [h, h ^ 1].iter().any(|&g| taken.get(bench.complex.cell(g) as usize).copied().unwrap_or(false))
+            }) {
+                later.push(node);
+                continue;
+            }
+            let Some(slide) = plan(bench.mesh, &bench.complex, &star) else { continue };
+            for &h in &star {
+                for g in [h, h ^ 1] {
+                    if let Some(t) = taken.get_mut(bench.complex.cell(g) as usize) {
+                        *t = true;
+                    }
+                }
+            }
+            now.push(slide);
+        }
+        made += bench.apply_slides(&now);
+        waiting = later;
+    }
+    made
+}
+
+/// Where the node of `star` should go; `None` if it is fixed or well placed.
+fn plan(mesh: &TriMesh, complex: &Complex, star: &[u32]) -> Option<Slide> {
+    let node = complex.from(*star.first()?);
+    if complex.nodes[node as usize].corner {
+        return None;
+    }
+    let fixed: Vec<usize> = (0..star.len()).filter(|&i| complex.arc(star[i]).kind != CurveKind::Smooth).collect();
+    let [x, y] = fixed[..] else { return None };
+    if complex.arc(star[x]).kind != complex.arc(star[y]).kind || star[x] / 2 == star[y] / 2 {
+        return None;
+    }
+    let vertices = |h: u32| -> Option<Vec<u32>> {
+        let chain = complex.arc(h).chain.iter().map(|p| match p {
+            Place::Vertex(v) => Some(*v),
+            _ => None,
+        });
+        let mut list = chain.collect::<Option<Vec<u32>>>()?;
+        if h % 2 == 1 {
+            list.reverse();
+        }
+        Some(list)
+    };
+    let mut line = vertices(star[x])?;
+    line.reverse();
+    let old = line.len() - 1;
+    line.extend_from_slice(&vertices(star[y])?[1..]);
+    let mut along = vec![0.0];
+    for w in line.windows(2) {
+        along.push(along[along.len() - 1] + mesh.points[w[0] as usize].distance(mesh.points[w[1] as usize]));
+    }
+    let total = along[along.len() - 1];
+    // Across from the other ends of the smooth arcs.
+    let (mut sum, mut count) = (0.0, 0.0);
+    for &h in star.iter().filter(|&&h| complex.arc(h).kind == CurveKind::Smooth) {
+        let far = mesh.points[complex.nodes[complex.to(h) as usize].vertex as usize];
+        let near = (0..line.len())
+            .min_by(|&i, &j| {
+                let d = |i: usize| mesh.points[line[i] as usize].distance_squared(far);
+                d(i).total_cmp(&d(j))
+            })
+            .expect("a line has vertices");
+        sum += along[near];
+        count += 1.0;
+    }
+    if count == 0.0 {
+        return None;
+    }
+    let target = EVEN * total / 2.0 + (1.0 - EVEN) * sum / count;
+    let target = target.clamp(KEEP * total, (1.0 - KEEP) * total);
+    let best = (1..line.len() - 1)
+        .min_by(|&i, &j| (along[i] - target).abs().total_cmp(&(along[j] - target).abs()))
+        .filter(|&i| i != old)?;
+    let mut sides = Vec::new();
+    for (from, to) in [(x, y), (y, x)] {
+        let mut halves = Vec::new();
+        let mut i = from;
+        loop {
+            halves.push(star[i]);
+            i = (i + 1) % star.len();
+            if i == to {
+                break;
+            }
+        }
+        if halves.len() < 2 {
+            continue;
+        }
+        let mut cells: Vec<u32> = halves.iter().map(|&h| complex.cell(h)).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        if cells.len() != halves.len() {
+            return None;
+        }
+        let change = Change { cells, removed: halves[1..].iter().map(|h| h / 2).collect(), ..Change::default() };
+        let around = outline(complex, &change)?;
+        let ends = halves[1..]
+            .iter()
+            .map(|&h| Some((h, around.iter().position(|&g| g == complex.following(h))?)))
+            .collect::<Option<Vec<_>>>()?;
+        sides.push((change, ends));
+    }
+    Some(Slide { node, vertex: line[best], line, along: [star[x], star[y]], sides })
+}
