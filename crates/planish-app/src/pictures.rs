@@ -10,11 +10,16 @@ use planish::pipeline;
 use planish::relief;
 use planish::render::{self, Camera, Image, Line, Look, Paint};
 use planish_io::Up;
-use planish_io::report::{Picture, Report, number};
+use planish_io::report::{Picture, Report, Scale, number};
 use rayon::prelude::*;
 
 /// Pixels of a picture: two stand side by side on a page, sharp on screens of twice the usual density.
 const SIZE: (usize, usize) = (960, 720);
+const ASPECT: f64 = SIZE.0 as f64 / SIZE.1 as f64;
+/// Free rim around the shape, as a share of half the picture.
+const RIM: f64 = 0.06;
+/// Steps of the colour scale on the page.
+const SCALE_STEPS: usize = 12;
 /// Iso-curves drawn across a patch in each direction, besides its boundary.
 const ISO_CURVES: usize = 4;
 const CLAY: [u8; 3] = [206, 203, 196];
@@ -24,7 +29,7 @@ const SEAM_COLOR: [u8; 3] = [40, 46, 54];
 const FEATURE_COLOR: [u8; 3] = [192, 38, 38];
 const GROUND: [u8; 3] = [250, 250, 251];
 /// Stripes over the half sphere: enough to show a kink of half a degree, few enough to be told apart.
-const STRIPES: f64 = 14.0;
+const STRIPES: f64 = 9.0;
 
 /// Draws all pictures of a report.
 /// # Errors
@@ -34,7 +39,7 @@ pub fn pictures(model: &Model, report: &Report, up: Up) -> Result<Vec<Picture>, 
         Up::Y => (DVec3::Y, DVec3::new(0.62, 0.42, 1.0)),
         Up::Z => (DVec3::Z, DVec3::new(0.62, -1.0, 0.42)),
     };
-    let camera = Camera::fit(&model.mesh.bounds(), toward, up, SIZE.0 as f64 / SIZE.1 as f64);
+    let camera = close_up(Camera::fit(&model.mesh.bounds(), toward, up, ASPECT), &model.mesh);
     let draw = |mesh: &TriMesh, look: Look| {
         let look = Look { background: Some(GROUND), ..look };
         let image = render::render(mesh, &look, &camera, SIZE.0, SIZE.1).map_err(Failure::fault)?;
@@ -45,7 +50,7 @@ pub fn pictures(model: &Model, report: &Report, up: Up) -> Result<Vec<Picture>, 
     let unit = report.input.units.as_str();
     let mut pictures = Vec::new();
     let mut add = |title: &str, caption: String, png: Vec<u8>| {
-        pictures.push(Picture { title: title.into(), caption, png, wide: false });
+        pictures.push(Picture { title: title.into(), caption, png, scale: None });
     };
 
     let input = draw(&model.mesh, Look { paint: Paint::Plain(CLAY), ..Look::default() })?;
@@ -64,20 +69,50 @@ pub fn pictures(model: &Model, report: &Report, up: Up) -> Result<Vec<Picture>, 
     add("Displaced", caption.into(), draw(&displaced, look)?);
 
     let (values, top) = deviation(&model.mesh, &base);
-    let label = format!("distance, {unit}");
-    let paint = Paint::Field { values: &values, range: [0.0, top], label: &label };
-    let caption = format!(
-        "Distance of the input from the surfaces without displacement: what the maps have to carry. The scale ends at \
-         {} {unit}, which 98 of 100 places keep.",
-        number(top)
-    );
-    add("Deviation", caption, draw(&model.mesh, Look { paint, hollows: 0.0, ..Look::default() })?);
+    let colors: Vec<[u8; 3]> = values.iter().map(|d| render::field_color((d / top).min(1.0))).collect();
+    let caption = "Distance of the input from the surfaces without displacement: what the maps have to carry. 98 of 100 \
+                   places lie within the scale.";
+    let look = Look { paint: Paint::PerVertex(&colors), hollows: 0.0, ..Look::default() };
+    add("Deviation", caption.into(), draw(&model.mesh, look)?);
 
     let paint = Paint::Zebra { stripes: STRIPES };
     let caption = "Reflected stripes on the surfaces. Where the surface bends across a seam a stripe jumps; where only \
                    its curvature changes it has a kink.";
     add("Zebra stripes", caption.into(), draw(&base, Look { paint, hollows: 0.0, ..Look::default() })?);
+    let steps = (0..=SCALE_STEPS).map(|k| render::field_color(k as f64 / SCALE_STEPS as f64));
+    let labels = [0.0, 0.5, 1.0].map(|x| format!("{} {unit}", number(x * top)));
+    if let Some(picture) = pictures.iter_mut().find(|p| p.title == "Deviation") {
+        picture.scale = Some(Scale { colors: steps.collect(), labels: labels.into() });
+    }
     Ok(pictures)
+}
+
+/// `camera` moved so that `mesh` just fills the picture.
+fn close_up(camera: Camera, mesh: &TriMesh) -> Camera {
+    let mut camera = camera;
+    // Moving aside changes the perspective a little: the second round settles it.
+    for _ in 0..3 {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let slopes = [camera.slope * ASPECT, camera.slope].map(|s| s * (1.0 - RIM));
+        let seen = |p: &DVec3| {
+            let q = *p - camera.eye;
+            (q.dot(camera.forward), [q.dot(camera.right) / slopes[0], q.dot(camera.up) / slopes[1]])
+        };
+        // In units of the distance at which a point touches the picture's side: x - depth and x + depth.
+        for (depth, place) in mesh.points.iter().map(seen) {
+            for k in 0..2 {
+                low[k] = low[k].min(place[k] + depth);
+                high[k] = high[k].max(place[k] - depth);
+            }
+        }
+        if !low.iter().chain(&high).all(|x| x.is_finite()) {
+            return camera;
+        }
+        let aside = [0, 1].map(|k| (high[k] + low[k]) / 2.0 * slopes[k]);
+        let nearer = [0, 1].map(|k| (low[k] - high[k]) / 2.0);
+        camera.eye += camera.right * aside[0] + camera.up * aside[1] + camera.forward * nearer[0].min(nearer[1]);
+    }
+    camera
 }
 
 /// The displaced patches side by side, each triangle in the colour of its patch.

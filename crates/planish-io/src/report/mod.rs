@@ -6,7 +6,7 @@
 mod page;
 mod words;
 
-pub use page::{Picture, html};
+pub use page::{Picture, Scale, html};
 pub use words::{count, distance, number, percent};
 
 use planish::pipeline::{Figure, Quality, StageRecord, Warning};

@@ -9,6 +9,8 @@ use std::fmt::Write;
 
 /// Rows of the table of seams; the rest are in `report.json`.
 const SEAMS_SHOWN: usize = 15;
+/// Gaps below this fraction of the diagonal are rounding: the boundary is shared.
+const ROUNDING: f64 = 1e-12;
 const STYLE: &str = include_str!("style.css");
 
 /// A picture of the page.
@@ -19,8 +21,16 @@ pub struct Picture {
     pub caption: String,
     /// The picture as a PNG file.
     pub png: Vec<u8>,
-    /// True if it takes the whole width.
-    pub wide: bool,
+    /// Meaning of its colours, if they have one.
+    pub scale: Option<Scale>,
+}
+
+/// The meaning of a picture's colours.
+pub struct Scale {
+    /// Colours from the least to the greatest value, evenly spaced, sRGB.
+    pub colors: Vec<[u8; 3]>,
+    /// Labels from the least to the greatest value, evenly spaced.
+    pub labels: Vec<String>,
 }
 
 /// Figures of quality in words: key, meaning, and how the value is read.
@@ -116,7 +126,7 @@ fn lead(page: &mut String, report: &Report) {
         text += &format!(" With the displacement maps applied the average is {}.", percent(rms));
     }
     if let (Some(gap), Some(angle)) = (report.figure("seam.gap_max"), report.figure("seam.angle_max_deg")) {
-        let closed = if gap == 0.0 {
+        let closed = if gap <= ROUNDING * report.input.diagonal {
             "Neighbours share their boundaries exactly".to_owned()
         } else {
             format!("Neighbours meet within {} {}", number(gap), report.input.units)
@@ -147,10 +157,10 @@ fn tiles(page: &mut String, report: &Report) {
         }
     }
     if let Some(angle) = report.figure("seam.angle_max_deg") {
-        let gap = report.figure("seam.gap_max").unwrap_or(0.0);
+        let gap = gap_of(report, report.figure("seam.gap_max").unwrap_or(0.0));
         row.push((number(angle), "°", "Seam angle, worst", format!("gap {} {unit}", number(gap))));
     }
-    if let Some(folds) = report.figure("grid.folds") {
+    if let Some(folds) = report.figure("grid.folds").filter(|n| *n > 0.0) {
         row.push((count(folds as u64), "", "Folded grid cells", String::new()));
     }
     if !report.stages.is_empty() {
@@ -199,13 +209,21 @@ fn gallery(page: &mut String, pictures: &[Picture]) {
     for picture in pictures {
         let _ = write!(
             page,
-            "<figure{}><img alt=\"{}\" src=\"data:image/png;base64,{}\">\n<figcaption><b>{}</b><span>{}</span>",
-            if picture.wide { " class=\"wide\"" } else { "" },
+            "<figure><img alt=\"{}\" src=\"data:image/png;base64,{}\">\n<figcaption><b>{}</b><span>{}</span>",
             escape(&picture.title),
             STANDARD.encode(&picture.png),
             escape(&picture.title),
             escape(&picture.caption)
         );
+        if let Some(scale) = &picture.scale {
+            let stops: Vec<String> = scale.colors.iter().map(|c| format!("rgb({},{},{})", c[0], c[1], c[2])).collect();
+            let labels: String = scale.labels.iter().map(|l| format!("<span>{}</span>", escape(l))).collect();
+            let _ = write!(
+                page,
+                "<div class=\"scale\"><div style=\"background:linear-gradient(90deg,{})\"></div><p>{labels}</p></div>",
+                stops.join(",")
+            );
+        }
         page.push_str("</figcaption></figure>\n");
     }
     page.push_str("</div>\n");
@@ -245,13 +263,18 @@ fn seams(page: &mut String, report: &Report) {
             seam.patches[1],
             number(seam.angle_max_deg),
             number(seam.angle_rms_deg),
-            number(seam.gap_max),
+            number(gap_of(report, seam.gap_max)),
             escape(&report.input.units),
             number(seam.length),
             escape(&report.input.units)
         );
     }
     page.push_str("</tbody></table></div>\n");
+}
+
+/// A gap without what is rounding.
+fn gap_of(report: &Report, gap: f64) -> f64 {
+    if gap <= ROUNDING * report.input.diagonal { 0.0 } else { gap }
 }
 
 fn figures(page: &mut String, report: &Report) {
@@ -368,9 +391,9 @@ mod tests {
             title: "Deviation".into(),
             caption: "Blue is close.".into(),
             png: vec![1, 2, 3],
-            wide: true,
+            scale: Some(Scale { colors: vec![[0, 0, 255], [255, 0, 0]], labels: vec!["0".into(), "1 mm".into()] }),
         };
         let page = html(&report(), &[picture]);
-        assert!(page.contains("data:image/png;base64,AQID") && page.contains("class=\"wide\""));
+        assert!(page.contains("data:image/png;base64,AQID") && page.contains("rgb(0,0,255),rgb(255,0,0)"));
     }
 }
