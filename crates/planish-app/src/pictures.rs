@@ -37,7 +37,7 @@ const STRIPES: f64 = 9.0;
 pub fn pictures(model: &Model, report: &Report, up: Up) -> Result<Vec<Picture>, Failure> {
     let (up, toward) = match up {
         Up::Y => (DVec3::Y, DVec3::new(0.62, 0.42, 1.0)),
-        Up::Z => (DVec3::Z, DVec3::new(0.62, -1.0, 0.42)),
+        Up::Z => (DVec3::Z, DVec3::new(-0.85, -0.75, 0.6)),
     };
     let camera = close_up(Camera::fit(&model.mesh.bounds(), toward, up, ASPECT), &model.mesh);
     let draw = |mesh: &TriMesh, look: Look| {

@@ -160,9 +160,6 @@ fn tiles(page: &mut String, report: &Report) {
         let gap = gap_of(report, report.figure("seam.gap_max").unwrap_or(0.0));
         row.push((number(angle), "°", "Seam angle, worst", format!("gap {} {unit}", number(gap))));
     }
-    if let Some(folds) = report.figure("grid.folds").filter(|n| *n > 0.0) {
-        row.push((count(folds as u64), "", "Folded grid cells", String::new()));
-    }
     if !report.stages.is_empty() {
         row.push((number(seconds), "s", "Computing time", format!("{} stages", report.stages.len())));
     }
