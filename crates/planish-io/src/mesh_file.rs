@@ -153,7 +153,7 @@ pub fn write_mesh(path: impl AsRef<Path>, mesh: &TriMesh, options: &WriteOptions
     let single = matches!(format, MeshFormat::Stl | MeshFormat::Glb);
     let most = if single { f32::MAX as f64 } else { f64::MAX };
     for (v, p) in mesh.points.iter().enumerate() {
-        if let Some(x) = p.to_array().into_iter().find(|x| !(x.abs() <= most)) {
+        if let Some(x) = p.to_array().into_iter().find(|x| x.is_nan() || x.abs() > most) {
             return Err(WriteError::Value {
                 value: format!("coordinate {x}"),
                 place: Place::Vertex(v),

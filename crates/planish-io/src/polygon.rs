@@ -87,8 +87,7 @@ impl Polygons {
 pub(crate) fn checked(mesh: TriMesh, faces: usize) -> Result<TriMesh, ReadError> {
     for (v, p) in mesh.points.iter().enumerate() {
         for value in p.to_array() {
-            // Written so that NaN fails too.
-            if !(value.abs() <= LARGEST_COORDINATE) {
+            if value.is_nan() || value.abs() > LARGEST_COORDINATE {
                 return Err(ReadError::Coordinate { value, place: Place::Vertex(v) });
             }
         }

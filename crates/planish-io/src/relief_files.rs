@@ -190,7 +190,7 @@ fn read_image(path: &Path, entry: &Entry) -> Result<Relief, ReadError> {
     let image = image.from_buffered(std::io::Cursor::new(&bytes)).map_err(|e| damaged(e.to_string()))?;
     let channel = |name: &str| {
         let list = &image.layer_data.channel_data.list;
-        match list.iter().find(|c| c.name == Text::from(name)).map(|c| &c.sample_data) {
+        match list.iter().find(|c| c.name == *name).map(|c| &c.sample_data) {
             Some(FlatSamples::F32(samples)) if samples.len() as u64 == pixels => Ok(samples),
             _ => Err(damaged(format!("it has no 32-bit float channel {name}"))),
         }

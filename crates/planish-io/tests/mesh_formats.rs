@@ -1,5 +1,7 @@
 //! PLY, OBJ, STL and glTF: what is written is read back, and what other programs write is read rightly.
 
+#![allow(clippy::print_stdout)] // figures and skipped tests are told to who runs them
+
 mod common;
 
 use common::{coloured_cube, cube, data, file, folder, volume6};
@@ -302,5 +304,40 @@ fn real_meshes_have_the_counts_that_their_list_says() {
         let mesh = read_mesh(data.join(name)).unwrap();
         println!("{name}: {:.3} s", start.elapsed().as_secs_f64());
         assert_eq!((mesh.points.len(), mesh.triangles.len()), (vertices, triangles), "{name}");
+        let folder = folder();
+        for format in ["ply", "obj", "stl", "glb"] {
+            let path = folder.path().join(format!("a.{format}"));
+            let start = std::time::Instant::now();
+            write_mesh(&path, &mesh, &WriteOptions { units: Units::M, ..Default::default() }).unwrap();
+            let wrote = start.elapsed().as_secs_f64();
+            let start = std::time::Instant::now();
+            let back = read_mesh(&path).unwrap();
+            println!("{name} as {format}: write {wrote:.3} s, read {:.3} s", start.elapsed().as_secs_f64());
+            match format {
+                "ply" => assert!(back == mesh),
+                "obj" => assert!(back.points == mesh.points && back.triangles == mesh.triangles),
+                // Welded: vertices at one place become one, triangles that collapse by it go.
+                _ => assert!(back.points.len() <= vertices && back.triangles.len() > triangles * 99 / 100),
+            }
+            let scale = mesh.bounds().diagonal();
+            assert!((back.bounds().diagonal() - scale).abs() < 1e-6 * scale);
+        }
     }
+}
+
+/// Set `PLANISH_PYTHON` to a Python that has trimesh to run this one.
+#[test]
+fn trimesh_reads_our_glb_as_a_watertight_cube_of_volume_1e_9_cubic_metres() {
+    let Some(python) = std::env::var_os("PLANISH_PYTHON") else {
+        println!("skipped: PLANISH_PYTHON is not set");
+        return;
+    };
+    let folder = folder();
+    let path = folder.path().join("a.glb");
+    write_mesh(&path, &coloured_cube(), &WriteOptions::default()).unwrap();
+    let script = "import trimesh,sys\nm=trimesh.load(sys.argv[1],process=False).to_geometry()\n\
+                  print(len(m.vertices),len(m.faces),m.is_watertight,'%.6e'%m.volume,m.visual.kind)";
+    let output = std::process::Command::new(python).args(["-c", script]).arg(&path).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(text.trim(), "8 12 True 1.000000e-09 vertex", "{}", String::from_utf8_lossy(&output.stderr));
 }

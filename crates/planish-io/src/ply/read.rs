@@ -251,7 +251,7 @@ fn faces(
     let mut list = Vec::new();
     for f in polygons.count() - first..element.count as usize {
         one(element, indices, body, total, &mut list)?;
-        let unknown = |v: i64| !(0..u32::MAX as i64).contains(&v) && !(strips && v == -1);
+        let unknown = |v: i64| !((0..u32::MAX as i64).contains(&v) || strips && v == -1);
         if let Some(&index) = list.iter().find(|&&v| unknown(v)) {
             return Err(ReadError::Index { index, vertices, place: Place::Face(f) });
         }

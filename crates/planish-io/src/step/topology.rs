@@ -21,7 +21,7 @@ pub(super) struct Topology {
 /// Patches joined by curves.
 pub(super) struct Component {
     pub patches: Vec<usize>,
-    /// True if every curve has two sides.
+    /// True if every curve has two sides or is a point.
     pub closed: bool,
 }
 
@@ -39,7 +39,7 @@ impl Row {
     fn of(surface: &Surface, k: usize) -> Row {
         let (rows, cols) = (surface.rows, surface.cols);
         let at = |i: usize, j: usize| surface.control[j * cols + i];
-        let along_u = k % 2 == 0;
+        let along_u = k.is_multiple_of(2);
         let control = match k {
             0 => (0..cols).map(|i| at(i, 0)).collect(),
             1 => (0..rows).map(|j| at(cols - 1, j)).collect(),
@@ -121,7 +121,8 @@ impl Topology {
                 row
             }));
         }
-        topology.components = components(network);
+        let collapsed: Vec<bool> = topology.curves.iter().map(|c| c.as_ref().is_some_and(|c| c.collapsed)).collect();
+        topology.components = components(network, &collapsed);
         Ok(topology)
     }
 }
@@ -165,7 +166,8 @@ fn check(network: &Network, surfaces: &[Surface]) -> Result<(), WriteError> {
     Ok(())
 }
 
-fn components(network: &Network) -> Vec<Component> {
+/// * `collapsed` - the curves that are a point: they close with one side
+fn components(network: &Network, collapsed: &[bool]) -> Vec<Component> {
     let uses = network.uses();
     let mut number = vec![usize::MAX; network.patches.len()];
     let mut components = Vec::new();
@@ -180,7 +182,7 @@ fn components(network: &Network) -> Vec<Component> {
             patches.push(p);
             for side in &network.patches[p].sides {
                 let uses = &uses[side.curve as usize];
-                closed &= uses.len() == 2;
+                closed &= uses.len() == 2 || collapsed[side.curve as usize];
                 for &(q, _) in uses {
                     if number[q as usize] == usize::MAX {
                         number[q as usize] = components.len();

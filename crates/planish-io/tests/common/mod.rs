@@ -70,8 +70,8 @@ pub fn surface(cols: usize, rows: usize, at: impl Fn(usize, usize) -> DVec3) -> 
 
 /// A network of patches over corners, each given by its four corners counter-clockwise; a curve for each pair.
 pub fn network(corners: usize, patches: &[[u32; 4]]) -> Network {
-    let mut network = Network::default();
-    network.corners = vec![Corner { place: FacePoint::corner(0, 0) }; corners];
+    let corners = vec![Corner { place: FacePoint::corner(0, 0) }; corners];
+    let mut network = Network { corners, ..Default::default() };
     for ring in patches {
         let sides = [0, 1, 2, 3].map(|k| {
             let (a, b) = (ring[k], ring[(k + 1) % 4]);
@@ -168,6 +168,22 @@ pub fn ring() -> (Network, Vec<Surface>) {
         DVec3::new(r * angle(i).cos(), r * angle(i).sin(), angle(j).sin())
     };
     (network, vec![surface(n, n, at)])
+}
+
+/// A globe of one patch: both its long sides are one curve, its short ones are the poles.
+pub fn globe() -> (Network, Vec<Surface>) {
+    let n = 13;
+    let mut network = network(2, &[]);
+    network.curves = vec![curve(0, 0), curve(0, 1), curve(1, 1)];
+    let side = |curve: u32, reversed: bool| Side { curve, reversed };
+    network.patches = vec![Patch { sides: [side(0, false), side(1, false), side(2, true), side(1, true)] }];
+    let at = |i: usize, j: usize| {
+        let phi = std::f64::consts::TAU * (i % (n - 1)) as f64 / (n - 1) as f64;
+        let theta = std::f64::consts::PI * (j as f64 / 8.0 - 0.5);
+        let r = if j == 0 || j == 8 { 0.0 } else { theta.cos() };
+        DVec3::new(r * phi.cos(), r * phi.sin(), theta.sin())
+    };
+    (network, vec![surface(n, 9, at)])
 }
 
 /// Two models as one.

@@ -7,13 +7,12 @@ use super::Fault;
 use super::net::Net;
 use glam::DVec2;
 
-/// Rounds over lines and columns, and the part of the way that a round goes.
-const ROUNDS: usize = 12;
+/// Part of the way that a round goes.
 const SHARE: f64 = 0.6;
 
-/// Evens the spacing of `net`.
-pub fn even<'a>(mut net: Net<'a>, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<Net<'a>, Fault> {
-    for round in 0..2 * ROUNDS {
+/// Evens the spacing of `net` in `rounds` rounds over lines and columns.
+pub fn even<'a>(mut net: Net<'a>, rounds: usize, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<Net<'a>, Fault> {
+    for round in 0..2 * rounds {
         if cancelled() {
             return Err(Fault::Cancelled);
         }
@@ -24,13 +23,22 @@ pub fn even<'a>(mut net: Net<'a>, cancelled: &(dyn Fn() -> bool + Sync)) -> Resu
             let node = |k: usize| if along_u { curve * net.cols + k } else { k * net.cols + curve };
             even_curve(&net, count, &node, &mut target);
         }
-        net = net.moved(&|k, fraction| net.chart.locate(net.uv[k].lerp(target[k], fraction), net.spots[k].triangle));
+        net = net
+            .moved(false, &|k, fraction| net.chart.locate(net.uv[k].lerp(target[k], fraction), net.spots[k].triangle));
     }
     Ok(net)
 }
 
-fn even_curve(net: &Net, count: usize, node: &dyn Fn(usize) -> usize, target: &mut [DVec2]) {
-    // Arc length and place in the square at every edge of the chart that the curve crosses.
+/// A curve of a net, measured on the surface.
+struct Measured {
+    /// Arc length and place in the square at every edge of the chart that the curve crosses and at every node.
+    arc: Vec<f64>,
+    places: Vec<DVec2>,
+    /// Arc length at the nodes.
+    at_node: Vec<f64>,
+}
+
+fn measured(net: &Net, count: usize, node: &dyn Fn(usize) -> usize) -> Measured {
     let mut arc = vec![0.0];
     let mut places = vec![net.uv[node(0)]];
     let mut at_node = vec![0.0];
@@ -50,6 +58,26 @@ fn even_curve(net: &Net, count: usize, node: &dyn Fn(usize) -> usize, target: &m
         places.push(q);
         at_node.push(sum);
     }
+    Measured { arc, places, at_node }
+}
+
+/// Mean square deviation of the spacing along the curves of `net`, measured on the surface, from even.
+pub fn unevenness(net: &Net) -> f64 {
+    let mut sum = 0.0;
+    for (curves, count, along_u) in [(net.rows, net.cols, true), (net.cols, net.rows, false)] {
+        for curve in 1..curves - 1 {
+            let node = |k: usize| if along_u { curve * net.cols + k } else { k * net.cols + curve };
+            let at_node = measured(net, count, &node).at_node;
+            let mean = at_node[count - 1] / (count - 1) as f64;
+            let square: f64 = at_node.windows(2).map(|w| ((w[1] - w[0]) / mean - 1.0).powi(2)).sum();
+            sum += square / (count - 1) as f64;
+        }
+    }
+    sum / ((net.rows + net.cols).saturating_sub(4)).max(1) as f64
+}
+
+fn even_curve(net: &Net, count: usize, node: &dyn Fn(usize) -> usize, target: &mut [DVec2]) {
+    let Measured { arc, places, at_node } = measured(net, count, node);
     let total = arc[arc.len() - 1];
     for k in 1..count - 1 {
         let goal = total * k as f64 / (count - 1) as f64;

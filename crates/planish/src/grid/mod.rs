@@ -12,6 +12,7 @@
 
 mod chart;
 mod even;
+mod fold;
 mod locate;
 mod net;
 mod quality;

@@ -8,6 +8,7 @@ use glam::{DVec2, DVec3};
 const HALVINGS: usize = 4;
 
 /// `cols x rows` points of a chart, row-major; the rim is fixed.
+#[derive(Clone)]
 pub struct Net<'a> {
     pub chart: &'a Chart,
     pub cols: usize,
@@ -84,27 +85,33 @@ impl<'a> Net<'a> {
     }
 
     /// Moves every inner point by `by(k, fraction)` (fraction 1 first), halving the moves around cells that would
-    /// turn over in the square until none does. Returns the moved net.
-    pub fn moved(&self, by: &(dyn Fn(usize, f64) -> Spot + Sync)) -> Net<'a> {
+    /// turn over in the square (or, if `untwisted`, get twisted on the surface) until none does. Returns the moved net.
+    pub fn moved(&self, untwisted: bool, by: &(dyn Fn(usize, f64) -> Spot + Sync)) -> Net<'a> {
         let count = self.cols * self.rows;
         let mut spots = self.spots.clone();
         let mut uv = self.uv.clone();
         let mut halved = vec![0usize; count];
-        let place = |k: usize, halvings: usize, spots: &mut Vec<Spot>, uv: &mut Vec<DVec2>| {
+        let mut points = self.points.clone();
+        let place = |k: usize, halvings: usize, spots: &mut [Spot], uv: &mut [DVec2], points: &mut [DVec3]| {
             if halvings > HALVINGS {
-                (spots[k], uv[k]) = (self.spots[k], self.uv[k]);
+                (spots[k], uv[k], points[k]) = (self.spots[k], self.uv[k], self.points[k]);
             } else {
                 spots[k] = by(k, 0.5f64.powi(halvings as i32));
                 uv[k] = self.chart.uv_of(spots[k]);
+                points[k] = self.chart.position(spots[k]);
             }
         };
         for k in (0..count).filter(|&k| self.is_inner(k)) {
-            place(k, 0, &mut spots, &mut uv);
+            place(k, 0, &mut spots, &mut uv, &mut points);
         }
         let cells = (self.cols - 1) * (self.rows - 1);
+        let turned = |c: usize, uv: &[DVec2], points: &[DVec3]| {
+            turns_over(uv, self.cols, c)
+                || (untwisted && is_twisted(points, self.cols, c) && !is_twisted(&self.points, self.cols, c))
+        };
         let mut suspects: Vec<usize> = (0..cells).collect();
         loop {
-            let bad: Vec<usize> = suspects.into_iter().filter(|&c| turns_over(&uv, self.cols, c)).collect();
+            let bad: Vec<usize> = suspects.into_iter().filter(|&c| turned(c, &uv, &points)).collect();
             if bad.is_empty() {
                 break;
             }
@@ -117,7 +124,7 @@ impl<'a> Net<'a> {
                 if self.is_inner(k) && halved[k] <= HALVINGS {
                     any = true;
                     halved[k] += 1;
-                    place(k, halved[k], &mut spots, &mut uv);
+                    place(k, halved[k], &mut spots, &mut uv, &mut points);
                 }
                 let (i, j) = (k % self.cols, k / self.cols);
                 for y in j.saturating_sub(1)..(j + 1).min(self.rows - 1) {
@@ -133,7 +140,6 @@ impl<'a> Net<'a> {
             suspects.sort_unstable();
             suspects.dedup();
         }
-        let points = spots.iter().map(|&s| self.chart.position(s)).collect();
         Net { chart: self.chart, cols: self.cols, rows: self.rows, uv, spots, points }
     }
 }
@@ -148,6 +154,13 @@ pub fn cell_corners(cols: usize, c: usize) -> [usize; 4] {
 pub fn turns_over(uv: &[DVec2], cols: usize, c: usize) -> bool {
     let q = cell_corners(cols, c).map(|k| uv[k]);
     (0..4).any(|k| orientation(q[k], q[(k + 1) % 4], q[(k + 2) % 4]) <= 0.0)
+}
+
+/// True if one of the four corner triangles of a cell points against the cell's own area vector.
+fn is_twisted(points: &[DVec3], cols: usize, c: usize) -> bool {
+    let q = cell_corners(cols, c).map(|k| points[k]);
+    let normal = (q[2] - q[0]).cross(q[3] - q[1]);
+    (0..4).any(|k| (q[(k + 1) % 4] - q[k]).cross(q[(k + 3) % 4] - q[k]).dot(normal) <= 0.0)
 }
 
 /// Draws the corners of turned cells towards the mean of their neighbours, in the square.

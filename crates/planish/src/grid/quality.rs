@@ -1,6 +1,7 @@
 //! How good a grid is.
 
 use super::Grid;
+use super::fold::folded_cells;
 use crate::geom::{Aabb, Bvh};
 use crate::mesh::TriMesh;
 use crate::network::PatchMesh;
@@ -29,11 +30,11 @@ pub struct GridQuality {
 
 /// Measures `grid` against its `patch`.
 ///
-/// The grid's surface has two triangles per cell, divided along the shorter diagonal. A cell counts as a fold if any
-/// of its four corner triangles points against the mean normal of its neighbourhood, the sum of the area vectors of
-/// the cells up to [`FOLD_REACH`] away: rough relief tilts single cells, but only a fold turns one right over. (That
-/// the grid is one-to-one on the patch is a matter of construction: `relax` checks the orientation of every cell in
-/// the chart exactly.)
+/// The grid's surface has two triangles per cell, divided along the shorter diagonal. A cell counts as a fold if one
+/// of its corner triangles points against the mean normal of the cells up to two away (but not the one at a corner
+/// of the patch, whose angle is given): rough relief tilts single cells, only a fold turns a corner right over. That
+/// the grid is one-to-one on the patch is a matter of construction: every cell is convex in the chart, by exact
+/// predicates.
 pub fn measure(grid: &Grid, patch: &PatchMesh) -> GridQuality {
     let (rows, cols) = (grid.rows, grid.cols);
     let at = |i: usize, j: usize| grid.points[j * cols + i];
@@ -54,7 +55,7 @@ pub fn measure(grid: &Grid, patch: &PatchMesh) -> GridQuality {
     angles.sort_by(f64::total_cmp);
     let (miss_max, miss_rms) = miss(grid, patch);
     GridQuality {
-        folds: folds(grid),
+        folds: folded_cells(&grid.points, cols, rows).len(),
         spacing_cv: variations.iter().sum::<f64>() / variations.len() as f64,
         spacing_cv_worst: variations.iter().copied().fold(0.0, f64::max),
         angle_p95_deg: angles[(angles.len() * 95 / 100).min(angles.len() - 1)],
@@ -64,38 +65,9 @@ pub fn measure(grid: &Grid, patch: &PatchMesh) -> GridQuality {
     }
 }
 
-/// Cells to each side that make up the neighbourhood of the fold test.
-pub const FOLD_REACH: usize = 2;
-
 /// Twice the area vector of a cell.
 fn cell_vector([a, b, c, d]: [DVec3; 4]) -> DVec3 {
     (c - a).cross(d - b)
-}
-
-fn folds(grid: &Grid) -> usize {
-    let (m, n) = (grid.cols - 1, grid.rows - 1);
-    let corners = |i: usize, j: usize| {
-        let k = j * grid.cols + i;
-        [k, k + 1, k + 1 + grid.cols, k + grid.cols].map(|k| grid.points[k])
-    };
-    let mut count = 0;
-    for j in 0..n {
-        for i in 0..m {
-            let mut normal = DVec3::ZERO;
-            for y in j.saturating_sub(FOLD_REACH)..(j + FOLD_REACH + 1).min(n) {
-                for x in i.saturating_sub(FOLD_REACH)..(i + FOLD_REACH + 1).min(m) {
-                    normal += cell_vector(corners(x, y));
-                }
-            }
-            let q = corners(i, j);
-            let turned = |k: usize| {
-                let (p, a, b) = (q[k], q[(k + 1) % 4], q[(k + 3) % 4]);
-                (a - p).cross(b - p).dot(normal) < 0.0
-            };
-            count += (0..4).any(turned) as usize;
-        }
-    }
-    count
 }
 
 /// Standard deviation over mean.

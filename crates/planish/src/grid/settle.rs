@@ -17,14 +17,16 @@ const GENTLE_SHARE: f64 = 0.08;
 const MEANT_ANGLE: f64 = std::f64::consts::FRAC_PI_4;
 /// Cells along the longer side for which the weight of bends is meant.
 const MEANT_CELLS: f64 = 32.0;
-/// Damping of the moves, in cells.
+/// Least damping of the moves, in cells.
 const DAMPING: f64 = 0.003;
 /// Largest move of a round, in cells.
 const LARGEST_MOVE: f64 = 0.5;
 /// Steps of conjugate gradients in a round.
 const CG_STEPS: usize = 24;
-/// Halvings of a round that raises the energy.
-const BACKTRACKS: usize = 4;
+/// Solves of a round, and the factor by which the damping grows from one to the next if the energy rises (as of
+/// Levenberg and Marquardt).
+const ATTEMPTS: usize = 4;
+const DAMPING_STEP: f64 = 10.0;
 /// A round that lowers the energy by less than this fraction ends the resolution.
 const SETTLED: f64 = 1e-3;
 
@@ -36,14 +38,14 @@ pub fn settle<'a>(
     cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Net<'a>, Fault> {
     let mut energy = energy_of(&net, params);
+    let mut damping = DAMPING;
     for _ in 0..rounds {
         let system = System::new(&net, params);
-        let Some(moves) = system.solve(cancelled) else { return Err(Fault::Cancelled) };
-        let mut scale = 1.0;
         let before = energy;
-        for _ in 0..BACKTRACKS {
-            let trial = net.moved(&|k, fraction| {
-                let m = moves[k].clamp_length_max(LARGEST_MOVE) * (scale * fraction);
+        for attempt in 0..ATTEMPTS {
+            let Some(moves) = system.solve(damping, cancelled) else { return Err(Fault::Cancelled) };
+            let trial = net.moved(true, &|k, fraction| {
+                let m = moves[k].clamp_length_max(LARGEST_MOVE) * fraction;
                 let [u, v] = system.tangents[k];
                 net.chart.advance(net.spots[k], u * m.x + v * m.y)
             });
@@ -51,12 +53,12 @@ pub fn settle<'a>(
             if reached < energy {
                 net = trial;
                 energy = reached;
+                if attempt == 0 {
+                    damping = (damping / DAMPING_STEP).max(DAMPING);
+                }
                 break;
             }
-            scale *= 0.5;
-        }
-        if cancelled() {
-            return Err(Fault::Cancelled);
+            damping *= DAMPING_STEP;
         }
         if energy >= before * (1.0 - SETTLED) {
             break;
@@ -261,12 +263,12 @@ impl System {
     }
 
     /// Moves that lower the linearised energy: conjugate gradients, preconditioned by the 2 x 2 blocks.
-    fn solve(&self, cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Vec<DVec2>> {
+    fn solve(&self, damping: f64, cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Vec<DVec2>> {
         let count = self.cols * self.rows;
         let mut edge: Vec<f64> = self.edges.iter().map(|e| e.1).collect();
         let mut cell: Vec<f64> = self.cells.iter().map(|c| c.1).collect();
         let mut bend: Vec<f64> = self.bends.iter().map(|b| b.3).collect();
-        let mut blocks = vec![[DAMPING, 0.0, DAMPING]; count];
+        let mut blocks = vec![[damping, 0.0, damping]; count];
         let add = |block: &mut [f64; 3], g: DVec2| {
             block[0] += g.x * g.x;
             block[1] += g.x * g.y;
@@ -313,7 +315,7 @@ impl System {
             }
             self.apply(&p, &mut edge, &mut cell, &mut bend);
             self.transpose(&edge, &cell, &bend, &mut q);
-            q.iter_mut().zip(&p).for_each(|(q, p)| *q += DAMPING * *p);
+            q.iter_mut().zip(&p).for_each(|(q, p)| *q += damping * *p);
             let alpha = rz / dot(&p, &q);
             for k in 0..count {
                 x[k] += alpha * p[k];

@@ -3,7 +3,6 @@
 //! Half-edge `h = 3 t + k` runs from corner `k` to corner `k + 1` of triangle `t`.
 
 use super::TriMesh;
-use rayon::prelude::*;
 
 /// "No half-edge": the other side of a boundary edge.
 pub const NONE: u32 = u32::MAX;
@@ -27,25 +26,38 @@ impl Adjacency {
 
     /// Adjacency of bare triangles over `vertex_count` vertices.
     pub fn of(triangles: &[[u32; 3]], vertex_count: usize) -> Adjacency {
-        let mut keyed: Vec<(u64, u32)> = triangles
-            .par_iter()
-            .enumerate()
-            .flat_map_iter(|(t, tri)| {
-                (0..3).map(move |k| {
-                    let (a, b) = (tri[k], tri[(k + 1) % 3]);
-                    (((a.min(b) as u64) << 32) | a.max(b) as u64, (3 * t + k) as u32)
-                })
-            })
-            .collect();
-        keyed.par_sort_unstable();
         let from = |h: u32| triangles[h as usize / 3][h as usize % 3];
-        let mut opposite = vec![NONE; 3 * triangles.len()];
-        for run in keyed.chunk_by(|x, y| x.0 == y.0) {
-            if let [(_, g), (_, h)] = *run
-                && from(g) != from(h)
-            {
-                opposite[g as usize] = h;
-                opposite[h as usize] = g;
+        let ends = |h: u32| {
+            let (a, b) = (from(h), from(next(h)));
+            (a.min(b), a.max(b))
+        };
+        // Half-edges in buckets by their lower vertex: a counting sort, then a look at a handful each.
+        let count = 3 * triangles.len() as u32;
+        let mut start = vec![0u32; vertex_count + 1];
+        for h in 0..count {
+            start[ends(h).0 as usize + 1] += 1;
+        }
+        for v in 0..vertex_count {
+            start[v + 1] += start[v];
+        }
+        let mut bucket = vec![(0u32, 0u32); count as usize];
+        let mut fill = start.clone();
+        for h in 0..count {
+            let (low, high) = ends(h);
+            bucket[fill[low as usize] as usize] = (high, h);
+            fill[low as usize] += 1;
+        }
+        let mut opposite = vec![NONE; count as usize];
+        for v in 0..vertex_count {
+            let edges = &mut bucket[start[v] as usize..start[v + 1] as usize];
+            edges.sort_unstable();
+            for run in edges.chunk_by(|x, y| x.0 == y.0) {
+                if let [(_, g), (_, h)] = *run
+                    && from(g) != from(h)
+                {
+                    opposite[g as usize] = h;
+                    opposite[h as usize] = g;
+                }
             }
         }
         let mut outgoing = vec![NONE; vertex_count];

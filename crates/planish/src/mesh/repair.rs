@@ -375,6 +375,8 @@ fn gather(mesh: &TriMesh, triangles: &[[u32; 3]], source: &[u32]) -> TriMesh {
         attributes: mesh
             .attributes
             .iter()
+            // One that does not match the vertices belongs to no vertex.
+            .filter(|a| a.values.len() == a.width * mesh.points.len())
             .map(|a| super::Attribute {
                 name: a.name.clone(),
                 width: a.width,

@@ -1,0 +1,179 @@
+//! The project file: everything comes back, and what is damaged, newer or something else is refused.
+
+#![allow(clippy::print_stdout)] // figures and skipped tests are told to who runs them
+
+mod common;
+
+use common::{coloured_cube, file, folder, torus};
+use planish::grid::Grid;
+use planish::mesh::FacePoint;
+use planish::relief::Relief;
+use planish::{DVec3, HistoryEntry, Model, Units};
+use planish_io::{ExportKind, ProjectError, export, export_kind, read_mesh, read_model, write_model};
+use proptest::prelude::*;
+
+/// A torus of 16 patches with grids and reliefs of `n x n` points.
+fn model(n: usize) -> Model {
+    let (network, surfaces) = torus(6);
+    let place = |k: usize| FacePoint { face: (k % 12) as u32, bary: [0.5, 0.25 + k as f64 * 1e-9, 0.25] };
+    let point = |p: usize, k: usize| {
+        let t = (p * n * n + k) as f64;
+        DVec3::new((t * 0.01).sin(), (t * 0.013).cos(), t * 1e-6)
+    };
+    let count = n * n;
+    let grids = (0..16).map(|p| Grid {
+        rows: n,
+        cols: n,
+        points: (0..count).map(|k| point(p, k)).collect(),
+        places: (0..count).map(place).collect(),
+    });
+    let reliefs =
+        (0..16).map(|p| Relief { rows: n, cols: n, vectors: (0..count).map(|k| point(p, k) * 0.01).collect() });
+    let entry = |command: &str| HistoryEntry { command: command.into(), parameters: "{\"tolerance\":0.1}".into() };
+    Model {
+        mesh: coloured_cube(),
+        grids: grids.collect(),
+        reliefs: reliefs.collect(),
+        surfaces,
+        network,
+        units: Units::In,
+        params: "{\"layout\":{\"patches\":16}}".into(),
+        history: vec![entry("layout"), entry("fit"), entry("move_corner")],
+    }
+}
+
+#[test]
+fn model_comes_back_bit_for_bit_from_a_single_file_and_twice_the_same_bytes() {
+    let folder = folder();
+    let path = folder.path().join("a.planish");
+    let model = model(9);
+    write_model(&path, &model).unwrap();
+    assert_eq!(read_model(&path).unwrap(), model);
+    let bytes = std::fs::read(&path).unwrap();
+    write_model(&path, &model).unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), bytes);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn empty_model_comes_back() {
+    let folder = folder();
+    let path = folder.path().join("a.planish");
+    write_model(&path, &Model::default()).unwrap();
+    assert_eq!(read_model(&path).unwrap(), Model::default());
+}
+
+#[test]
+fn log_that_another_program_left_beside_a_replaced_file_is_not_played_into_the_new_one() {
+    let folder = folder();
+    let path = folder.path().join("a.planish");
+    file(&folder, "a.planish-wal", b"old");
+    file(&folder, "a.planish-journal", b"old");
+    write_model(&path, &model(4)).unwrap();
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    assert_eq!(read_model(&path).unwrap(), model(4));
+}
+
+#[test]
+fn newer_schema_other_programs_truncated_and_damaged_files_are_refused_with_a_hint() {
+    let folder = folder();
+    let path = folder.path().join("a.planish");
+    write_model(&path, &model(20)).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let refused = |change: &dyn Fn(&mut Vec<u8>), wanted: &str| {
+        let mut bytes = bytes.clone();
+        change(&mut bytes);
+        let message = read_model(file(&folder, "b.planish", bytes)).map(|_| wanted).unwrap_err().to_string();
+        assert!(message.contains(wanted) && message.contains(" - hint: ") && !message.contains('\n'), "{message}");
+    };
+    refused(&|b| b[63] = 7, "its schema is version 7, newer than 1 that this planish knows - hint: update planish");
+    refused(&|b| b[68..72].fill(0), "it is a database of another program (application id 0x00000000)");
+    refused(&|b| b.clear(), "it is not a planish project");
+    refused(&|b| b[0] = b'X', "it is not a planish project");
+    refused(&|b| b.truncate(b.len() - 1), "the file is cut off");
+    refused(&|b| b.truncate(50_000), "the file is cut off: 50000 of");
+    // A byte in the middle of an array, found in the file by what is around it.
+    let blob: Vec<u8> = {
+        let database = rusqlite::Connection::open(&path).unwrap();
+        database.query_row("SELECT data FROM array ORDER BY length(data) DESC", [], |row| row.get(0)).unwrap()
+    };
+    let inner = &blob[100..132];
+    let at = bytes.windows(32).position(|w| w == inner).unwrap();
+    refused(&|b| b[at] ^= 1, "the checksum does not match (array ");
+    let sql = |statement: &str, wanted: &str| {
+        let path = file(&folder, "c.planish", &bytes);
+        rusqlite::Connection::open(&path).unwrap().execute_batch(statement).unwrap();
+        let message = read_model(&path).map(|_| wanted).unwrap_err().to_string();
+        assert!(message.contains(wanted) && message.contains(" - hint: "), "{message}");
+    };
+    sql("UPDATE grid SET rows = 21 WHERE patch = 3", "numbers are not the points expected");
+    sql("DELETE FROM relief WHERE patch = 15", "15 rows for 16 patches (relief 15)");
+    sql("DELETE FROM surface WHERE patch = 0", "stands where 0 should");
+    sql("UPDATE meta SET value = 'ell' WHERE key = 'units'", "unknown unit \"ell\"");
+    sql("UPDATE array SET count = 1000000000000 WHERE id = 1", "the checksum does not match (array 1)");
+    sql("UPDATE mesh SET triangles = points", "(array 1)");
+    sql("DROP TABLE grid", "the database is damaged or in use");
+    sql("UPDATE network SET json = replace(json, '\"curve\":0', '\"curve\":77')", "names a curve that is not there");
+    assert!(matches!(read_model(folder.path()), Err(ProjectError::Io(_))));
+    assert!(matches!(read_model(folder.path().join("none")), Err(ProjectError::Io(_))));
+}
+
+#[test]
+fn project_of_1_million_grid_points_is_written_and_read() {
+    let folder = folder();
+    let path = folder.path().join("a.planish");
+    let model = model(250);
+    let start = std::time::Instant::now();
+    write_model(&path, &model).unwrap();
+    let written = start.elapsed().as_secs_f64();
+    let start = std::time::Instant::now();
+    let back = read_model(&path).unwrap();
+    let read = start.elapsed().as_secs_f64();
+    println!("1 M points: write {written:.2} s, read {read:.2} s, {} bytes", std::fs::metadata(&path).unwrap().len());
+    assert!(back == model);
+}
+
+#[test]
+fn export_chooses_by_extension_and_lists_the_known_ones() {
+    let folder = folder();
+    let model = model(5);
+    let at = |name: &str| folder.path().join(name);
+    for (name, kind) in [
+        ("a.STEP", ExportKind::Step),
+        ("b.glb", ExportKind::Mesh),
+        ("c.ply", ExportKind::Mesh),
+        ("relief", ExportKind::Relief),
+    ] {
+        assert_eq!(export(at(name), &model, || model.mesh.clone()).unwrap(), kind);
+        assert!(at(name).exists(), "{name}");
+    }
+    assert!((read_mesh(at("b.glb")).unwrap().bounds().max.x - 0.0254).abs() < 1e-9);
+    assert!(std::fs::read_to_string(at("a.STEP")).unwrap().contains("CONVERSION_BASED_UNIT('INCH'"));
+    assert!(at("relief/patch_0015.exr").exists());
+    let message = export_kind("a.iges").unwrap_err().to_string();
+    assert!(message.contains("unknown extension \"iges\"") && message.contains(".step, .stp, .ply"), "{message}");
+    let nothing = export(at("d.step"), &Model::default(), Default::default).unwrap_err().to_string();
+    assert!(nothing.contains("there is nothing to write"), "{nothing}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 150, failure_persistence: None, ..Default::default() })]
+
+    #[test]
+    fn bytes_changed_at_random_never_panic(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20),
+    ) {
+        static GOOD: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
+        let folder = folder();
+        let mut bytes = GOOD.get_or_init(|| {
+            let path = folder.path().join("a.planish");
+            write_model(&path, &model(4)).unwrap();
+            std::fs::read(&path).unwrap()
+        }).clone();
+        for (at, byte) in changes {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        let _ = read_model(file(&folder, "b.planish", bytes));
+    }
+}
