@@ -20,7 +20,9 @@ pub enum Content {
 /// If the file is no usable mesh.
 pub fn mesh(path: &Path) -> Result<TriMesh, Failure> {
     if is_model(path) {
-        return Err(Failure::input(path, "is a model, not a mesh").hint("export its mesh with `planish export --surface mesh`"));
+        return Err(
+            Failure::input(path, "is a model, not a mesh").hint("export its mesh with `planish export --surface mesh`")
+        );
     }
     planish_io::read_mesh(path).map_err(|e| Failure::input(path, e))
 }

@@ -6,8 +6,8 @@ mod failure;
 mod files;
 mod options;
 mod pictures;
-mod progress;
 mod products;
+mod progress;
 mod summary;
 
 use clap::Parser;

@@ -139,9 +139,8 @@ impl Field {
 
     fn read(&self, text: &str) -> Result<Value, String> {
         let wrong = |need: &str| Err(format!("invalid value '{text}' for '--{}': {need}\n", self.flag));
-        let outside = |x: f64, min: &Option<f64>, max: &Option<f64>| {
-            min.is_some_and(|m| x < m) || max.is_some_and(|m| x > m)
-        };
+        let outside =
+            |x: f64, min: &Option<f64>, max: &Option<f64>| min.is_some_and(|m| x < m) || max.is_some_and(|m| x > m);
         let range = |min: &Option<f64>, max: &Option<f64>| match (min, max) {
             (Some(a), Some(b)) => format!("a number from {a} to {b} is needed"),
             (Some(a), None) => format!("a number of at least {a} is needed"),
@@ -293,8 +292,13 @@ fn choices(property: &Value) -> Option<Vec<String>> {
 /// Field names that more than one stage has.
 fn clashing_names() -> Vec<String> {
     let stages = serde_json::to_value(PipelineParams::default()).unwrap_or_default();
-    let mut names: Vec<String> =
-        stages.as_object().into_iter().flat_map(|s| s.values()).filter_map(Value::as_object).flat_map(|f| f.keys().cloned()).collect();
+    let mut names: Vec<String> = stages
+        .as_object()
+        .into_iter()
+        .flat_map(|s| s.values())
+        .filter_map(Value::as_object)
+        .flat_map(|f| f.keys().cloned())
+        .collect();
     names.sort();
     let mut clashes: Vec<String> = names.windows(2).filter(|w| w[0] == w[1]).map(|w| w[0].clone()).collect();
     clashes.dedup();

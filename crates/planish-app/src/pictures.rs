@@ -145,8 +145,7 @@ fn curves(model: &Model) -> Vec<Line> {
     }
     for curve in &model.network.curves {
         let points = curve.points.iter().map(|p| p.position(&model.mesh)).collect();
-        let (color, width) =
-            if curve.kind == CurveKind::Smooth { (SEAM_COLOR, 1.6) } else { (FEATURE_COLOR, 2.2) };
+        let (color, width) = if curve.kind == CurveKind::Smooth { (SEAM_COLOR, 1.6) } else { (FEATURE_COLOR, 2.2) };
         lines.push(Line { points, color, width });
     }
     lines

@@ -104,7 +104,8 @@ fn every_command_has_help_and_every_option_of_it_a_sentence() {
         let mut lines = text.lines().peekable();
         while let Some(line) = lines.next() {
             if line.trim_start().starts_with("--") || line.trim_start().starts_with('-') && line.contains(", --") {
-                let told = line.trim().split("  ").count() > 1 || lines.peek().is_some_and(|l| l.starts_with("          "));
+                let told =
+                    line.trim().split("  ").count() > 1 || lines.peek().is_some_and(|l| l.starts_with("          "));
                 assert!(told, "{command}: no help for {line}");
             }
         }
@@ -155,8 +156,23 @@ fn unusable_input_is_status_3_with_file_and_hint_and_leaves_nothing() {
     write("part.docx", b"PK");
     write("broken.planish", b"SQLite format 3\0 but not really");
     let before = names(folder.path());
-    for name in ["none.ply", "empty.ply", "words.ply", "short.ply", "lying.ply", "index.ply", "cloud.ply", "part.docx", "broken.planish"] {
-        for args in [&["run", name, "-o", "out"][..], &["info", name], &["compare", name, name], &["fit", name, "-o", "m.planish"]] {
+    for name in [
+        "none.ply",
+        "empty.ply",
+        "words.ply",
+        "short.ply",
+        "lying.ply",
+        "index.ply",
+        "cloud.ply",
+        "part.docx",
+        "broken.planish",
+    ] {
+        for args in [
+            &["run", name, "-o", "out"][..],
+            &["info", name],
+            &["compare", name, name],
+            &["fit", name, "-o", "m.planish"],
+        ] {
             let output = planish(args, folder.path());
             assert_eq!(status(&output), 3, "{args:?}: {}", stderr(&output));
             let line = error_line(&output);

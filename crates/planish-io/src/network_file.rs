@@ -35,7 +35,9 @@ pub enum NetworkFileError {
         column: usize,
     },
     /// Another kind of file, or a newer version.
-    #[error("is \"{format}\" version {version}, not \"{FORMAT}\" version {VERSION} - hint: write it with this version of planish")]
+    #[error(
+        "is \"{format}\" version {version}, not \"{FORMAT}\" version {VERSION} - hint: write it with this version of planish"
+    )]
     Format {
         /// Format found.
         format: String,
@@ -43,7 +45,9 @@ pub enum NetworkFileError {
         version: u32,
     },
     /// Made for another mesh.
-    #[error("was made for a mesh of {found} {what}, this one has {wanted} - hint: use it with the mesh that it was made for")]
+    #[error(
+        "was made for a mesh of {found} {what}, this one has {wanted} - hint: use it with the mesh that it was made for"
+    )]
     OtherMesh {
         /// `triangles` or `vertices`.
         what: &'static str,

@@ -2,6 +2,8 @@
 //!
 //! Writes `bench/runs/<date>-<machine>.json`: the median of the rounds, seconds of wall clock.
 
+#![allow(clippy::print_stderr)] // a bench tells its figures on the terminal
+
 use planish::Silent;
 use planish::mesh::shapes;
 use planish::pipeline::{self, PipelineParams};

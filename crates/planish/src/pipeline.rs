@@ -127,7 +127,8 @@ fn run(
     )?;
     let mut model = Model { mesh, network, grids, ..Model::default() };
     surfaces(&mut model, params, &mut clock)?;
-    let measured = clock.stage("measure", |o| quality::measure(&model, &patches, &repairs, o), |m| [("seams", m.seams.len())])?;
+    let measured =
+        clock.stage("measure", |o| quality::measure(&model, &patches, &repairs, o), |m| [("seams", m.seams.len())])?;
     Ok(Fitted {
         model,
         stages: clock.records,
@@ -206,11 +207,20 @@ fn surfaces(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Re
     let (network, grids) = (&model.network, &model.grids);
     let control = |s: &Vec<surface::Surface>| [("control_points", s.iter().map(|s| s.control.len()).sum())];
     let fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &params.fit, o), control)?;
-    let smooth =
-        clock.stage("seams", |o| surface::stitch(network, grids, &fitted, &params.stitch, o), |_| [("curves", network.curves.len())])?;
+    let smooth = clock.stage(
+        "seams",
+        |o| surface::stitch(network, grids, &fitted, &params.stitch, o),
+        |_| [("curves", network.curves.len())],
+    )?;
     let reliefs = clock.stage(
         "relief",
-        |_| grids.par_iter().zip(&smooth).map(|(grid, surface)| relief::bake(grid, surface)).collect::<Result<Vec<_>, _>>(),
+        |_| {
+            grids
+                .par_iter()
+                .zip(&smooth)
+                .map(|(grid, surface)| relief::bake(grid, surface))
+                .collect::<Result<Vec<_>, _>>()
+        },
         |reliefs| [("texels", reliefs.iter().map(|r| r.vectors.len()).sum())],
     )?;
     (model.surfaces, model.reliefs) = (smooth, reliefs);

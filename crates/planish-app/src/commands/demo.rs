@@ -17,7 +17,8 @@ pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
     let staged = Staged::folder(&args.output)?;
     let part = shapes::demo(session.common.seed.unwrap_or(0), args.triangles as usize);
     let options = WriteOptions { units: session.units(), up: Up::Z, name: "demo".into() };
-    planish_io::write_mesh(staged.path(PART), &part, &options).map_err(|e| Failure::usage(args.output.join(PART), e))?;
+    planish_io::write_mesh(staged.path(PART), &part, &options)
+        .map_err(|e| Failure::usage(args.output.join(PART), e))?;
     let job = Job {
         command: "demo",
         path: Path::new(PART),

@@ -7,15 +7,14 @@ use crate::files;
 use crate::products::Staged;
 use crate::summary::Summary;
 use planish::pipeline;
-use planish_io::{ExportKind, StepInput, WriteError, WriteOptions};
 use planish_io::report::Report;
+use planish_io::{ExportKind, StepInput, WriteError, WriteOptions};
 
 pub fn export(session: &Session, args: &Export) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
     let wrong = |e: WriteError| Failure::usage(&args.output, e);
     let kind = planish_io::export_kind(&args.output).map_err(wrong)?;
-    let staged =
-        if kind == ExportKind::Relief { Staged::folder(&args.output)? } else { Staged::file(&args.output)? };
+    let staged = if kind == ExportKind::Relief { Staged::folder(&args.output)? } else { Staged::file(&args.output)? };
     let (mut model, read) = session.step("read", || files::model(&args.model))?;
     if let Some(units) = session.common.units {
         model.units = units.into();

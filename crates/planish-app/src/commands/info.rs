@@ -103,11 +103,10 @@ fn mesh_rows(table: &mut Summary, report: &Report, facts: &Diagnosis) {
     table.row("size", format!("{} x {} x {} {unit}", number(size.x), number(size.y), number(size.z)));
     table.row("diagonal", format!("{} {unit}", number(facts.diagonal)));
     table.row("pieces", count(facts.components as u64));
-    table.row("surface", format!(
-        "{}, {}",
-        yes(facts.watertight, "watertight", "open"),
-        yes(facts.manifold, "manifold", "not manifold")
-    ));
+    table.row(
+        "surface",
+        format!("{}, {}", yes(facts.watertight, "watertight", "open"), yes(facts.manifold, "manifold", "not manifold")),
+    );
     if let Some(genus) = facts.genus {
         table.row("handles", genus.to_string());
     }

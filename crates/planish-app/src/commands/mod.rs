@@ -73,7 +73,11 @@ impl Session {
     }
 
     /// Runs a step that is not a stage of the pipeline, under a bar of its own.
-    fn step<T>(&self, name: &'static str, work: impl FnOnce() -> Result<T, Failure>) -> Result<(T, StageRecord), Failure> {
+    fn step<T>(
+        &self,
+        name: &'static str,
+        work: impl FnOnce() -> Result<T, Failure>,
+    ) -> Result<(T, StageRecord), Failure> {
         let (result, record) = self.bars.step(name, |_| work());
         if progress::interrupted() {
             return Err(Failure::interrupted());

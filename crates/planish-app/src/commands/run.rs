@@ -11,8 +11,8 @@ use planish::mesh::TriMesh;
 use planish::model::{HistoryEntry, Model};
 use planish::network::Network;
 use planish::pipeline::{self, Fitted, PipelineParams, StageRecord};
-use planish_io::{StepInput, Up, WriteOptions};
 use planish_io::report::{self, Report, SeamRow, count, distance, number};
+use planish_io::{StepInput, Up, WriteOptions};
 use std::path::Path;
 
 pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
@@ -84,7 +84,8 @@ pub fn fitted(session: &Session, job: Job, before: Vec<StageRecord>) -> Result<(
     let mut report = Report::new(job.command, files::mesh_facts(job.path, job.input, units));
     let (network, network_path) = job.network.unzip();
     let Fitted { mut model, stages, quality, seams, warnings } =
-        pipeline::fit(job.input, network, &job.params, &session.bars).map_err(|e| pipeline_failure(job.path, network_path, e))?;
+        pipeline::fit(job.input, network, &job.params, &session.bars)
+            .map_err(|e| pipeline_failure(job.path, network_path, e))?;
     report.stages = before;
     report.stages.extend(stages);
     report.quality = quality;
@@ -111,7 +112,8 @@ pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
     let figure = |key: &str| report.figure(key).unwrap_or(0.0);
     let length = |key: &str| distance(figure(key), diagonal, unit);
     let closed = if report.flag("mesh.watertight") == Some(true) { "watertight" } else { "open" };
-    table.row("input", format!("{}: {} triangles, {closed}", report.input.path, count(figure("mesh.triangles") as u64)));
+    table
+        .row("input", format!("{}: {} triangles, {closed}", report.input.path, count(figure("mesh.triangles") as u64)));
     table.row("patches", count(figure("patches.count") as u64));
     table.row("control points", count(figure("surface.control_points") as u64));
     table.row("grids", format!("{} points, {} folds", count(figure("grid.points") as u64), figure("grid.folds")));
@@ -162,8 +164,13 @@ fn write_products(staged: &Staged, output: &Path, model: &Model, options: &Write
     let mesh = |name: &str, mesh: &TriMesh| {
         planish_io::write_mesh(staged.path(name), mesh, options).map_err(|e| wrong(name, &e))
     };
-    let step =
-        StepInput { network: &model.network, surfaces: &model.surfaces, units: model.units, name: &options.name, time: None };
+    let step = StepInput {
+        network: &model.network,
+        surfaces: &model.surfaces,
+        units: model.units,
+        name: &options.name,
+        time: None,
+    };
     mesh("mesh.ply", &model.mesh)?;
     planish_io::write_model(staged.path("model.planish"), model).map_err(|e| wrong("model.planish", &e))?;
     planish_io::write_step(staged.path("surface.step"), &step).map_err(|e| wrong("surface.step", &e))?;

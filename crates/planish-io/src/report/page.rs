@@ -149,9 +149,11 @@ fn tiles(page: &mut String, report: &Report) {
         let detail = control.map(|c| format!("{} control points", count(c as u64))).unwrap_or_default();
         row.push((count(n as u64), "", "Patches", detail));
     }
-    for (key, name) in
-        [("surface.rms", "Mean deviation"), ("surface.max", "Largest deviation"), ("displaced.rms", "With displacement")]
-    {
+    for (key, name) in [
+        ("surface.rms", "Mean deviation"),
+        ("surface.max", "Largest deviation"),
+        ("displaced.rms", "With displacement"),
+    ] {
         if let Some((value, small, detail)) = length(key) {
             row.push((value, small, name, detail));
         }
@@ -202,7 +204,9 @@ fn gallery(page: &mut String, pictures: &[Picture]) {
     if pictures.is_empty() {
         return;
     }
-    page.push_str("<h2>Pictures</h2>\n<p class=\"note\">All from the same point of view.</p>\n<div class=\"pictures\">\n");
+    page.push_str(
+        "<h2>Pictures</h2>\n<p class=\"note\">All from the same point of view.</p>\n<div class=\"pictures\">\n",
+    );
     for picture in pictures {
         let _ = write!(
             page,
@@ -349,7 +353,8 @@ mod tests {
     use planish::pipeline::Warning;
 
     fn report() -> Report {
-        let mut report = Report::new("run", Input { path: "parts/<b>.ply".into(), diagonal: 200.0, ..Default::default() });
+        let mut report =
+            Report::new("run", Input { path: "parts/<b>.ply".into(), diagonal: 200.0, ..Default::default() });
         report.input.units = "mm".into();
         report.quality.insert("patches.count".into(), Figure::Count(12));
         report.quality.insert("surface.rms".into(), Figure::Number(0.5));

@@ -187,12 +187,7 @@ fn grid_figures(model: &Model, patches: &[PatchMesh], quality: &mut Quality, war
     }
 }
 
-fn seam_figures(
-    model: &Model,
-    diagonal: f64,
-    quality: &mut Quality,
-    warnings: &mut Vec<Warning>,
-) -> Vec<SeamQuality> {
+fn seam_figures(model: &Model, diagonal: f64, quality: &mut Quality, warnings: &mut Vec<Warning>) -> Vec<SeamQuality> {
     let seams = surface::measure_seams(&model.network, &model.surfaces);
     let gap = seams.iter().map(|s| s.gap_max).fold(0.0, f64::max);
     let smooth: Vec<&SeamQuality> = seams.iter().filter(|s| s.kind == CurveKind::Smooth).collect();
@@ -236,7 +231,8 @@ fn relief_figures(
     length(quality, "relief.max", each.iter().map(|e| e.1).fold(0.0, f64::max), diagonal);
     let folding: usize = each.iter().map(|e| e.2).sum();
     if folding > 0 {
-        let places: Vec<String> = each.iter().enumerate().filter(|(_, e)| e.2 > 0).map(|(p, _)| p.to_string()).collect();
+        let places: Vec<String> =
+            each.iter().enumerate().filter(|(_, e)| e.2 > 0).map(|(p, _)| p.to_string()).collect();
         let text = format!(
             "{folding} of {texels} texels displace the surface beyond its centre of curvature: scaling such a map up \
              folds the surface over. More control points there help."
