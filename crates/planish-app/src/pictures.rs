@@ -14,7 +14,7 @@ use planish_io::report::{Picture, Report, Scale, number};
 use rayon::prelude::*;
 
 /// Pixels of a picture: two stand side by side on a page, sharp on screens of twice the usual density.
-const SIZE: (usize, usize) = (960, 720);
+const SIZE: (usize, usize) = (800, 600);
 const ASPECT: f64 = SIZE.0 as f64 / SIZE.1 as f64;
 /// Free rim around the shape, as a share of half the picture.
 const RIM: f64 = 0.06;
