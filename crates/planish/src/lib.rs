@@ -2,6 +2,20 @@
 //!
 //! Pure computing: no files, no command line. Data flows one way; a stage knows the stages before it and
 //! nothing of those after it ([`pipeline`] alone knows their order).
+//!
+//! ```
+//! use planish::mesh::shapes;
+//! use planish::network::LayoutParams;
+//! use planish::pipeline::{self, PipelineParams};
+//!
+//! let ball = shapes::sphere(10.0, 4);
+//! let params = PipelineParams { layout: LayoutParams { patches: 24, ..Default::default() }, ..Default::default() };
+//! let fitted = pipeline::fit(&ball, None, &params, &planish::Silent)?;
+//! assert_eq!(fitted.model.surfaces.len(), fitted.model.network.patches.len());
+//! // Surface plus relief is the grid again, to rounding.
+//! assert!(fitted.quality["relief.roundtrip_max_rel"].value() < 1e-12);
+//! # Ok::<(), pipeline::PipelineError>(())
+//! ```
 
 pub mod geom;
 pub mod grid;
@@ -10,6 +24,7 @@ pub mod mesh;
 pub mod model;
 pub mod network;
 pub mod observe;
+pub mod pipeline;
 pub mod relief;
 pub mod render;
 pub mod surface;

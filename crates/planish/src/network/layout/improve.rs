@@ -7,8 +7,8 @@
 use super::LayoutError;
 use super::complex::Complex;
 use super::polygon::{self, Sectors, badness, polygon_normal};
-use super::slide;
 use super::recut::{Bench, Change, outline, outline_with_cells};
+use super::slide;
 use crate::network::CurveKind;
 use crate::observe::Observer;
 use glam::DVec3;

@@ -1,0 +1,62 @@
+# planish - one line per errand.
+#
+#   make demo    build the program and run everything on a synthetic part: products in out/demo
+#   make test    all tests: the library, the program, and files read back by other programs' libraries
+#   make lint    formatting and clippy, warnings are errors
+#   make bench   time every stage: bench/runs/<date>-<machine>.json
+#   make docs    reference of the libraries, and the pictures of the guide from the demo
+#
+# One cargo profile (release) for everything: a second one would build every dependency twice.
+
+SHELL   := /bin/bash
+CARGO   ?= cargo
+PLANISH := target/release/planish
+PYTHON  := .venv/bin/python
+
+.PHONY: build demo test test-rust test-readers lint bench docs clean
+.DELETE_ON_ERROR:
+
+build: .stamp/packages
+	$(CARGO) build --release --locked --workspace
+
+demo: build
+	$(PLANISH) demo -o out/demo
+	@echo "open out/demo/report.html"
+
+test: test-rust test-readers
+
+test-rust: .stamp/packages
+	$(CARGO) test --release --locked --workspace
+
+# Needs the program, which test-rust has built already when both run.
+test-readers: build .stamp/readers
+	$(PYTHON) -m pytest -q -rs tests/readers
+
+lint: .stamp/packages
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
+
+bench: .stamp/packages
+	$(CARGO) bench --locked -p planish --bench pipeline
+
+docs: build
+	$(CARGO) doc --release --locked --no-deps -p planish -p planish-io
+	$(PLANISH) demo -q -o out/docs
+	python3 docs/pictures.py out/docs/report.html docs/pictures
+
+clean:
+	rm -rf out .stamp .venv
+
+# System packages, only those that are missing.
+.stamp/packages: .ci/packages
+	@mkdir -p .stamp
+	.ci/packages build
+	@touch $@
+
+# The libraries that read the products back.
+.stamp/readers: tests/readers/requirements.txt .ci/packages
+	@mkdir -p .stamp
+	.ci/packages readers
+	test -x $(PYTHON) || python3 -m venv .venv
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check -r $<
+	@touch $@

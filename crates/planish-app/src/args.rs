@@ -1,0 +1,294 @@
+//! What the user can say: commands in the order of the pipeline, and their options.
+
+use crate::failure::Failure;
+use crate::options::{StageOptions, StageParams};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use planish::grid::GridParams;
+use planish::model::Units;
+use planish::network::LayoutParams;
+use planish::pipeline::PipelineParams;
+use planish::surface::{FitParams, StitchParams};
+use planish_io::Up;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+/// Turns dense triangle meshes into smooth B-spline patches with displacement maps.
+#[derive(Parser, Debug)]
+#[command(name = "planish", version, max_term_width = 110)]
+#[command(after_help = "\
+The way of the data:
+  mesh -> repair -> layout -> grids -> surfaces -> seams -> relief -> files
+  `run` goes all the way; `layout` stops at the network, so that it can be edited; `fit` goes on from there.
+
+Exit status:
+  0 done   1 a demanded tolerance is missed (the result is written)   2 wrong usage   3 unusable input
+  4 internal fault   130 interrupted
+
+Start with `planish demo`: it needs no input.")]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands, in the order of the pipeline.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// Make a synthetic part with sharp edges and fine detail, and run everything on it
+    Demo(Demo),
+    /// Everything: mesh in; surfaces, displacement maps and a report out
+    Run(Run),
+    /// Mesh -> a network of four-sided patches to start from
+    Layout(Layout),
+    /// Mesh and network -> grids, surfaces, seams and relief in one model file
+    Fit(Fit),
+    /// Model -> STEP, mesh or displacement maps; the format comes from the extension
+    Export(Export),
+    /// Distances and normal errors between any two meshes or models
+    Compare(Compare),
+    /// What is in a file, and what is wrong with it
+    Info(Info),
+}
+
+/// Options of every command.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Common options")]
+pub struct Common {
+    /// Write the report to FILE.json
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Number of threads; the result does not depend on it [default: all cores]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Seed of everything random
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// What one unit of the input is; carried into every export [default: the file's own, else mm]
+    #[arg(long)]
+    pub units: Option<UnitsWord>,
+    /// Write nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Tell each stage with its time
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
+}
+
+/// A unit of length by its symbol.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum UnitsWord {
+    /// Millimetres
+    Mm,
+    /// Centimetres
+    Cm,
+    /// Metres
+    M,
+    /// Inches
+    In,
+}
+
+impl From<UnitsWord> for Units {
+    fn from(word: UnitsWord) -> Units {
+        match word {
+            UnitsWord::Mm => Units::Mm,
+            UnitsWord::Cm => Units::Cm,
+            UnitsWord::M => Units::M,
+            UnitsWord::In => Units::In,
+        }
+    }
+}
+
+/// An axis that points up.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum UpWord {
+    /// Y, as in most animation programs
+    Y,
+    /// Z, as in most CAD programs and scanners
+    Z,
+}
+
+impl From<UpWord> for Up {
+    fn from(word: UpWord) -> Up {
+        match word {
+            UpWord::Y => Up::Y,
+            UpWord::Z => Up::Z,
+        }
+    }
+}
+
+/// `planish demo`
+#[derive(Args, Debug)]
+pub struct Demo {
+    /// Folder for the products; made if missing
+    #[arg(short, long, value_name = "DIR", default_value = "planish-demo")]
+    pub output: PathBuf,
+    /// Triangles of the synthetic part, about
+    #[arg(long, value_name = "N", default_value_t = 60_000, value_parser = clap::value_parser!(u32).range(2_000..=2_000_000))]
+    pub triangles: u32,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// `planish run`
+#[derive(Args, Debug)]
+pub struct Run {
+    /// The mesh: PLY, OBJ, STL, GLB or glTF
+    pub input: PathBuf,
+    /// Folder for the products; made if missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Network to use instead of an automatic one
+    #[arg(long, value_name = "NETWORK.json")]
+    pub network: Option<PathBuf>,
+    /// Axis of the input that points up, for pictures and GLB
+    #[arg(long, value_name = "AXIS", default_value = "y")]
+    pub up: UpWord,
+    #[command(flatten)]
+    pub common: Common,
+    #[command(flatten)]
+    pub stages: AllStages,
+}
+
+/// `planish layout`
+#[derive(Args, Debug)]
+pub struct Layout {
+    /// The mesh: PLY, OBJ, STL, GLB or glTF
+    pub mesh: PathBuf,
+    /// The network
+    #[arg(short, long, value_name = "NETWORK.json")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub common: Common,
+    #[command(flatten)]
+    pub layout: StageOptions<LayoutParams>,
+}
+
+/// `planish fit`
+#[derive(Args, Debug)]
+pub struct Fit {
+    /// The mesh: PLY, OBJ, STL, GLB or glTF
+    pub mesh: PathBuf,
+    /// Network on the mesh [default: an automatic one]
+    #[arg(long, value_name = "NETWORK.json")]
+    pub network: Option<PathBuf>,
+    /// The model
+    #[arg(short, long, value_name = "MODEL.planish")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub common: Common,
+    #[command(flatten)]
+    pub stages: AllStages,
+}
+
+/// `planish export`
+#[derive(Args, Debug)]
+pub struct Export {
+    /// The model
+    #[arg(value_name = "MODEL.planish")]
+    pub model: PathBuf,
+    /// Where to: .step or .stp (surfaces), .ply, .obj, .stl or .glb (a mesh), or a folder (displacement maps)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Which surface a mesh format gets
+    #[arg(long, value_name = "WORD", default_value = "displaced")]
+    pub surface: SurfaceWord,
+    /// Axis of the model that points up; GLB is turned accordingly
+    #[arg(long, value_name = "AXIS", default_value = "y")]
+    pub up: UpWord,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// Which surface of a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SurfaceWord {
+    /// The smooth surfaces with their displacement: all detail
+    Displaced,
+    /// The smooth surfaces alone
+    Base,
+    /// The mesh that the model was fitted to
+    Mesh,
+}
+
+/// `planish compare`
+#[derive(Args, Debug)]
+pub struct Compare {
+    /// A mesh or a model
+    pub a: PathBuf,
+    /// A mesh or a model
+    pub b: PathBuf,
+    /// Largest distance that is accepted, in units of A; beyond it the exit status is 1
+    #[arg(long, value_name = "LENGTH", value_parser = positive)]
+    pub tolerance: Option<f64>,
+    /// Which surface of a model is compared
+    #[arg(long, value_name = "WORD", default_value = "base")]
+    pub surface: SurfaceWord,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// `planish info`
+#[derive(Args, Debug)]
+pub struct Info {
+    /// A mesh or a model
+    pub file: PathBuf,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// Options of all stages.
+#[derive(Args, Clone, Debug)]
+pub struct AllStages {
+    #[command(flatten)]
+    layout: StageOptions<LayoutParams>,
+    #[command(flatten)]
+    grid: StageOptions<GridParams>,
+    #[command(flatten)]
+    fit: StageOptions<FitParams>,
+    #[command(flatten)]
+    stitch: StageOptions<StitchParams>,
+}
+
+impl AllStages {
+    /// The parameters of all stages: defaults with the given options in place.
+    pub fn params(&self, seed: Option<u64>) -> Result<PipelineParams, Failure> {
+        Ok(PipelineParams {
+            layout: self.layout.params(seed)?,
+            grid: self.grid.params(seed)?,
+            fit: self.fit.params(seed)?,
+            stitch: self.stitch.params(seed)?,
+        })
+    }
+
+    /// The fit tolerance if the user demanded one, as a fraction of the diagonal.
+    pub fn demanded_tolerance(&self) -> Option<f64> {
+        self.fit.given("resolution", "tolerance")
+    }
+}
+
+impl StageParams for LayoutParams {
+    const STAGE: &'static str = "layout";
+    const HEADING: &'static str = "Layout: the automatic network";
+}
+
+impl StageParams for GridParams {
+    const STAGE: &'static str = "grid";
+    const HEADING: &'static str = "Grids: patches resampled";
+}
+
+impl StageParams for FitParams {
+    const STAGE: &'static str = "fit";
+    const HEADING: &'static str = "Surfaces: give one of these";
+}
+
+impl StageParams for StitchParams {
+    const STAGE: &'static str = "stitch";
+    const HEADING: &'static str = "Seams between the surfaces";
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+        _ => Err("a number above 0 is needed".into()),
+    }
+}

@@ -1,0 +1,129 @@
+//! `planish info`: what is in a file, and what is wrong with it.
+
+use super::{Session, commit_report};
+use crate::args::Info;
+use crate::failure::{Failure, Status};
+use crate::files::{self, Content};
+use crate::summary::Summary;
+use planish::mesh::{Diagnosis, diagnose};
+use planish::model::Model;
+use planish::pipeline::{Figure, Warning};
+use planish_io::report::{Report, count, number};
+
+pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
+    let own_report = session.stage_report()?;
+    let (content, read) = session.step("read", || files::content(&args.file))?;
+    let (mesh, model) = match &content {
+        Content::Mesh(mesh) => (mesh, None),
+        Content::Model(model) => (&model.mesh, Some(model.as_ref())),
+    };
+    let units = session.common.units.map(Into::into).or(model.map(|m| m.units)).unwrap_or_default();
+    let input = match model {
+        Some(model) => files::model_facts(&args.file, model, units),
+        None => files::mesh_facts(&args.file, mesh, units),
+    };
+    let mut report = Report::new("info", input);
+    let facts = diagnose(mesh);
+    report.stages.push(read);
+    report.warnings = faults(&facts);
+    figures(&facts, &mut report);
+    if let Some(model) = model {
+        report.quality.insert("patches.count".into(), Figure::Count(model.network.patches.len() as u64));
+        let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
+        report.quality.insert("surface.control_points".into(), Figure::Count(control as u64));
+    }
+    commit_report(own_report, &report)?;
+    if !session.common.quiet {
+        session.tell_warnings(&report);
+        let mut table = Summary::default();
+        mesh_rows(&mut table, &report, &facts);
+        if let Some(model) = model {
+            model_rows(&mut table, model);
+        }
+        let verdict = match report.warnings.len() {
+            0 => "nothing".to_owned(),
+            n => format!("{n} things, told above; `planish run` repairs what it can"),
+        };
+        table.row("wrong", verdict);
+        table.print();
+    }
+    Ok(Status::Done)
+}
+
+fn figures(facts: &Diagnosis, report: &mut Report) {
+    let counts = [
+        ("mesh.triangles", facts.triangles),
+        ("mesh.vertices", facts.vertices),
+        ("mesh.components", facts.components),
+        ("mesh.boundary_loops", facts.boundary_loops),
+        ("mesh.non_manifold_edges", facts.non_manifold_edges),
+        ("mesh.non_manifold_vertices", facts.non_manifold_vertices),
+        ("mesh.duplicate_faces", facts.duplicate_faces),
+        ("mesh.degenerate_faces", facts.degenerate_faces),
+        ("mesh.flipped_faces", facts.flipped_faces),
+        ("mesh.unreferenced_vertices", facts.unreferenced_vertices),
+    ];
+    report.quality.extend(counts.map(|(key, n)| (key.to_owned(), Figure::Count(n as u64))));
+    report.quality.insert("mesh.watertight".into(), Figure::Flag(facts.watertight));
+    report.quality.insert("mesh.manifold".into(), Figure::Flag(facts.manifold));
+    report.quality.insert("mesh.area".into(), Figure::Number(facts.area));
+    if let Some(volume) = facts.volume {
+        report.quality.insert("mesh.volume".into(), Figure::Number(volume));
+    }
+    if let Some(genus) = facts.genus {
+        report.quality.insert("mesh.genus".into(), Figure::Number(genus as f64));
+    }
+}
+
+/// What is wrong with a mesh, in words.
+fn faults(facts: &Diagnosis) -> Vec<Warning> {
+    let several = [
+        ("bad_indices", facts.bad_indices, "triangles name vertices that do not exist"),
+        ("not_finite", facts.non_finite_vertices, "vertices have a position that is no number"),
+        ("non_manifold_edges", facts.non_manifold_edges, "edges have more than two triangles"),
+        ("non_manifold_vertices", facts.non_manifold_vertices, "vertices join surfaces that touch in a point"),
+        ("flipped_faces", facts.flipped_faces, "triangles face the other way than their neighbours"),
+        ("inverted_pieces", facts.inverted_components, "closed pieces are inside out, or voids in another"),
+        ("duplicate_faces", facts.duplicate_faces, "triangles repeat another"),
+        ("degenerate_faces", facts.degenerate_faces, "triangles have no area"),
+        ("boundary", facts.boundary_loops, "boundaries: the surface is open"),
+        ("unreferenced_vertices", facts.unreferenced_vertices, "vertices belong to no triangle"),
+    ];
+    let found = several.iter().filter(|(_, n, _)| *n > 0);
+    found.map(|(code, n, words)| Warning::new(code, format!("{n} {words}."), "")).collect()
+}
+
+fn mesh_rows(table: &mut Summary, report: &Report, facts: &Diagnosis) {
+    let unit = report.input.units.as_str();
+    let yes = |yes: bool, a: &str, b: &str| if yes { a.to_owned() } else { b.to_owned() };
+    let size = facts.bounds.size();
+    table.row("file", format!("{}: {}", report.input.path, report.input.kind));
+    table.row("triangles", count(facts.triangles as u64));
+    table.row("vertices", count(facts.vertices as u64));
+    table.row("size", format!("{} x {} x {} {unit}", number(size.x), number(size.y), number(size.z)));
+    table.row("diagonal", format!("{} {unit}", number(facts.diagonal)));
+    table.row("pieces", count(facts.components as u64));
+    table.row(
+        "surface",
+        format!("{}, {}", yes(facts.watertight, "watertight", "open"), yes(facts.manifold, "manifold", "not manifold")),
+    );
+    if let Some(genus) = facts.genus {
+        table.row("handles", genus.to_string());
+    }
+    table.row("area", format!("{} {unit}\u{b2}", number(facts.area)));
+    if let Some(volume) = facts.volume {
+        table.row("volume", format!("{} {unit}\u{b3}", number(volume)));
+    }
+}
+
+fn model_rows(table: &mut Summary, model: &Model) {
+    let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
+    let points: usize = model.grids.iter().map(|g| g.points.len()).sum();
+    let texels: usize = model.reliefs.iter().map(|r| r.vectors.len()).sum();
+    table.row("patches", count(model.network.patches.len() as u64));
+    table.row("grid points", count(points as u64));
+    table.row("control points", count(control as u64));
+    table.row("relief", format!("{} texels", count(texels as u64)));
+    let commands: Vec<&str> = model.history.iter().map(|h| h.command.as_str()).collect();
+    table.row("history", commands.join(", "));
+}

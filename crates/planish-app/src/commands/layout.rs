@@ -1,0 +1,54 @@
+//! `planish layout`: a network to start from.
+
+use super::{Session, commit_report};
+use crate::args::Layout;
+use crate::failure::{Failure, Status};
+use crate::files;
+use crate::products::Staged;
+use crate::summary::Summary;
+use planish::network::CurveKind;
+use planish::pipeline::{self, Figure};
+use planish_io::report::{Report, count};
+
+pub fn layout(session: &Session, args: &Layout) -> Result<Status, Failure> {
+    files::check_extension(&args.output, &["json"])?;
+    let staged = Staged::file(&args.output)?;
+    let own_report = session.stage_report()?;
+    let params = args.layout.params(session.common.seed)?;
+    let (input, read) = session.step("read", || files::mesh(&args.mesh))?;
+    let mut report = Report::new("layout", files::mesh_facts(&args.mesh, &input, session.units()));
+    let made =
+        pipeline::layout(&input, &params, &session.bars).map_err(|e| super::pipeline_failure(&args.mesh, None, e))?;
+    let network = &made.network;
+    planish_io::write_network(staged.file_path(), network, &made.mesh).map_err(|e| Failure::usage(&args.output, e))?;
+    report.stages.push(read);
+    report.stages.extend(made.stages);
+    report.warnings = made.warnings;
+    report.quality = made.quality;
+    staged.commit()?;
+    commit_report(own_report, &report)?;
+    if session.common.quiet {
+        return Ok(Status::Done);
+    }
+    session.tell_warnings(&report);
+    let of_kind = |kind: CurveKind| network.curves.iter().filter(|c| c.kind == kind).count() as u64;
+    let mut table = Summary::default();
+    table.row("input", format!("{}: {} triangles", report.input.path, count(input.triangles.len() as u64)));
+    table.row("patches", count(network.patches.len() as u64));
+    table.row("corners", count(network.corners.len() as u64));
+    table.row(
+        "curves",
+        format!(
+            "{} smooth, {} on sharp edges, {} on the boundary",
+            count(of_kind(CurveKind::Smooth)),
+            count(of_kind(CurveKind::Feature)),
+            count(of_kind(CurveKind::Boundary))
+        ),
+    );
+    if let Some(Figure::Count(irregular)) = report.quality.get("patches.irregular_corners") {
+        table.row("irregular", format!("{} corners", count(*irregular)));
+    }
+    table.row("network", args.output.display().to_string());
+    table.print();
+    Ok(Status::Done)
+}

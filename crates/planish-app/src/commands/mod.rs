@@ -1,0 +1,117 @@
+//! One file per command, and what they share.
+
+mod compare;
+mod demo;
+mod export;
+mod fit;
+mod info;
+mod layout;
+mod run;
+
+use crate::args::{Cli, Command, Common};
+use crate::failure::{Failure, Status};
+use crate::files;
+use crate::products::Staged;
+use crate::progress::{self, Bars};
+use planish::model::Units;
+use planish::pipeline::{PipelineError, StageRecord};
+use planish_io::report::Report;
+use std::io::Write;
+use std::path::Path;
+
+/// Runs the command.
+/// # Errors
+/// What the user is to be told.
+pub fn run(cli: Cli) -> Result<Status, Failure> {
+    progress::watch_interrupts();
+    match cli.command {
+        Command::Demo(args) => demo::demo(&Session::new(&args.common)?, &args),
+        Command::Run(args) => run::run(&Session::new(&args.common)?, &args),
+        Command::Layout(args) => layout::layout(&Session::new(&args.common)?, &args),
+        Command::Fit(args) => fit::fit(&Session::new(&args.common)?, &args),
+        Command::Export(args) => export::export(&Session::new(&args.common)?, &args),
+        Command::Compare(args) => compare::compare(&Session::new(&args.common)?, &args),
+        Command::Info(args) => info::info(&Session::new(&args.common)?, &args),
+    }
+}
+
+/// What the common options make of a command.
+struct Session {
+    common: Common,
+    bars: Bars,
+}
+
+impl Session {
+    fn new(common: &Common) -> Result<Session, Failure> {
+        if let Some(report) = &common.report {
+            files::check_extension(report, &["json"])?;
+        }
+        let threads = common.threads.map_or(0, |n| n.get());
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::fault)?;
+        Ok(Session { common: common.clone(), bars: Bars::new(common.quiet, common.verbose) })
+    }
+
+    /// Units of the input: the user's, else millimetres.
+    fn units(&self) -> Units {
+        self.common.units.map_or(Units::default(), Units::from)
+    }
+
+    /// Where `--report` goes, claimed before the work so that a wrong place is told at once.
+    fn stage_report(&self) -> Result<Option<Staged>, Failure> {
+        self.common.report.as_deref().map(Staged::file).transpose()
+    }
+
+    /// Tells the warnings on stderr.
+    fn tell_warnings(&self, report: &Report) {
+        if self.common.quiet {
+            return;
+        }
+        for warning in &report.warnings {
+            let place = if warning.place.is_empty() { String::new() } else { format!(" ({})", warning.place) };
+            let _ = writeln!(std::io::stderr(), "warning: {}{place}", warning.message.trim_end_matches('.'));
+        }
+    }
+
+    /// Runs a step that is not a stage of the pipeline, under a bar of its own.
+    fn step<T>(
+        &self,
+        name: &'static str,
+        work: impl FnOnce() -> Result<T, Failure>,
+    ) -> Result<(T, StageRecord), Failure> {
+        let (result, record) = self.bars.step(name, |_| work());
+        if progress::interrupted() {
+            return Err(Failure::interrupted());
+        }
+        Ok((result?, record))
+    }
+}
+
+/// Writes the report into its staged file and moves it to its place.
+fn commit_report(staged: Option<Staged>, report: &Report) -> Result<(), Failure> {
+    let Some(staged) = staged else { return Ok(()) };
+    write_text(&staged.file_path(), &report.to_json())?;
+    staged.commit()
+}
+
+/// Writes a text file.
+fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
+    std::fs::write(path, text).map_err(|e| Failure::usage(path, format!("cannot be written ({e})")))
+}
+
+/// What a failed pipeline is to the user: mostly a fault of the input.
+fn pipeline_failure(input: &Path, network: Option<&Path>, error: PipelineError) -> Failure {
+    match error {
+        PipelineError::Cancelled => Failure::interrupted(),
+        // With a network of the user's own, what it causes is told of that file.
+        PipelineError::Network(e) if network.is_some() => Failure::input(network.unwrap_or(input), e),
+        e => Failure::input(input, with_hint(&e.to_string())).hint("look for faults with `planish info`"),
+    }
+}
+
+/// The way out that a library error ends with, as a hint.
+fn with_hint(text: &str) -> String {
+    match text.rsplit_once("; ") {
+        Some((what, hint)) if !text.contains(" - hint: ") => format!("{what} - hint: {hint}"),
+        _ => text.to_owned(),
+    }
+}

@@ -1,0 +1,179 @@
+//! `planish run`: everything, from a mesh to all products.
+
+use super::{Session, commit_report, pipeline_failure, write_text};
+use crate::args::Run;
+use crate::failure::{Failure, Status};
+use crate::files;
+use crate::pictures;
+use crate::products::Staged;
+use crate::summary::Summary;
+use planish::mesh::TriMesh;
+use planish::model::{HistoryEntry, Model};
+use planish::network::Network;
+use planish::pipeline::{self, Fitted, PipelineParams, StageRecord};
+use planish_io::report::{self, Report, SeamRow, count, distance, number};
+use planish_io::{StepInput, Up, WriteOptions};
+use std::path::Path;
+
+pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
+    let staged = Staged::folder(&args.output)?;
+    let params = args.stages.params(session.common.seed)?;
+    let (input, read) = session.step("read", || files::mesh(&args.input))?;
+    let network = files::optional_network(args.network.as_deref(), &input)?;
+    let job = Job {
+        command: "run",
+        path: &args.input,
+        input: &input,
+        network: network.zip(args.network.as_deref()),
+        params,
+        demanded: args.stages.demanded_tolerance(),
+        output: &args.output,
+        up: args.up.into(),
+    };
+    produce(session, job, staged, vec![read])
+}
+
+/// A mesh on its way to a model.
+pub struct Job<'a> {
+    /// Name of the command.
+    pub command: &'static str,
+    /// The mesh's path as the user gave it.
+    pub path: &'a Path,
+    /// The mesh.
+    pub input: &'a TriMesh,
+    /// A network of the user's own, with its path.
+    pub network: Option<(Network, &'a Path)>,
+    /// Parameters of all stages.
+    pub params: PipelineParams,
+    /// Tolerance that the user demanded, as a fraction of the diagonal.
+    pub demanded: Option<f64>,
+    /// Where the products go.
+    pub output: &'a Path,
+    /// Axis that points up.
+    pub up: Up,
+}
+
+/// Fits a model and writes all products.
+pub fn produce(session: &Session, job: Job, staged: Staged, before: Vec<StageRecord>) -> Result<Status, Failure> {
+    let own_report = session.stage_report()?;
+    let (path, output, demanded, up) = (job.path, job.output, job.demanded, job.up);
+    let (mut report, model) = fitted(session, job, before)?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let options = WriteOptions { units: model.units, up, name };
+    let ((), write) = session.step("write", || write_products(&staged, output, &model, &options))?;
+    let (pictures, draw) = session.step("pictures", || pictures::pictures(&model, &report, up))?;
+    report.stages.extend([write, draw]);
+    write_text(&staged.path("report.json"), &report.to_json())?;
+    write_text(&staged.path("report.html"), &report::html(&report, &pictures))?;
+    staged.commit()?;
+    commit_report(own_report, &report)?;
+    let status = verdict(&report, demanded);
+    if !session.common.quiet {
+        session.tell_warnings(&report);
+        let mut summary = summary(&report, demanded);
+        summary.row("products", output.display().to_string());
+        summary.row("look at", output.join("report.html").display().to_string());
+        summary.print();
+    }
+    Ok(status)
+}
+
+/// Fits a model: its report so far, and itself with units and history.
+pub fn fitted(session: &Session, job: Job, before: Vec<StageRecord>) -> Result<(Report, Model), Failure> {
+    let units = session.units();
+    let mut report = Report::new(job.command, files::mesh_facts(job.path, job.input, units));
+    let (network, network_path) = job.network.unzip();
+    let Fitted { mut model, stages, quality, seams, warnings } =
+        pipeline::fit(job.input, network, &job.params, &session.bars)
+            .map_err(|e| pipeline_failure(job.path, network_path, e))?;
+    report.stages = before;
+    report.stages.extend(stages);
+    report.quality = quality;
+    report.warnings = warnings;
+    report.seams = seam_rows(&model, &seams);
+    model.units = units;
+    model.params = serde_json::to_string(&job.params).map_err(Failure::fault)?;
+    model.history.push(HistoryEntry { command: "fit".into(), parameters: model.params.clone() });
+    Ok((report, model))
+}
+
+/// Done, or the demanded tolerance is missed.
+pub fn verdict(report: &Report, demanded: Option<f64>) -> Status {
+    match (demanded, report.figure("surface.patch_rms_max_rel")) {
+        (Some(wanted), Some(reached)) if reached > wanted => Status::Missed,
+        _ => Status::Done,
+    }
+}
+
+/// The table of a fit.
+pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
+    let mut table = Summary::default();
+    let (unit, diagonal) = (report.input.units.as_str(), report.input.diagonal);
+    let figure = |key: &str| report.figure(key).unwrap_or(0.0);
+    let length = |key: &str| distance(figure(key), diagonal, unit);
+    let closed = if report.flag("mesh.watertight") == Some(true) { "watertight" } else { "open" };
+    table
+        .row("input", format!("{}: {} triangles, {closed}", report.input.path, count(figure("mesh.triangles") as u64)));
+    table.row("patches", count(figure("patches.count") as u64));
+    table.row("control points", count(figure("surface.control_points") as u64));
+    table.row("grids", format!("{} points, {} folds", count(figure("grid.points") as u64), figure("grid.folds")));
+    table.row("surface, RMS", length("surface.rms"));
+    table.row("surface, largest", length("surface.max"));
+    table.row("displaced, RMS", length("displaced.rms"));
+    table.row("displaced, largest", length("displaced.max"));
+    table.row(
+        "seams",
+        format!(
+            "gap {} {unit}, angle {} degrees at most, {} RMS",
+            number(figure("seam.gap_max")),
+            number(figure("seam.angle_max_deg")),
+            number(figure("seam.angle_rms_deg"))
+        ),
+    );
+    if let Some(wanted) = demanded {
+        let reached = figure("surface.patch_rms_max_rel");
+        let word = if reached > wanted { "missed" } else { "kept" };
+        table.row("tolerance", format!("{word}: {} for {} of the diagonal", number(reached), number(wanted)));
+    }
+    let seconds: f64 = report.stages.iter().map(|s| s.seconds).sum();
+    table.row("time", format!("{} s", number(seconds)));
+    table
+}
+
+fn seam_rows(model: &Model, seams: &[planish::surface::SeamQuality]) -> Vec<SeamRow> {
+    let uses = model.network.uses();
+    pipeline::worst_seams(seams)
+        .into_iter()
+        .map(|s| {
+            let sides = &uses[s.curve as usize];
+            SeamRow {
+                curve: s.curve,
+                patches: [sides[0].0, sides[1].0],
+                feature: s.kind != planish::network::CurveKind::Smooth,
+                length: s.length,
+                gap_max: s.gap_max,
+                angle_max_deg: s.angle_max_deg,
+                angle_rms_deg: s.angle_rms_deg,
+            }
+        })
+        .collect()
+}
+
+fn write_products(staged: &Staged, output: &Path, model: &Model, options: &WriteOptions) -> Result<(), Failure> {
+    let wrong = |name: &str, e: &dyn std::fmt::Display| Failure::usage(output.join(name), e);
+    let mesh = |name: &str, mesh: &TriMesh| {
+        planish_io::write_mesh(staged.path(name), mesh, options).map_err(|e| wrong(name, &e))
+    };
+    let step = StepInput {
+        network: &model.network,
+        surfaces: &model.surfaces,
+        units: model.units,
+        name: &options.name,
+        time: None,
+    };
+    mesh("mesh.ply", &model.mesh)?;
+    planish_io::write_model(staged.path("model.planish"), model).map_err(|e| wrong("model.planish", &e))?;
+    planish_io::write_step(staged.path("surface.step"), &step).map_err(|e| wrong("surface.step", &e))?;
+    planish_io::write_relief(staged.path("relief"), &model.reliefs, model.units).map_err(|e| wrong("relief", &e))?;
+    mesh("preview.glb", &pipeline::displaced_mesh(model).map_err(Failure::fault)?)
+}

@@ -1,0 +1,91 @@
+//! Inputs: meshes, models and networks from files, with what the user is told when they cannot be used.
+
+use crate::failure::Failure;
+use planish::mesh::TriMesh;
+use planish::model::{Model, Units};
+use planish::network::Network;
+use planish_io::report::Input;
+use std::path::Path;
+
+/// A mesh or a model.
+pub enum Content {
+    /// A mesh.
+    Mesh(TriMesh),
+    /// A model.
+    Model(Box<Model>),
+}
+
+/// Reads a mesh.
+/// # Errors
+/// If the file is no usable mesh.
+pub fn mesh(path: &Path) -> Result<TriMesh, Failure> {
+    if is_model(path) {
+        return Err(
+            Failure::input(path, "is a model, not a mesh").hint("export its mesh with `planish export --surface mesh`")
+        );
+    }
+    planish_io::read_mesh(path).map_err(|e| Failure::input(path, e))
+}
+
+/// Reads a model.
+/// # Errors
+/// If the file is no usable model.
+pub fn model(path: &Path) -> Result<Model, Failure> {
+    planish_io::read_model(path).map_err(|e| Failure::input(path, e))
+}
+
+/// Reads a mesh or a model, by the extension.
+/// # Errors
+/// If the file is neither.
+pub fn content(path: &Path) -> Result<Content, Failure> {
+    if is_model(path) { Ok(Content::Model(Box::new(model(path)?))) } else { Ok(Content::Mesh(mesh(path)?)) }
+}
+
+fn is_model(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("planish"))
+}
+
+/// The facts of a mesh as an input.
+pub fn mesh_facts(path: &Path, mesh: &TriMesh, units: Units) -> Input {
+    Input {
+        path: path.display().to_string(),
+        kind: "mesh".into(),
+        counts: [("triangles", mesh.triangles.len()), ("vertices", mesh.points.len())]
+            .map(|(what, n)| (what.to_owned(), n as u64))
+            .into(),
+        units: units.symbol().into(),
+        diagonal: mesh.bounds().diagonal(),
+    }
+}
+
+/// The facts of a model as an input.
+pub fn model_facts(path: &Path, model: &Model, units: Units) -> Input {
+    let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
+    let facts = [("patches", model.network.patches.len()), ("control points", control)];
+    Input {
+        kind: "model".into(),
+        counts: facts.map(|(what, n)| (what.to_owned(), n as u64)).into(),
+        ..mesh_facts(path, &model.mesh, units)
+    }
+}
+
+/// Refuses an output whose extension is not one of `wanted`.
+/// # Errors
+/// With the extensions that are possible.
+pub fn check_extension(path: &Path, wanted: &[&str]) -> Result<(), Failure> {
+    let found = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    if wanted.contains(&found.as_str()) {
+        return Ok(());
+    }
+    let list: Vec<String> = wanted.iter().map(|e| format!(".{e}")).collect();
+    Err(Failure::usage(path, "has an extension that names no format for this").hint(format!("use {}", list.join(", "))))
+}
+
+/// Reads a network on `input`, if one is given. Its places lie on the mesh as repair leaves it.
+/// # Errors
+/// If the file is no network, or one of another mesh.
+pub fn optional_network(path: Option<&Path>, input: &TriMesh) -> Result<Option<Network>, Failure> {
+    let Some(path) = path else { return Ok(None) };
+    let (repaired, _) = planish::mesh::repair(input).map_err(|e| Failure::input(path, e))?;
+    planish_io::read_network(path, &repaired).map(Some).map_err(|e| Failure::input(path, e))
+}

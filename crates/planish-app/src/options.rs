@@ -1,0 +1,306 @@
+//! Options of a stage, made from the stage's parameter struct: its fields become flags, its doc comments
+//! their help, its defaults and ranges theirs. Nothing about a parameter is declared a second time.
+//!
+//! A field `feature_angle_deg` becomes `--feature-angle-deg`; where two stages have a field of one name,
+//! each flag has its stage in front (`--grid-iterations`, `--fit-iterations`). A field that is one of several
+//! things (`resolution`: a tolerance or control points) becomes one flag for each, of which one may be given.
+
+use crate::failure::Failure;
+use clap::builder::{PossibleValuesParser, ValueParser};
+use clap::error::ErrorKind;
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
+use planish::pipeline::PipelineParams;
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+use std::marker::PhantomData;
+
+/// Fields that common options set: they get no flag of their own.
+const COMMON_FIELDS: [&str; 1] = ["seed"];
+
+/// A stage's parameter struct, with the name it has in [`PipelineParams`].
+pub trait StageParams: Default + Serialize + DeserializeOwned + JsonSchema {
+    /// Name of the stage.
+    const STAGE: &'static str;
+    /// Heading of its options in the help.
+    const HEADING: &'static str;
+}
+
+/// The options of one stage as the user gave them.
+#[derive(Clone, Debug)]
+pub struct StageOptions<P> {
+    given: Map<String, Value>,
+    params: PhantomData<P>,
+}
+
+impl<P: StageParams> StageOptions<P> {
+    /// The stage's parameters: its defaults with the given options in place.
+    /// # Errors
+    /// If the stage refuses a value.
+    pub fn params(&self, seed: Option<u64>) -> Result<P, Failure> {
+        self.merge(seed).map_err(|e| Failure::usage(format!("options of the {} stage", P::STAGE), e))
+    }
+
+    /// The number given for `variant` of the field `name`, if the user gave one.
+    pub fn given(&self, name: &str, variant: &str) -> Option<f64> {
+        self.given.get(name)?.get(variant)?.as_f64()
+    }
+
+    fn merge(&self, seed: Option<u64>) -> Result<P, serde_json::Error> {
+        let mut fields = serde_json::to_value(P::default())?;
+        if let Value::Object(fields) = &mut fields {
+            fields.extend(self.given.clone());
+            if let (Some(seed), true) = (seed, fields.contains_key("seed")) {
+                fields.insert("seed".into(), seed.into());
+            }
+        }
+        serde_json::from_value(fields)
+    }
+}
+
+impl<P: StageParams> FromArgMatches for StageOptions<P> {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let mut options = StageOptions { given: Map::new(), params: PhantomData };
+        options.update_from_arg_matches(matches)?;
+        Ok(options)
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        for field in fields::<P>() {
+            if let Some(text) = matches.get_one::<String>(&field.id) {
+                let value = field.read(text).map_err(|e| clap::Error::raw(ErrorKind::ValueValidation, e))?;
+                let value = match field.variant {
+                    Some(variant) => Value::Object(Map::from_iter([(variant, value)])),
+                    None => value,
+                };
+                self.given.insert(field.name, value);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<P: StageParams> Args for StageOptions<P> {
+    fn augment_args(mut command: Command) -> Command {
+        for field in fields::<P>() {
+            command = command.arg(field.arg().help_heading(P::HEADING));
+        }
+        command
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+/// One field of a parameter struct, as its schema describes it.
+struct Field {
+    name: String,
+    /// The variant of an enum field that the flag stands for.
+    variant: Option<String>,
+    /// Ids of the other variants: one of them at most.
+    rivals: Vec<String>,
+    id: String,
+    flag: String,
+    help: String,
+    kind: Kind,
+    optional: bool,
+}
+
+#[derive(Clone)]
+enum Kind {
+    Flag,
+    Whole { min: Option<f64>, max: Option<f64> },
+    Real { min: Option<f64>, max: Option<f64> },
+    Choice(Vec<String>),
+    Wholes { count: Option<usize> },
+}
+
+impl Field {
+    fn arg(&self) -> Arg {
+        let parser = match &self.kind {
+            Kind::Flag => ValueParser::from(PossibleValuesParser::new(["true", "false"])),
+            Kind::Choice(words) => ValueParser::from(PossibleValuesParser::new(words.clone())),
+            _ => ValueParser::string(),
+        };
+        let value_name = match self.kind {
+            Kind::Flag => "true|false",
+            Kind::Whole { .. } => "N",
+            Kind::Real { .. } => "X",
+            Kind::Choice(_) => "WORD",
+            Kind::Wholes { .. } => "N,N",
+        };
+        let arg = Arg::new(self.id.clone()).long(self.flag.clone()).help(self.help.clone()).value_name(value_name);
+        let arg = arg.value_parser(parser).action(ArgAction::Set).allow_negative_numbers(true);
+        let arg = arg.conflicts_with_all(self.rivals.clone());
+        if matches!(self.kind, Kind::Flag) { arg.num_args(0..=1).default_missing_value("true") } else { arg }
+    }
+
+    fn read(&self, text: &str) -> Result<Value, String> {
+        let wrong = |need: &str| Err(format!("invalid value '{text}' for '--{}': {need}\n", self.flag));
+        let outside =
+            |x: f64, min: &Option<f64>, max: &Option<f64>| min.is_some_and(|m| x < m) || max.is_some_and(|m| x > m);
+        let range = |min: &Option<f64>, max: &Option<f64>| match (min, max) {
+            (Some(a), Some(b)) => format!("a number from {a} to {b} is needed"),
+            (Some(a), None) => format!("a number of at least {a} is needed"),
+            (None, Some(b)) => format!("a number of at most {b} is needed"),
+            _ => "a number is needed".into(),
+        };
+        if self.optional && text == "none" {
+            return Ok(Value::Null);
+        }
+        match &self.kind {
+            Kind::Flag => Ok(Value::Bool(text == "true")),
+            Kind::Choice(_) => Ok(Value::String(text.into())),
+            Kind::Wholes { count } => {
+                let numbers: Result<Vec<u64>, _> = text.split(',').map(|n| n.trim().parse::<u64>()).collect();
+                match numbers {
+                    Ok(numbers) if count.is_none_or(|c| c == numbers.len()) => Ok(numbers.into()),
+                    _ => wrong(&match count {
+                        Some(c) => format!("{c} whole numbers with commas between are needed"),
+                        None => "whole numbers with commas between are needed".into(),
+                    }),
+                }
+            }
+            Kind::Whole { min, max } => match text.parse::<i64>() {
+                Ok(n) if !outside(n as f64, min, max) => Ok(n.into()),
+                _ => wrong(&range(min, max).replace("a number", "a whole number")),
+            },
+            Kind::Real { min, max } => match text.parse::<f64>() {
+                Ok(x) if x.is_finite() && !outside(x, min, max) => Ok(x.into()),
+                _ => wrong(&range(min, max)),
+            },
+        }
+    }
+}
+
+/// The fields of `P` that can be given on the command line.
+fn fields<P: StageParams>() -> Vec<Field> {
+    let schema = schemars::schema_for!(P);
+    let schema = schema.as_value();
+    let defaults = serde_json::to_value(P::default()).unwrap_or_default();
+    let clashes = clashing_names();
+    let Some(properties) = schema["properties"].as_object() else { return Vec::new() };
+    let mut found = Vec::new();
+    for (name, property) in properties.iter().filter(|(name, _)| !COMMON_FIELDS.contains(&name.as_str())) {
+        let id = format!("{}.{name}", P::STAGE);
+        let variants = variants_of(property, schema);
+        if let Some((kind, optional)) = kind_of(property, schema) {
+            let dashed = name.replace('_', "-");
+            let flag = if clashes.contains(name) { format!("{}-{dashed}", P::STAGE) } else { dashed };
+            let help = help_of(property, &defaults[name]);
+            let (variant, rivals) = (None, Vec::new());
+            found.push(Field { name: name.clone(), variant, rivals, id, flag, help, kind, optional });
+            continue;
+        }
+        for (variant, described, kind) in &variants {
+            let others = variants.iter().filter(|v| v.0 != *variant);
+            found.push(Field {
+                name: name.clone(),
+                variant: Some(variant.clone()),
+                rivals: others.map(|v| format!("{id}.{}", v.0)).collect(),
+                id: format!("{id}.{variant}"),
+                flag: variant.replace('_', "-"),
+                help: help_of(described, &defaults[name][variant]),
+                kind: kind.clone(),
+                optional: false,
+            });
+        }
+    }
+    found
+}
+
+/// The help of a property: its doc comment, its default, its unit.
+fn help_of(property: &Value, default: &Value) -> String {
+    let text = property["description"].as_str().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut help = text.trim_end_matches('.').to_owned();
+    match default {
+        Value::Null => {}
+        Value::String(word) => help += &format!(" [default: {word}]"),
+        value => help += &format!(" [default: {value}]"),
+    }
+    if let Some(unit) = property["unit"].as_str() {
+        help += &format!(" [unit: {unit}]");
+    }
+    help
+}
+
+/// The variants of an enum field whose variants carry one value each: name, description, kind.
+fn variants_of(property: &Value, schema: &Value) -> Vec<(String, Value, Kind)> {
+    let property = match property["$ref"].as_str().and_then(|r| r.rsplit('/').next()) {
+        Some(name) => &schema["$defs"][name],
+        None => property,
+    };
+    let mut variants = Vec::new();
+    for one in property["oneOf"].as_array().into_iter().flatten() {
+        let Some((name, content)) = one["properties"].as_object().and_then(|p| p.iter().next()) else { continue };
+        if let Some((kind, _)) = kind_of(content, schema) {
+            variants.push((name.clone(), one.clone(), kind));
+        }
+    }
+    variants
+}
+
+/// The kind of a property and whether it may be absent; `None` for nested structs.
+fn kind_of(property: &Value, schema: &Value) -> Option<(Kind, bool)> {
+    if let Some(reference) = property["$ref"].as_str() {
+        let name = reference.rsplit('/').next()?;
+        return kind_of(&schema["$defs"][name], schema);
+    }
+    if let Some(any) = property["anyOf"].as_array() {
+        let (kind, _) = any.iter().find_map(|p| kind_of(p, schema))?;
+        return Some((kind, any.iter().any(|p| p["type"] == "null")));
+    }
+    if let Some(words) = choices(property) {
+        return Some((Kind::Choice(words), false));
+    }
+    let types: Vec<&str> = match &property["type"] {
+        Value::String(t) => vec![t],
+        Value::Array(many) => many.iter().filter_map(Value::as_str).collect(),
+        _ => return None,
+    };
+    if types.contains(&"array") {
+        if property["items"]["type"] != "integer" {
+            return None;
+        }
+        let count = property["minItems"].as_u64().filter(|n| property["maxItems"].as_u64() == Some(*n));
+        return Some((Kind::Wholes { count: count.map(|n| n as usize) }, false));
+    }
+    let (min, max) = (property["minimum"].as_f64(), property["maximum"].as_f64());
+    let kind = match types.iter().find(|t| **t != "null")? {
+        &"boolean" => Kind::Flag,
+        &"integer" => Kind::Whole { min, max },
+        &"number" => Kind::Real { min, max },
+        _ => return None,
+    };
+    Some((kind, types.contains(&"null")))
+}
+
+/// The words of a plain enum.
+fn choices(property: &Value) -> Option<Vec<String>> {
+    let mut words = Vec::new();
+    for word in property["enum"].as_array().into_iter().flatten() {
+        words.push(word.as_str()?.to_owned());
+    }
+    for one in property["oneOf"].as_array().into_iter().flatten() {
+        words.push(one["const"].as_str()?.to_owned());
+    }
+    (!words.is_empty()).then_some(words)
+}
+
+/// Field names that more than one stage has.
+fn clashing_names() -> Vec<String> {
+    let stages = serde_json::to_value(PipelineParams::default()).unwrap_or_default();
+    let mut names: Vec<String> = stages
+        .as_object()
+        .into_iter()
+        .flat_map(|s| s.values())
+        .filter_map(Value::as_object)
+        .flat_map(|f| f.keys().cloned())
+        .collect();
+    names.sort();
+    let mut clashes: Vec<String> = names.windows(2).filter(|w| w[0] == w[1]).map(|w| w[0].clone()).collect();
+    clashes.dedup();
+    clashes
+}

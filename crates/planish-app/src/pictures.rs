@@ -1,0 +1,177 @@
+//! The pictures of a report: one point of view, from the input to the zebra stripes.
+
+use crate::failure::Failure;
+use planish::DVec3;
+use planish::geom::Bvh;
+use planish::mesh::TriMesh;
+use planish::model::Model;
+use planish::network::CurveKind;
+use planish::pipeline;
+use planish::relief;
+use planish::render::{self, Camera, Image, Line, Look, Paint};
+use planish_io::Up;
+use planish_io::report::{Picture, Report, Scale, number};
+use rayon::prelude::*;
+
+/// Pixels of a picture: two stand side by side on a page, sharp on screens of twice the usual density.
+const SIZE: (usize, usize) = (800, 600);
+const ASPECT: f64 = SIZE.0 as f64 / SIZE.1 as f64;
+/// Free rim around the shape, as a share of half the picture.
+const RIM: f64 = 0.06;
+/// Steps of the colour scale on the page.
+const SCALE_STEPS: usize = 12;
+/// Iso-curves drawn across a patch in each direction, besides its boundary.
+const ISO_CURVES: usize = 4;
+const CLAY: [u8; 3] = [206, 203, 196];
+const STEEL: [u8; 3] = [170, 190, 210];
+const ISO_COLOR: [u8; 3] = [255, 255, 255];
+const SEAM_COLOR: [u8; 3] = [40, 46, 54];
+const FEATURE_COLOR: [u8; 3] = [192, 38, 38];
+const GROUND: [u8; 3] = [250, 250, 251];
+/// Stripes over the half sphere: enough to show a kink of half a degree, few enough to be told apart.
+const STRIPES: f64 = 9.0;
+
+/// Draws all pictures of a report.
+/// # Errors
+/// If the parts of the model do not belong together.
+pub fn pictures(model: &Model, report: &Report, up: Up) -> Result<Vec<Picture>, Failure> {
+    let (up, toward) = match up {
+        Up::Y => (DVec3::Y, DVec3::new(0.62, 0.42, 1.0)),
+        Up::Z => (DVec3::Z, DVec3::new(-0.85, -0.75, 0.6)),
+    };
+    let camera = close_up(Camera::fit(&model.mesh.bounds(), toward, up, ASPECT), &model.mesh);
+    let draw = |mesh: &TriMesh, look: Look| {
+        let look = Look { background: Some(GROUND), ..look };
+        let image = render::render(mesh, &look, &camera, SIZE.0, SIZE.1).map_err(Failure::fault)?;
+        png(&image)
+    };
+    let base = pipeline::surface_mesh(model).map_err(Failure::fault)?;
+    let displaced = pipeline::displaced_mesh(model).map_err(Failure::fault)?;
+    let unit = report.input.units.as_str();
+    let mut pictures = Vec::new();
+    let mut add = |title: &str, caption: String, png: Vec<u8>| {
+        pictures.push(Picture { title: title.into(), caption, png, scale: None });
+    };
+
+    let input = draw(&model.mesh, Look { paint: Paint::Plain(CLAY), ..Look::default() })?;
+    let triangles = model.mesh.triangles.len();
+    add("Input", format!("The mesh after repair, {triangles} triangles."), input);
+
+    let (painted, colors) = patches(model)?;
+    let look = Look { paint: Paint::PerTriangle(&colors), lines: curves(model), hollows: 0.5, ..Look::default() };
+    let caption = "One colour per patch, with iso-curves of its grid in white. Dark lines are smooth seams, red lines \
+                   follow sharp edges or the boundary.";
+    add("Patches", caption.into(), draw(&painted, look)?);
+
+    let look = Look { paint: Paint::Plain(STEEL), ..Look::default() };
+    add("Surfaces", "The B-spline surfaces alone, as they are in surface.step.".into(), draw(&base, look.clone())?);
+    let caption = "The same surfaces with their displacement maps, as in preview.glb.";
+    add("Displaced", caption.into(), draw(&displaced, look)?);
+
+    let (values, top) = deviation(&model.mesh, &base);
+    let colors: Vec<[u8; 3]> = values.iter().map(|d| render::field_color((d / top).min(1.0))).collect();
+    let caption = "Distance of the input from the surfaces without displacement: what the maps have to carry. 98 of 100 \
+                   places lie within the scale.";
+    let look = Look { paint: Paint::PerVertex(&colors), hollows: 0.0, ..Look::default() };
+    add("Deviation", caption.into(), draw(&model.mesh, look)?);
+
+    let paint = Paint::Zebra { stripes: STRIPES };
+    let caption = "Reflected stripes on the surfaces. Where the surface bends across a seam a stripe jumps; where only \
+                   its curvature changes it has a kink.";
+    add("Zebra stripes", caption.into(), draw(&base, Look { paint, hollows: 0.0, ..Look::default() })?);
+    let steps = (0..=SCALE_STEPS).map(|k| render::field_color(k as f64 / SCALE_STEPS as f64));
+    let labels = [0.0, 0.5, 1.0].map(|x| format!("{} {unit}", number(x * top)));
+    if let Some(picture) = pictures.iter_mut().find(|p| p.title == "Deviation") {
+        picture.scale = Some(Scale { colors: steps.collect(), labels: labels.into() });
+    }
+    Ok(pictures)
+}
+
+/// `camera` moved so that `mesh` just fills the picture.
+fn close_up(camera: Camera, mesh: &TriMesh) -> Camera {
+    let mut camera = camera;
+    // Moving aside changes the perspective a little: the second round settles it.
+    for _ in 0..3 {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let slopes = [camera.slope * ASPECT, camera.slope].map(|s| s * (1.0 - RIM));
+        let seen = |p: &DVec3| {
+            let q = *p - camera.eye;
+            (q.dot(camera.forward), [q.dot(camera.right) / slopes[0], q.dot(camera.up) / slopes[1]])
+        };
+        // In units of the distance at which a point touches the picture's side: x - depth and x + depth.
+        for (depth, place) in mesh.points.iter().map(seen) {
+            for k in 0..2 {
+                low[k] = low[k].min(place[k] + depth);
+                high[k] = high[k].max(place[k] - depth);
+            }
+        }
+        if !low.iter().chain(&high).all(|x| x.is_finite()) {
+            return camera;
+        }
+        let aside = [0, 1].map(|k| (high[k] + low[k]) / 2.0 * slopes[k]);
+        let nearer = [0, 1].map(|k| (low[k] - high[k]) / 2.0);
+        camera.eye += camera.right * aside[0] + camera.up * aside[1] + camera.forward * nearer[0].min(nearer[1]);
+    }
+    camera
+}
+
+/// The displaced patches side by side, each triangle in the colour of its patch.
+fn patches(model: &Model) -> Result<(TriMesh, Vec<[u8; 3]>), Failure> {
+    let palette = render::even_colors(model.network.patches.len());
+    let (mut all, mut colors) = (TriMesh::default(), Vec::new());
+    for (grid, color) in model.grids.iter().zip(palette) {
+        let patch = relief::patch_mesh(grid.points.clone(), grid.rows, grid.cols).map_err(Failure::fault)?;
+        let first = all.points.len() as u32;
+        all.points.extend(patch.points);
+        all.triangles.extend(patch.triangles.iter().map(|t| t.map(|v| v + first)));
+        colors.resize(all.triangles.len(), color);
+    }
+    Ok((all, colors))
+}
+
+/// Iso-curves of the grids and the curves of the network.
+fn curves(model: &Model) -> Vec<Line> {
+    let mut lines = Vec::new();
+    for grid in &model.grids {
+        let inner = |count: usize| (1..=ISO_CURVES).map(move |k| k * (count - 1) / (ISO_CURVES + 1));
+        for i in inner(grid.cols) {
+            let points = (0..grid.rows).map(|j| grid.points[j * grid.cols + i]).collect();
+            lines.push(Line { points, color: ISO_COLOR, width: 0.8 });
+        }
+        for j in inner(grid.rows) {
+            let points = grid.points[j * grid.cols..(j + 1) * grid.cols].to_vec();
+            lines.push(Line { points, color: ISO_COLOR, width: 0.8 });
+        }
+    }
+    for curve in &model.network.curves {
+        let points = curve.points.iter().map(|p| p.position(&model.mesh)).collect();
+        let (color, width) = if curve.kind == CurveKind::Smooth { (SEAM_COLOR, 1.6) } else { (FEATURE_COLOR, 2.2) };
+        lines.push(Line { points, color, width });
+    }
+    lines
+}
+
+/// Distance of each vertex from the surfaces, and the end of a scale that 98 of 100 of them keep.
+fn deviation(mesh: &TriMesh, surface: &TriMesh) -> (Vec<f64>, f64) {
+    let tree = Bvh::new(surface);
+    let values: Vec<f64> = mesh.points.par_iter().map(|p| tree.closest(*p).distance).collect();
+    let mut sorted = values.clone();
+    sorted.sort_by(f64::total_cmp);
+    let top = sorted.get(sorted.len() * 98 / 100).copied().unwrap_or(0.0);
+    // A surface that is exact has a scale nevertheless.
+    let least = mesh.bounds().diagonal() * 1e-9;
+    (values, top.max(least).max(f64::MIN_POSITIVE))
+}
+
+/// A picture as a PNG file.
+fn png(image: &Image) -> Result<Vec<u8>, Failure> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, image.width as u32, image.height as u32);
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    let mut writer = encoder.write_header().map_err(Failure::fault)?;
+    writer.write_image_data(&image.rgba).map_err(Failure::fault)?;
+    writer.finish().map_err(Failure::fault)?;
+    Ok(bytes)
+}

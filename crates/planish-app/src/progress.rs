@@ -1,0 +1,146 @@
+//! Progress on stderr and Ctrl-C.
+
+use crate::failure::Status;
+use crate::products;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use planish::Observer;
+use planish::pipeline::{PipelineObserver, StageRecord};
+use std::io::{IsTerminal, Write};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// A stage shows its bar once it has run for this long: shorter ones would only flicker.
+const SHOW_AFTER: Duration = Duration::from_millis(500);
+/// After Ctrl-C a stage has this long to notice; then the program ends without it. The promise is one second.
+const GRACE: Duration = Duration::from_millis(800);
+/// Steps of a bar.
+const STEPS: u64 = 1000;
+
+static CANCELLED: AtomicBool = AtomicBool::new(false);
+
+/// Makes Ctrl-C end the program within a second, with nothing half-written left.
+pub fn watch_interrupts() {
+    // A second handler cannot be set; then the first one is there already.
+    let _ = ctrlc::set_handler(|| {
+        CANCELLED.store(true, Ordering::SeqCst);
+        std::thread::sleep(GRACE);
+        products::abandon_and_exit(Status::Interrupted as u8);
+    });
+}
+
+/// True once the user has pressed Ctrl-C.
+pub fn interrupted() -> bool {
+    CANCELLED.load(Ordering::SeqCst)
+}
+
+/// Bars for the stages of a command: one per stage that takes longer than half a second, on stderr when it
+/// is a terminal.
+pub struct Bars {
+    bars: bool,
+    verbose: bool,
+    current: Mutex<Option<Current>>,
+}
+
+struct Current {
+    bar: ProgressBar,
+    since: Instant,
+    shown: bool,
+}
+
+impl Bars {
+    /// Bars unless `quiet`; with `verbose` a line for each stage that ends.
+    pub fn new(quiet: bool, verbose: bool) -> Bars {
+        let bars = !quiet && std::io::stderr().is_terminal();
+        Bars { bars, verbose: verbose && !quiet, current: Mutex::new(None) }
+    }
+
+    /// Runs one step outside the pipeline (reading, writing, drawing) under a bar of its own.
+    pub fn step<T>(&self, name: &'static str, work: impl FnOnce(&dyn Observer) -> T) -> (T, StageRecord) {
+        self.begins(name, 0.0);
+        let start = Instant::now();
+        let result = work(self);
+        let (seconds, peak_bytes) = (start.elapsed().as_secs_f64(), peak_bytes());
+        let record = StageRecord { name: name.into(), seconds, peak_bytes, counts: Default::default() };
+        self.ends(&record);
+        (result, record)
+    }
+
+    fn advance(&self, fraction: f64) {
+        let Ok(mut current) = self.current.lock() else { return };
+        let Some(current) = current.as_mut() else { return };
+        current.bar.set_position((fraction * STEPS as f64) as u64);
+        if !current.shown && current.since.elapsed() > SHOW_AFTER {
+            current.bar.set_draw_target(ProgressDrawTarget::stderr());
+            current.shown = true;
+        }
+    }
+}
+
+impl Observer for Bars {
+    fn progress(&self, fraction: f64) {
+        self.advance(fraction);
+    }
+
+    fn cancelled(&self) -> bool {
+        interrupted()
+    }
+}
+
+impl PipelineObserver for Bars {
+    fn begins(&self, name: &'static str, _of_run: f64) {
+        if !self.bars {
+            return;
+        }
+        let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::hidden());
+        let style = ProgressStyle::with_template("{prefix:>9} {bar:36} {percent:>3} %  {eta} left");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_prefix(name);
+        if let Ok(mut current) = self.current.lock() {
+            *current = Some(Current { bar, since: Instant::now(), shown: false });
+        }
+    }
+
+    fn progress(&self, of_stage: f64, _of_run: f64) {
+        self.advance(of_stage);
+    }
+
+    fn ends(&self, record: &StageRecord) {
+        if let Ok(mut current) = self.current.lock()
+            && let Some(done) = current.take()
+        {
+            done.bar.finish_and_clear();
+        }
+        if self.verbose {
+            let counts: Vec<String> = record.counts.iter().map(|(key, n)| format!("{key} {n}")).collect();
+            let line = format!("{:>9} {:8.2} s  {}", record.name, record.seconds, counts.join(", "));
+            let _ = writeln!(std::io::stderr(), "{}", line.trim_end());
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        interrupted()
+    }
+
+    fn peak_bytes(&self) -> u64 {
+        peak_bytes()
+    }
+}
+
+impl Drop for Bars {
+    fn drop(&mut self) {
+        if let Ok(mut current) = self.current.lock()
+            && let Some(unfinished) = current.take()
+        {
+            unfinished.bar.finish_and_clear();
+        }
+    }
+}
+
+/// Largest memory that this process has held, in bytes; 0 where the system does not tell.
+pub fn peak_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    let kilobytes = line.and_then(|l| l.trim().strip_suffix("kB")).and_then(|n| n.trim().parse::<u64>().ok());
+    kilobytes.unwrap_or(0) * 1024
+}

@@ -1,0 +1,324 @@
+//! The built program as a user meets it: help, statuses, messages, products whole or not at all.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+fn planish(args: &[&str], folder: &Path) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_planish"));
+    command.args(args).current_dir(folder).stdin(Stdio::null());
+    command.output().expect("the program starts")
+}
+
+fn status(output: &Output) -> i32 {
+    output.status.code().expect("an exit status")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// The one line of an error, checked for its form.
+fn error_line(output: &Output) -> String {
+    let text = stderr(output);
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines.len(), 1, "one line, not: {text}");
+    assert!(lines[0].starts_with("error: "), "{text}");
+    lines[0].to_owned()
+}
+
+/// A closed box of `n x n` squares per face, as a PLY file, unit edge.
+fn write_box(path: &Path, n: usize) {
+    let mut points: Vec<[i64; 3]> = Vec::new();
+    let mut triangles: Vec<[usize; 3]> = Vec::new();
+    let m = n as i64;
+    let mut index = |p: [i64; 3]| {
+        points.iter().position(|q| *q == p).unwrap_or_else(|| {
+            points.push(p);
+            points.len() - 1
+        })
+    };
+    for axis in 0..3 {
+        for side in [0, m] {
+            for a in 0..m {
+                for b in 0..m {
+                    let mut at = |a: i64, b: i64| {
+                        let mut p = [0; 3];
+                        (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (side, a, b);
+                        index(p)
+                    };
+                    let [w, x, y, z] = [at(a, b), at(a + 1, b), at(a + 1, b + 1), at(a, b + 1)];
+                    for t in [[w, x, y], [w, y, z]] {
+                        triangles.push(if side == 0 { [t[0], t[2], t[1]] } else { t });
+                    }
+                }
+            }
+        }
+    }
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        points.len(),
+        triangles.len()
+    );
+    for p in &points {
+        text += &format!("{} {} {}\n", p[0] as f64 / m as f64, p[1] as f64 / m as f64, p[2] as f64 / m as f64);
+    }
+    for t in &triangles {
+        text += &format!("3 {} {} {}\n", t[0], t[1], t[2]);
+    }
+    fs::write(path, text).unwrap();
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn help_shows_the_commands_in_the_order_of_the_pipeline() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = planish(&["--help"], folder.path());
+    assert_eq!(status(&output), 0);
+    let text = stdout(&output);
+    let at = |word: &str| text.find(&format!("\n  {word} ")).unwrap_or_else(|| panic!("no {word} in\n{text}"));
+    let places: Vec<usize> = ["demo", "run", "layout", "fit", "export", "compare", "info"].map(at).into();
+    assert!(places.is_sorted(), "{text}");
+}
+
+#[test]
+fn every_command_has_help_and_every_option_of_it_a_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    for command in ["demo", "run", "layout", "fit", "export", "compare", "info"] {
+        let output = planish(&[command, "--help"], folder.path());
+        assert_eq!(status(&output), 0, "{command}");
+        let text = stdout(&output);
+        assert!(text.contains("--report") && text.contains("--threads") && text.contains("--units"), "{command}");
+        let mut lines = text.lines().peekable();
+        while let Some(line) = lines.next() {
+            if line.trim_start().starts_with("--") || line.trim_start().starts_with('-') && line.contains(", --") {
+                let told =
+                    line.trim().split("  ").count() > 1 || lines.peek().is_some_and(|l| l.starts_with("          "));
+                assert!(told, "{command}: no help for {line}");
+            }
+        }
+    }
+}
+
+#[test]
+fn version_is_told_with_status_0() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = planish(&["--version"], folder.path());
+    assert_eq!((status(&output), stdout(&output).trim()), (0, concat!("planish ", env!("CARGO_PKG_VERSION"))));
+}
+
+#[test]
+fn wrong_usage_is_status_2() {
+    let folder = tempfile::tempdir().unwrap();
+    write_box(&folder.path().join("box.ply"), 2);
+    for args in [
+        &["polish"][..],
+        &["run", "box.ply"],
+        &["run", "box.ply", "-o", "out", "--no-such-option"],
+        &["run", "box.ply", "-o", "out", "--threads", "0"],
+        &["run", "box.ply", "-o", "out", "--units", "furlong"],
+        &["run", "box.ply", "-o", "out", "-q", "-v"],
+        &["run", "box.ply", "-o", "out", "--density", "many"],
+        &["run", "box.ply", "-o", "out", "--density", "-1"],
+        &["info", "box.ply", "--report", "facts.txt"],
+        &["layout", "box.ply", "-o", "network.xml"],
+        &["fit", "box.ply", "-o", "model.step"],
+    ] {
+        let output = planish(args, folder.path());
+        assert_eq!(status(&output), 2, "{args:?}: {}", stderr(&output));
+        assert!(stderr(&output).starts_with("error: "), "{args:?}: {}", stderr(&output));
+        assert_eq!(names(folder.path()), ["box.ply"], "{args:?} left something");
+    }
+}
+
+#[test]
+fn unusable_input_is_status_3_with_file_and_hint_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
+    write("empty.ply", b"");
+    write("words.ply", b"this is no mesh\n");
+    write("short.ply", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0");
+    write("lying.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n");
+    write("index.ply", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n");
+    write("cloud.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n");
+    write("part.docx", b"PK");
+    write("broken.planish", b"SQLite format 3\0 but not really");
+    let before = names(folder.path());
+    for name in [
+        "none.ply",
+        "empty.ply",
+        "words.ply",
+        "short.ply",
+        "lying.ply",
+        "index.ply",
+        "cloud.ply",
+        "part.docx",
+        "broken.planish",
+    ] {
+        for args in [
+            &["run", name, "-o", "out"][..],
+            &["info", name],
+            &["compare", name, name],
+            &["fit", name, "-o", "m.planish"],
+        ] {
+            let output = planish(args, folder.path());
+            assert_eq!(status(&output), 3, "{args:?}: {}", stderr(&output));
+            let line = error_line(&output);
+            assert!(line.starts_with(&format!("error: {name}: ")), "{line}");
+            assert!(line.contains(" - hint: "), "{line}");
+            assert_eq!(names(folder.path()), before, "{args:?} left something");
+        }
+    }
+}
+
+#[test]
+fn a_network_of_another_mesh_or_of_no_sense_is_status_3() {
+    let folder = tempfile::tempdir().unwrap();
+    write_box(&folder.path().join("box.ply"), 3);
+    for (name, text) in [
+        ("words.json", "no json"),
+        ("list.json", "[]"),
+        ("far.json", r#"{"corners":[{"place":{"face":99999,"bary":[1,0,0]}}],"curves":[],"patches":[]}"#),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+        let output = planish(&["fit", "box.ply", "--network", name, "-o", "m.planish"], folder.path());
+        assert_eq!(status(&output), 3, "{name}: {}", stderr(&output));
+        assert!(error_line(&output).starts_with(&format!("error: {name}: ")), "{}", stderr(&output));
+        assert!(!folder.path().join("m.planish").exists());
+    }
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_told_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    write_box(&folder.path().join("box.ply"), 2);
+    fs::write(folder.path().join("file"), "x").unwrap();
+    fs::create_dir(folder.path().join("dir")).unwrap();
+    for args in [
+        &["run", "box.ply", "-o", "file"][..],
+        &["run", "box.ply", "-o", "file/out"],
+        &["fit", "box.ply", "-o", "dir"],
+        &["fit", "box.ply", "-o", "nowhere/m.planish"],
+        &["layout", "box.ply", "-o", "nowhere/n.json"],
+        &["info", "box.ply", "--report", "nowhere/r.json"],
+    ] {
+        let output = planish(args, folder.path());
+        assert_eq!(status(&output), 2, "{args:?}: {}", stderr(&output));
+        assert!(error_line(&output).contains(" - hint: "), "{}", stderr(&output));
+        assert_eq!(names(folder.path()), ["box.ply", "dir", "file"], "{args:?} left something");
+    }
+}
+
+#[test]
+fn run_leaves_all_products_and_the_same_bytes_on_1_and_2_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    write_box(&folder.path().join("box.ply"), 6);
+    // A folder that is there already, with a file of the user's own and an old product.
+    fs::create_dir(folder.path().join("one")).unwrap();
+    fs::write(folder.path().join("one/notes.txt"), "mine").unwrap();
+    fs::write(folder.path().join("one/surface.step"), "old").unwrap();
+    for (out, threads) in [("one", "1"), ("two", "2")] {
+        let output = planish(
+            &["run", "box.ply", "-o", out, "--threads", threads, "--units", "cm", "--patches", "6"],
+            folder.path(),
+        );
+        assert_eq!(status(&output), 0, "{}", stderr(&output));
+        assert!(stderr(&output).is_empty(), "not a terminal: no bars, and nothing to warn of: {}", stderr(&output));
+        assert!(stdout(&output).contains("patches"), "{}", stdout(&output));
+    }
+    let products = ["mesh.ply", "model.planish", "preview.glb", "relief", "report.html", "report.json", "surface.step"];
+    assert_eq!(names(&folder.path().join("two")), products);
+    assert_eq!(fs::read_to_string(folder.path().join("one/notes.txt")).unwrap(), "mine");
+    assert_eq!(names(folder.path()), ["box.ply", "one", "two"]);
+    let read = |out: &str, name: &str| fs::read(folder.path().join(out).join(name)).unwrap();
+    for name in ["mesh.ply", "model.planish", "preview.glb", "surface.step"] {
+        assert!(read("one", name) == read("two", name), "{name} differs");
+    }
+    for name in names(&folder.path().join("two/relief")) {
+        let name = format!("relief/{name}");
+        assert!(read("one", &name) == read("two", &name), "{name} differs");
+    }
+    let report: serde_json::Value = serde_json::from_slice(&read("two", "report.json")).unwrap();
+    assert_eq!(report["input"]["units"], "cm");
+    assert_eq!(report["quality"]["mesh.watertight"], true);
+    assert_eq!(report["quality"]["grid.folds"], 0);
+    assert_eq!(report["quality"]["patches.count"], 6);
+}
+
+#[test]
+fn layout_then_fit_then_export_then_compare_works_step_by_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_box(&path.join("box.ply"), 6);
+    let done = |args: &[&str]| {
+        let output = planish(args, path);
+        assert_eq!(status(&output), 0, "{args:?}: {}", stderr(&output));
+        stdout(&output)
+    };
+    done(&["layout", "box.ply", "-o", "network.json", "--patches", "6"]);
+    done(&["fit", "box.ply", "--network", "network.json", "-o", "box.planish", "--report", "fit.json"]);
+    for name in ["box.step", "box.glb", "box-surface.ply", "box.stl", "box.obj"] {
+        done(&["export", "box.planish", "-o", name]);
+        assert!(fs::metadata(path.join(name)).unwrap().len() > 100, "{name}");
+    }
+    assert!(done(&["info", "box.planish"]).contains("patches"));
+    assert!(done(&["info", "box.ply"]).contains("watertight"));
+    let table = done(&["compare", "box.ply", "box.planish", "--report", "compare.json"]);
+    assert!(table.contains("distance"), "{table}");
+    let report: serde_json::Value = serde_json::from_slice(&fs::read(path.join("compare.json")).unwrap()).unwrap();
+    // A box of flat faces: its surface is exact.
+    assert!(report["quality"]["distance.max_rel"].as_f64().unwrap() < 1e-9, "{report}");
+    let missed = planish(&["export", "box.planish", "-o", "box.docx"], path);
+    assert_eq!(status(&missed), 2, "{}", stderr(&missed));
+    assert!(error_line(&missed).contains("step"), "the hint names the formats: {}", stderr(&missed));
+}
+
+#[test]
+fn a_demanded_tolerance_that_is_missed_is_status_1_and_the_result_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    write_box(&folder.path().join("box.ply"), 3);
+    write_box(&folder.path().join("finer.ply"), 4);
+    let shifted = fs::read_to_string(folder.path().join("finer.ply")).unwrap().replace("\n1 1 1\n", "\n1.5 1.5 1.5\n");
+    fs::write(folder.path().join("finer.ply"), shifted).unwrap();
+    let compare = |tolerance: &str| {
+        planish(&["compare", "box.ply", "finer.ply", "--tolerance", tolerance, "--report", "r.json"], folder.path())
+    };
+    let (far, near) = (compare("0.1"), compare("10"));
+    assert_eq!((status(&far), status(&near)), (1, 0), "{}{}", stderr(&far), stderr(&near));
+    assert!(folder.path().join("r.json").exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_within_1_s_with_status_130_and_no_partial_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_planish"))
+        .args(["demo", "-o", "out", "--triangles", "400000"])
+        .current_dir(folder.path())
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(1500));
+    assert!(child.try_wait().unwrap().is_none(), "the run ended before it could be interrupted");
+    let pressed = Instant::now();
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let ended = child.wait().unwrap();
+    let took = pressed.elapsed();
+    assert_eq!(ended.code(), Some(130));
+    assert!(took < Duration::from_millis(1500), "took {took:?}");
+    assert!(names(folder.path()).is_empty(), "left {:?}", names(folder.path()));
+}

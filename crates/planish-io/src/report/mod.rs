@@ -1,0 +1,103 @@
+//! The report of a run: `report.json` for programs, `report.html` for people.
+//!
+//! Both are written from one [`Report`]; the page adds pictures. Keys are documented in the guide and only
+//! ever added to.
+
+mod page;
+mod words;
+
+pub use page::{Picture, Scale, html};
+pub use words::{count, distance, number, percent};
+
+use planish::pipeline::{Figure, Quality, StageRecord, Warning};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What a command tells of its work.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// Version of the program.
+    pub planish: String,
+    /// Name of the command.
+    pub command: String,
+    /// What went in.
+    pub input: Input,
+    /// Stages in the order they ran.
+    pub stages: Vec<StageRecord>,
+    /// Figures of quality by key: flat; distances in input units, with `_rel` fractions of the diagonal.
+    pub quality: Quality,
+    /// What a user should know.
+    pub warnings: Vec<Warning>,
+    /// Seams, worst first; absent where no seam was measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub seams: Vec<SeamRow>,
+}
+
+/// What went into a command.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Input {
+    /// Path as the user gave it.
+    pub path: String,
+    /// `mesh`, `model` or `network`.
+    pub kind: String,
+    /// How many of what.
+    pub counts: BTreeMap<String, u64>,
+    /// What one unit of a coordinate is: `mm`, `cm`, `m`, `in`.
+    pub units: String,
+    /// Diagonal of the bounding box, input units.
+    pub diagonal: f64,
+}
+
+/// One seam between two patches.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SeamRow {
+    /// Curve of the network.
+    pub curve: u32,
+    /// The patches on its two sides.
+    pub patches: [u32; 2],
+    /// True along a feature: such a seam is meant to have an angle.
+    pub feature: bool,
+    /// Length of the seam, input units.
+    pub length: f64,
+    /// Largest distance between the two boundaries, input units.
+    pub gap_max: f64,
+    /// Largest angle between the two normals, degrees.
+    pub angle_max_deg: f64,
+    /// Root mean square of that angle, degrees.
+    pub angle_rms_deg: f64,
+}
+
+impl Report {
+    /// A report without results yet.
+    pub fn new(command: &str, input: Input) -> Report {
+        Report {
+            planish: env!("CARGO_PKG_VERSION").into(),
+            command: command.into(),
+            input,
+            stages: Vec::new(),
+            quality: Quality::new(),
+            warnings: Vec::new(),
+            seams: Vec::new(),
+        }
+    }
+
+    /// The report as JSON text.
+    pub fn to_json(&self) -> String {
+        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
+    /// A figure by its key, as a number.
+    pub fn figure(&self, key: &str) -> Option<f64> {
+        self.quality.get(key).map(|f| f.value())
+    }
+
+    /// A yes-or-no figure by its key.
+    pub fn flag(&self, key: &str) -> Option<bool> {
+        match self.quality.get(key) {
+            Some(Figure::Flag(yes)) => Some(*yes),
+            _ => None,
+        }
+    }
+}

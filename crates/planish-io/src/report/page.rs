@@ -1,0 +1,401 @@
+//! The page: one self-contained HTML file without scripts and without anything from outside.
+
+use super::words::{count, distance, number, percent};
+use super::{Report, SeamRow};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use planish::pipeline::Figure;
+use std::fmt::Write;
+
+/// Rows of the table of seams; the rest are in `report.json`.
+const SEAMS_SHOWN: usize = 15;
+/// Gaps below this fraction of the diagonal are rounding: the boundary is shared.
+const ROUNDING: f64 = 1e-12;
+const STYLE: &str = include_str!("style.css");
+
+/// A picture of the page.
+pub struct Picture {
+    /// What it shows, in a few words.
+    pub title: String,
+    /// One or two sentences on how to read it.
+    pub caption: String,
+    /// The picture as a PNG file.
+    pub png: Vec<u8>,
+    /// Meaning of its colours, if they have one.
+    pub scale: Option<Scale>,
+}
+
+/// The meaning of a picture's colours.
+pub struct Scale {
+    /// Colours from the least to the greatest value, evenly spaced, sRGB.
+    pub colors: Vec<[u8; 3]>,
+    /// Labels from the least to the greatest value, evenly spaced.
+    pub labels: Vec<String>,
+}
+
+/// Figures of quality in words: key, meaning, and how the value is read.
+const FIGURES: [(&str, &str, Reading); 23] = [
+    ("mesh.triangles", "Triangles of the mesh after repair", Reading::Plain),
+    ("mesh.watertight", "The mesh is closed", Reading::Plain),
+    ("mesh.manifold", "The mesh is manifold", Reading::Plain),
+    ("mesh.feature_edges", "Sharp edges found", Reading::Plain),
+    ("patches.count", "Four-sided patches", Reading::Plain),
+    ("patches.irregular_corners", "Corners where not four patches meet", Reading::Plain),
+    ("grid.points", "Points of all grids", Reading::Plain),
+    ("grid.folds", "Folded grid cells", Reading::Plain),
+    ("grid.spacing_cv", "Unevenness of grid spacing (deviation over mean)", Reading::Fraction),
+    ("surface.control_points", "Control points of all surfaces", Reading::Plain),
+    ("surface.rms", "Surface to input, root mean square", Reading::Length),
+    ("surface.p95", "Surface to input, 95 of 100 places are closer", Reading::Length),
+    ("surface.max", "Surface to input, largest", Reading::Length),
+    ("displaced.rms", "Displaced surface to input, root mean square", Reading::Length),
+    ("displaced.p95", "Displaced surface to input, 95 of 100 places are closer", Reading::Length),
+    ("displaced.max", "Displaced surface to input, largest", Reading::Length),
+    ("seam.count", "Seams between two patches", Reading::Plain),
+    ("seam.gap_max", "Largest gap along a seam", Reading::Length),
+    ("seam.angle_max_deg", "Largest angle across a smooth seam", Reading::Degrees),
+    ("seam.angle_rms_deg", "Angle across smooth seams, root mean square", Reading::Degrees),
+    ("relief.texels", "Texels of all displacement maps", Reading::Plain),
+    ("relief.max", "Largest displacement", Reading::Length),
+    ("relief.roundtrip_max", "Surface plus displacement against the grid, largest", Reading::Length),
+];
+
+#[derive(Clone, Copy, PartialEq)]
+enum Reading {
+    Plain,
+    Fraction,
+    Length,
+    Degrees,
+}
+
+/// The page for `report`, with `pictures` in their order.
+pub fn html(report: &Report, pictures: &[Picture]) -> String {
+    let mut page = String::new();
+    let name = report.input.path.rsplit(['/', '\\']).next().unwrap_or_default();
+    let _ = write!(
+        page,
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{} - planish report</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n",
+        escape(name)
+    );
+    header(&mut page, report, name);
+    lead(&mut page, report);
+    tiles(&mut page, report);
+    warnings(&mut page, report);
+    gallery(&mut page, pictures);
+    seams(&mut page, report);
+    figures(&mut page, report);
+    stages(&mut page, report);
+    let _ = write!(
+        page,
+        "<footer>Made by planish {} (<code>planish {}</code>). Distances are measured in both directions, from the \
+         surface to the input mesh and back. The same figures are in <code>report.json</code>.</footer>\n\
+         </main>\n</body>\n</html>\n",
+        escape(&report.planish),
+        escape(&report.command)
+    );
+    page
+}
+
+fn header(page: &mut String, report: &Report, name: &str) {
+    let input = &report.input;
+    let mut facts: Vec<String> = input.counts.iter().map(|(what, &n)| format!("{} {what}", count(n))).collect();
+    facts.push(format!("{} {} across", number(input.diagonal), input.units));
+    let _ = write!(
+        page,
+        "<header>\n<p class=\"mark\">planish report</p>\n<h1>{}</h1>\n<p class=\"facts\">{}</p>\n</header>\n",
+        escape(name),
+        escape(&facts.join(" \u{b7} "))
+    );
+}
+
+/// The result in one or two sentences.
+fn lead(page: &mut String, report: &Report) {
+    let Some(patches) = report.figure("patches.count") else { return };
+    let mut text = format!("{} four-sided B-spline patches", count(patches as u64));
+    if let (Some(rms), Some(max)) = (report.figure("surface.rms_rel"), report.figure("surface.max_rel")) {
+        text += &format!(
+            " follow the input to {} of its diagonal on average and {} at the worst place",
+            percent(rms),
+            percent(max)
+        );
+    }
+    text += ".";
+    if let Some(rms) = report.figure("displaced.rms_rel") {
+        text += &format!(" With the displacement maps applied the average is {}.", percent(rms));
+    }
+    if let (Some(gap), Some(angle)) = (report.figure("seam.gap_max"), report.figure("seam.angle_max_deg")) {
+        let closed = if gap <= ROUNDING * report.input.diagonal {
+            "Neighbours share their boundaries exactly".to_owned()
+        } else {
+            format!("Neighbours meet within {} {}", number(gap), report.input.units)
+        };
+        text += &format!(" {closed}; across smooth seams the normals turn by {}° at most.", number(angle));
+    }
+    let _ = writeln!(page, "<p class=\"lead\">{}</p>", escape(&text));
+}
+
+fn tiles(page: &mut String, report: &Report) {
+    let unit = report.input.units.as_str();
+    let length = |key: &str| {
+        let rel = report.figure(&format!("{key}_rel"))?;
+        Some((number(rel * 100.0), "%", format!("{} {unit}", number(report.figure(key)?))))
+    };
+    let seconds: f64 = report.stages.iter().map(|s| s.seconds).sum();
+    let mut row: Vec<(String, &str, &str, String)> = Vec::new();
+    let control = report.figure("surface.control_points");
+    if let Some(n) = report.figure("patches.count") {
+        let detail = control.map(|c| format!("{} control points", count(c as u64))).unwrap_or_default();
+        row.push((count(n as u64), "", "Patches", detail));
+    }
+    for (key, name) in [
+        ("surface.rms", "Mean deviation"),
+        ("surface.max", "Largest deviation"),
+        ("displaced.rms", "With displacement"),
+    ] {
+        if let Some((value, small, detail)) = length(key) {
+            row.push((value, small, name, detail));
+        }
+    }
+    if let Some(angle) = report.figure("seam.angle_max_deg") {
+        let gap = gap_of(report, report.figure("seam.gap_max").unwrap_or(0.0));
+        row.push((number(angle), "°", "Seam angle, worst", format!("gap {} {unit}", number(gap))));
+    }
+    if !report.stages.is_empty() {
+        row.push((number(seconds), "s", "Computing time", format!("{} stages", report.stages.len())));
+    }
+    if row.is_empty() {
+        return;
+    }
+    page.push_str("<div class=\"tiles\">\n");
+    for (value, small, name, detail) in row {
+        let _ = writeln!(
+            page,
+            "<div class=\"tile\"><b>{}{}<small>{small}</small></b><span>{name}</span><i>{}</i></div>",
+            escape(&value),
+            if small.is_empty() || small == "°" { "" } else { "\u{202f}" },
+            escape(&detail)
+        );
+    }
+    page.push_str("</div>\n");
+}
+
+fn warnings(page: &mut String, report: &Report) {
+    if report.warnings.is_empty() {
+        return;
+    }
+    let title = match report.warnings.len() {
+        1 => "One thing to know".to_owned(),
+        n => format!("{n} things to know"),
+    };
+    let _ = write!(page, "<div class=\"warnings\"><b>{title}</b>\n<ul>\n");
+    for warning in &report.warnings {
+        let _ = write!(page, "<li>{}", escape(&warning.message));
+        if !warning.place.is_empty() {
+            let _ = write!(page, " <span class=\"where\">({})</span>", escape(&warning.place));
+        }
+        page.push_str("</li>\n");
+    }
+    page.push_str("</ul></div>\n");
+}
+
+fn gallery(page: &mut String, pictures: &[Picture]) {
+    if pictures.is_empty() {
+        return;
+    }
+    page.push_str(
+        "<h2>Pictures</h2>\n<p class=\"note\">All from the same point of view.</p>\n<div class=\"pictures\">\n",
+    );
+    for picture in pictures {
+        let _ = write!(
+            page,
+            "<figure><img alt=\"{}\" src=\"data:image/png;base64,{}\">\n<figcaption><b>{}</b><span>{}</span>",
+            escape(&picture.title),
+            STANDARD.encode(&picture.png),
+            escape(&picture.title),
+            escape(&picture.caption)
+        );
+        if let Some(scale) = &picture.scale {
+            let stops: Vec<String> = scale.colors.iter().map(|c| format!("rgb({},{},{})", c[0], c[1], c[2])).collect();
+            let labels: String = scale.labels.iter().map(|l| format!("<span>{}</span>", escape(l))).collect();
+            let _ = write!(
+                page,
+                "<div class=\"scale\"><div style=\"background:linear-gradient(90deg,{})\"></div><p>{labels}</p></div>",
+                stops.join(",")
+            );
+        }
+        page.push_str("</figcaption></figure>\n");
+    }
+    page.push_str("</div>\n");
+}
+
+fn seams(page: &mut String, report: &Report) {
+    if report.seams.is_empty() {
+        return;
+    }
+    let smooth: Vec<&SeamRow> = report.seams.iter().filter(|s| !s.feature).collect();
+    let sharp = report.seams.len() - smooth.len();
+    let mut note = format!(
+        "Across a smooth seam the surface should not bend: the angle is that between the two normals. {} smooth seams",
+        smooth.len()
+    );
+    if sharp > 0 {
+        note += &format!("; {sharp} more follow sharp edges, where the angle is wanted");
+    }
+    note += ".";
+    if smooth.len() > SEAMS_SHOWN {
+        note += &format!(" The worst {SEAMS_SHOWN}:");
+    }
+    let _ = write!(
+        page,
+        "<h2>Seams</h2>\n<p class=\"note\">{}</p>\n<div class=\"scroll\"><table><thead><tr><th>Curve</th>\
+         <th>Between patches</th><th class=\"n\">Angle, largest</th><th class=\"n\">Angle, RMS</th>\
+         <th class=\"n\">Gap</th><th class=\"n\">Length</th></tr></thead><tbody>\n",
+        escape(&note)
+    );
+    for seam in smooth.iter().take(SEAMS_SHOWN) {
+        let _ = writeln!(
+            page,
+            "<tr><td>{}</td><td>{} and {}</td><td class=\"n\">{}°</td><td class=\"n\">{}°</td><td class=\"n\">{} {}</td>\
+             <td class=\"n\">{} {}</td></tr>",
+            seam.curve,
+            seam.patches[0],
+            seam.patches[1],
+            number(seam.angle_max_deg),
+            number(seam.angle_rms_deg),
+            number(gap_of(report, seam.gap_max)),
+            escape(&report.input.units),
+            number(seam.length),
+            escape(&report.input.units)
+        );
+    }
+    page.push_str("</tbody></table></div>\n");
+}
+
+/// A gap without what is rounding.
+fn gap_of(report: &Report, gap: f64) -> f64 {
+    if gap <= ROUNDING * report.input.diagonal { 0.0 } else { gap }
+}
+
+fn figures(page: &mut String, report: &Report) {
+    if report.quality.is_empty() {
+        return;
+    }
+    page.push_str(
+        "<h2>Figures</h2>\n<p class=\"note\">Each with its key in <code>report.json</code>.</p>\n<div class=\"scroll\">\
+         <table><tbody>\n",
+    );
+    let unit = report.input.units.as_str();
+    for (key, words, reading) in FIGURES {
+        let Some(figure) = report.quality.get(key) else { continue };
+        let value = match (figure, reading) {
+            (Figure::Flag(yes), _) => if *yes { "yes" } else { "no" }.to_owned(),
+            (Figure::Count(n), _) => count(*n),
+            (Figure::Number(x), Reading::Length) => distance(*x, report.input.diagonal, unit),
+            (Figure::Number(x), Reading::Degrees) => format!("{}°", number(*x)),
+            (Figure::Number(x), Reading::Fraction) => percent(*x),
+            (Figure::Number(x), Reading::Plain) => number(*x),
+        };
+        let _ = writeln!(
+            page,
+            "<tr><td>{}</td><td class=\"n\">{}</td><td><code>{key}</code></td></tr>",
+            escape(words),
+            escape(&value)
+        );
+    }
+    page.push_str("</tbody></table></div>\n");
+}
+
+fn stages(page: &mut String, report: &Report) {
+    if report.stages.is_empty() {
+        return;
+    }
+    let longest = report.stages.iter().map(|s| s.seconds).fold(0.0, f64::max);
+    let total: f64 = report.stages.iter().map(|s| s.seconds).sum();
+    page.push_str(
+        "<h2>Stages</h2>\n<div class=\"scroll\"><table><thead><tr><th>Stage</th><th class=\"n\">Time</th><th></th>\
+         <th>Made</th><th class=\"n\">Memory</th></tr></thead><tbody>\n",
+    );
+    for stage in &report.stages {
+        let made: Vec<String> = stage.counts.iter().map(|(what, &n)| format!("{} {what}", count(n))).collect();
+        let _ = writeln!(
+            page,
+            "<tr><td>{}</td><td class=\"n\">{} s</td><td class=\"bar\"><div style=\"width:{:.1}%\"></div></td><td>{}</td>\
+             <td class=\"n\">{}</td></tr>",
+            escape(&stage.name),
+            number(stage.seconds),
+            100.0 * stage.seconds / longest.max(f64::MIN_POSITIVE),
+            escape(&made.join(", ").replace('_', " ")),
+            memory(stage.peak_bytes)
+        );
+    }
+    let _ = write!(
+        page,
+        "</tbody><tfoot><tr><td>All</td><td class=\"n\">{} s</td><td></td><td></td><td></td></tr></tfoot></table></div>\n",
+        number(total)
+    );
+}
+
+fn memory(bytes: u64) -> String {
+    if bytes == 0 { "-".into() } else { format!("{} MiB", bytes >> 20) }
+}
+
+/// Text as HTML.
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::Input;
+    use planish::pipeline::Warning;
+
+    fn report() -> Report {
+        let mut report =
+            Report::new("run", Input { path: "parts/<b>.ply".into(), diagonal: 200.0, ..Default::default() });
+        report.input.units = "mm".into();
+        report.quality.insert("patches.count".into(), Figure::Count(12));
+        report.quality.insert("surface.rms".into(), Figure::Number(0.5));
+        report.quality.insert("surface.rms_rel".into(), Figure::Number(0.0025));
+        report.warnings.push(Warning::new("open", "5 holes & cracks", "patch 3"));
+        report
+    }
+
+    #[test]
+    fn names_from_outside_are_escaped_and_nothing_is_fetched() {
+        let page = html(&report(), &[]);
+        assert!(page.contains("<h1>&lt;b&gt;.ply</h1>") && page.contains("5 holes &amp; cracks"));
+        for outside in ["http:", "https:", "<script", "<link", "@import", "url("] {
+            assert!(!page.contains(outside), "{outside}");
+        }
+    }
+
+    #[test]
+    fn a_figure_of_half_a_millimetre_on_200_is_shown_with_its_quarter_percent() {
+        assert!(html(&report(), &[]).contains("0.500 mm (0.250 % of the diagonal)"));
+    }
+
+    #[test]
+    fn json_keeps_keys_and_reads_back_equal() {
+        let report = report();
+        let text = report.to_json();
+        let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(value["quality"]["patches.count"], 12);
+        assert_eq!(value["warnings"][0]["where"], "patch 3");
+        assert_eq!(serde_json::from_str::<Report>(&text).unwrap(), report);
+    }
+
+    #[test]
+    fn pictures_are_embedded() {
+        let picture = Picture {
+            title: "Deviation".into(),
+            caption: "Blue is close.".into(),
+            png: vec![1, 2, 3],
+            scale: Some(Scale { colors: vec![[0, 0, 255], [255, 0, 0]], labels: vec!["0".into(), "1 mm".into()] }),
+        };
+        let page = html(&report(), &[picture]);
+        assert!(page.contains("data:image/png;base64,AQID") && page.contains("rgb(0,0,255),rgb(255,0,0)"));
+    }
+}

@@ -1,0 +1,228 @@
+//! The whole way from a mesh to a model: the only file that knows the order of the stages.
+//!
+//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, fig. 1.3: curves, grids, surfaces,
+//! displacement maps; before it the repair of the mesh and an automatic network, after it the measuring.
+
+mod quality;
+mod record;
+
+pub use quality::{SEAM_ANGLE_WARNING_DEG, displaced_mesh, surface_mesh, worst_seams};
+pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
+
+use crate::grid::{self, GridError, GridParams};
+use crate::mesh::{self, CompareError, MeshError, Repairs, TriMesh};
+use crate::model::Model;
+use crate::network::{self, ImprintError, LayoutError, LayoutParams, Network};
+use crate::relief::{self, ReliefError};
+use crate::surface::{self, FitError, FitParams, SeamQuality, StitchParams};
+use rayon::prelude::*;
+use record::Clock;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Parameters of all stages.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PipelineParams {
+    /// The automatic network.
+    pub layout: LayoutParams,
+    /// The grids.
+    pub grid: GridParams,
+    /// The surfaces.
+    pub fit: FitParams,
+    /// The seams between them.
+    pub stitch: StitchParams,
+}
+
+/// Stages in their order, each with its usual share of the time.
+const WEIGHTS: [(&str, f64); 8] = [
+    ("repair", 2.0),
+    ("layout", 40.0),
+    ("imprint", 3.0),
+    ("grids", 25.0),
+    ("surfaces", 5.0),
+    ("seams", 10.0),
+    ("relief", 2.0),
+    ("measure", 13.0),
+];
+
+/// What [`fit`] makes.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// The model, on the repaired mesh.
+    pub model: Model,
+    /// The stages that ran.
+    pub stages: Vec<StageRecord>,
+    /// Figures of quality.
+    pub quality: Quality,
+    /// How the patches meet, in the order of the curves.
+    pub seams: Vec<SeamQuality>,
+    /// What a user should know.
+    pub warnings: Vec<Warning>,
+}
+
+/// Why there is no model.
+#[derive(Debug, thiserror::Error)]
+pub enum PipelineError {
+    /// The mesh cannot be repaired.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// There is no automatic network.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    /// The network does not fit the mesh.
+    #[error(transparent)]
+    Network(#[from] ImprintError),
+    /// A patch cannot be resampled.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+    /// The surfaces cannot be fitted.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// The reliefs cannot be made.
+    #[error(transparent)]
+    Relief(#[from] ReliefError),
+    /// The result cannot be measured.
+    #[error(transparent)]
+    Compare(#[from] CompareError),
+    /// The observer no longer wanted the result.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// Fits a model to a mesh.
+///
+/// * `input` - any triangle mesh; it is repaired first
+/// * `network` - on the mesh as [`mesh::repair`] leaves it; `None` for an automatic one
+///
+/// # Errors
+/// The first stage that fails; a cancelled stage always as [`PipelineError::Cancelled`].
+pub fn fit(
+    input: &TriMesh,
+    network: Option<Network>,
+    params: &PipelineParams,
+    observer: &dyn PipelineObserver,
+) -> Result<Fitted, PipelineError> {
+    run(input, network, params, observer).map_err(|e| or_cancelled(e, observer))
+}
+
+fn run(
+    input: &TriMesh,
+    network: Option<Network>,
+    params: &PipelineParams,
+    observer: &dyn PipelineObserver,
+) -> Result<Fitted, PipelineError> {
+    let mut clock = Clock::new(observer, &WEIGHTS);
+    let (mesh, repairs) = repair(input, &mut clock)?;
+    let network = match network {
+        Some(network) => network,
+        None => draw(&mesh, &params.layout, &mut clock)?,
+    };
+    let patches = clock.stage("imprint", |_| network::imprint(&mesh, &network), |p| [("patches", p.len())])?;
+    let sizes = grid::choose_sizes(&network, &patches, &params.grid);
+    let grids = clock.stage(
+        "grids",
+        |o| grid::relax(&mesh, &patches, &sizes, &params.grid, o),
+        |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
+    )?;
+    let mut model = Model { mesh, network, grids, ..Model::default() };
+    surfaces(&mut model, params, &mut clock)?;
+    let measured =
+        clock.stage("measure", |o| quality::measure(&model, &patches, &repairs, o), |m| [("seams", m.seams.len())])?;
+    Ok(Fitted {
+        model,
+        stages: clock.records,
+        quality: measured.quality,
+        seams: measured.seams,
+        warnings: measured.warnings,
+    })
+}
+
+/// What [`layout`] makes.
+#[derive(Clone, Debug)]
+pub struct Drafted {
+    /// The repaired mesh, on which the network lies.
+    pub mesh: TriMesh,
+    /// The network.
+    pub network: Network,
+    /// The stages that ran.
+    pub stages: Vec<StageRecord>,
+    /// Figures of quality.
+    pub quality: Quality,
+    /// What a user should know.
+    pub warnings: Vec<Warning>,
+}
+
+/// The stages up to the network, for one that is edited before it goes on to [`fit`].
+/// # Errors
+/// As [`fit`].
+pub fn layout(
+    input: &TriMesh,
+    params: &LayoutParams,
+    observer: &dyn PipelineObserver,
+) -> Result<Drafted, PipelineError> {
+    let mut clock = Clock::new(observer, &WEIGHTS[..2]);
+    let draft = |clock: &mut Clock| {
+        let (mesh, repairs) = repair(input, clock)?;
+        let network = draw(&mesh, params, clock)?;
+        Ok::<_, PipelineError>((mesh, repairs, network))
+    };
+    let (mesh, repairs, network) = draft(&mut clock).map_err(|e| or_cancelled(e, observer))?;
+    let (mut quality, mut warnings) = (Quality::new(), Vec::new());
+    quality::mesh_figures(&mesh, &network, &repairs, &mut quality, &mut warnings);
+    quality::network_figures(&network, &mut quality);
+    Ok(Drafted { mesh, network, stages: clock.records, quality, warnings })
+}
+
+/// Fits surfaces, seams and reliefs of a model anew and keeps its mesh, network and grids.
+///
+/// Returns the stages that ran. On an error the model is what it was.
+/// # Errors
+/// As [`fit`].
+pub fn refit(
+    model: &mut Model,
+    params: &PipelineParams,
+    observer: &dyn PipelineObserver,
+) -> Result<Vec<StageRecord>, PipelineError> {
+    let mut clock = Clock::new(observer, &WEIGHTS);
+    surfaces(model, params, &mut clock).map_err(|e| or_cancelled(e, observer))?;
+    Ok(clock.records)
+}
+
+/// A stage that was stopped fails with an error of its own; to the caller it is always the same.
+fn or_cancelled(error: PipelineError, observer: &dyn PipelineObserver) -> PipelineError {
+    if observer.cancelled() { PipelineError::Cancelled } else { error }
+}
+
+fn repair(input: &TriMesh, clock: &mut Clock) -> Result<(TriMesh, Repairs), PipelineError> {
+    Ok(clock.stage("repair", |_| mesh::repair(input), |(mesh, _)| [("triangles", mesh.triangles.len())])?)
+}
+
+fn draw(mesh: &TriMesh, params: &LayoutParams, clock: &mut Clock) -> Result<Network, PipelineError> {
+    Ok(clock.stage("layout", |o| network::layout(mesh, params, o), |n| [("patches", n.patches.len())])?)
+}
+
+/// The stages from the grids to the reliefs.
+fn surfaces(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Result<(), PipelineError> {
+    let (network, grids) = (&model.network, &model.grids);
+    let control = |s: &Vec<surface::Surface>| [("control_points", s.iter().map(|s| s.control.len()).sum())];
+    let fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &params.fit, o), control)?;
+    let smooth = clock.stage(
+        "seams",
+        |o| surface::stitch(network, grids, &fitted, &params.stitch, o),
+        |_| [("curves", network.curves.len())],
+    )?;
+    let reliefs = clock.stage(
+        "relief",
+        |_| {
+            grids
+                .par_iter()
+                .zip(&smooth)
+                .map(|(grid, surface)| relief::bake(grid, surface))
+                .collect::<Result<Vec<_>, _>>()
+        },
+        |reliefs| [("texels", reliefs.iter().map(|r| r.vectors.len()).sum())],
+    )?;
+    (model.surfaces, model.reliefs) = (smooth, reliefs);
+    Ok(())
+}

@@ -1,0 +1,250 @@
+//! Figures of quality of a model against its mesh, and what a user should know about them.
+
+use super::{Figure, PipelineError, Quality, Warning};
+use crate::grid;
+use crate::mesh::{self, CompareParams, Comparison, Repairs, TriMesh};
+use crate::model::Model;
+use crate::network::{CurveKind, Network, PatchMesh};
+use crate::observe::Observer;
+use crate::relief;
+use crate::surface::{self, SeamQuality};
+use rayon::prelude::*;
+
+/// Triangles per knot span and direction in the mesh that stands for a surface when distances are measured:
+/// between them a cubic span with a turn of 30 degrees leaves its chord by less than 1/500 of its length.
+const CUTS_PER_SPAN: usize = 6;
+/// Smooth seams that bend by more are told to the user: half a degree is the default of a common CAD program.
+pub const SEAM_ANGLE_WARNING_DEG: f64 = 0.5;
+
+/// What [`measure`] finds.
+pub(super) struct Measured {
+    pub quality: Quality,
+    pub seams: Vec<SeamQuality>,
+    pub warnings: Vec<Warning>,
+}
+
+/// Measures `model` against its mesh.
+pub(super) fn measure(
+    model: &Model,
+    patches: &[PatchMesh],
+    repairs: &Repairs,
+    observer: &dyn Observer,
+) -> Result<Measured, PipelineError> {
+    let mut quality = Quality::new();
+    let mut warnings = Vec::new();
+    let diagonal = model.mesh.bounds().diagonal();
+    mesh_figures(&model.mesh, &model.network, repairs, &mut quality, &mut warnings);
+    network_figures(&model.network, &mut quality);
+    grid_figures(model, patches, &mut quality, &mut warnings);
+    let seams = seam_figures(model, diagonal, &mut quality, &mut warnings);
+    observer.progress(0.1);
+
+    let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
+    quality.insert("surface.control_points".into(), Figure::Count(control as u64));
+    let worst = model.surfaces.par_iter().zip(&model.grids).map(|(s, g)| surface::deviation_of(s, g).rms);
+    length(&mut quality, "surface.patch_rms_max", worst.reduce(|| 0.0, f64::max), diagonal);
+    let base = surface_mesh(model)?;
+    distances(&mut quality, "surface", &compare(&model.mesh, &base, &Share(observer, 0.1, 0.45))?, diagonal);
+    let displaced = displaced_mesh(model)?;
+    distances(&mut quality, "displaced", &compare(&model.mesh, &displaced, &Share(observer, 0.55, 0.45))?, diagonal);
+    relief_figures(model, diagonal, &mut quality, &mut warnings)?;
+    observer.progress(1.0);
+    Ok(Measured { quality, seams, warnings })
+}
+
+/// The surfaces of a model with their displacement as one mesh: its grids.
+/// # Errors
+/// If the parts of the model do not belong together.
+pub fn displaced_mesh(model: &Model) -> Result<TriMesh, PipelineError> {
+    Ok(relief::displaced_mesh(&model.network, &model.surfaces, &model.reliefs)?)
+}
+
+/// The smooth surfaces of a model as one mesh, fine enough to measure distances on.
+/// # Errors
+/// If the parts of the model do not belong together.
+pub fn surface_mesh(model: &Model) -> Result<TriMesh, PipelineError> {
+    let shapes = relief::span_shapes(&model.surfaces, CUTS_PER_SPAN);
+    Ok(relief::surface_mesh(&model.network, &model.surfaces, &shapes)?)
+}
+
+fn compare(input: &TriMesh, result: &TriMesh, observer: &dyn Observer) -> Result<Comparison, PipelineError> {
+    Ok(mesh::compare(input, result, &CompareParams::default(), observer)?)
+}
+
+/// A share of a stage's progress: it starts at `.1` and is `.2` long.
+struct Share<'a>(&'a dyn Observer, f64, f64);
+
+impl Observer for Share<'_> {
+    fn progress(&self, fraction: f64) {
+        self.0.progress(self.1 + self.2 * fraction);
+    }
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+}
+
+/// Smooth seams first, the widest angle first; then the seams on features.
+pub fn worst_seams(seams: &[SeamQuality]) -> Vec<&SeamQuality> {
+    let mut order: Vec<&SeamQuality> = seams.iter().collect();
+    order.sort_by(|a, b| {
+        let sharp = |s: &SeamQuality| s.kind != CurveKind::Smooth;
+        sharp(a).cmp(&sharp(b)).then(b.angle_max_deg.total_cmp(&a.angle_max_deg)).then(a.curve.cmp(&b.curve))
+    });
+    order
+}
+
+fn length(quality: &mut Quality, key: &str, value: f64, diagonal: f64) {
+    quality.insert(key.into(), Figure::Number(value));
+    let relative = if diagonal > 0.0 { value / diagonal } else { 0.0 };
+    quality.insert(format!("{key}_rel"), Figure::Number(relative));
+}
+
+fn distances(quality: &mut Quality, name: &str, found: &Comparison, diagonal: f64) {
+    let both = &found.both;
+    for (key, value) in [("rms", both.rms), ("max", both.max), ("p95", both.p95)] {
+        length(quality, &format!("{name}.{key}"), value, diagonal);
+    }
+}
+
+pub(super) fn mesh_figures(
+    mesh: &TriMesh,
+    network: &Network,
+    repairs: &Repairs,
+    quality: &mut Quality,
+    warnings: &mut Vec<Warning>,
+) {
+    let facts = mesh::diagnose(mesh);
+    let sharp = network.curves.iter().filter(|c| c.kind == CurveKind::Feature).map(|c| c.points.len() - 1);
+    quality.insert("mesh.triangles".into(), Figure::Count(facts.triangles as u64));
+    quality.insert("mesh.watertight".into(), Figure::Flag(facts.watertight));
+    quality.insert("mesh.manifold".into(), Figure::Flag(facts.manifold));
+    quality.insert("mesh.feature_edges".into(), Figure::Count(sharp.sum::<usize>() as u64));
+    if repairs.any() {
+        warnings.push(Warning::new("mesh_repaired", in_words(repairs), ""));
+    }
+    if repairs.degenerate_left > 0 {
+        let text = format!("{} triangles without height could not be removed.", repairs.degenerate_left);
+        warnings.push(Warning::new("mesh_degenerate", text, ""));
+    }
+    if !facts.watertight {
+        let loops = facts.boundary_loops;
+        let holes = if loops == 1 { "one boundary".into() } else { format!("{loops} boundaries") };
+        let text = format!("The mesh is open: it has {holes}. The surfaces form an open shell, not a solid.");
+        warnings.push(Warning::new("mesh_open", text, ""));
+    }
+    if facts.components > 1 {
+        let text = format!("The mesh has {} pieces; each gets patches of its own.", facts.components);
+        warnings.push(Warning::new("mesh_pieces", text, ""));
+    }
+}
+
+/// What was repaired, as one sentence.
+fn in_words(repairs: &Repairs) -> String {
+    let done = [
+        (repairs.welded_vertices, "vertices at one place merged"),
+        (repairs.repeated_faces, "triangles with a repeated vertex dropped"),
+        (repairs.duplicate_faces, "duplicate triangles dropped"),
+        (repairs.cut_edges, "edges of more than two triangles cut"),
+        (repairs.one_sided_edges, "edges of one-sided pieces cut"),
+        (repairs.turned_faces, "triangles turned round"),
+        (repairs.turned_components, "pieces turned inside out"),
+        (repairs.split_vertices, "vertices split"),
+        (repairs.collapsed_edges + repairs.flipped_edges + repairs.trimmed_faces, "triangles without height removed"),
+        (repairs.unreferenced_vertices, "unused vertices dropped"),
+    ];
+    let words: Vec<String> = done.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+    format!("The mesh was repaired: {}.", words.join(", "))
+}
+
+pub(super) fn network_figures(network: &Network, quality: &mut Quality) {
+    let mut valence = vec![0usize; network.corners.len()];
+    let mut boundary = vec![false; network.corners.len()];
+    for curve in &network.curves {
+        for &corner in &curve.corners {
+            valence[corner as usize] += 1;
+            boundary[corner as usize] |= curve.kind == CurveKind::Boundary;
+        }
+    }
+    let regular = |(&n, &rim): (&usize, &bool)| n == if rim { 3 } else { 4 };
+    let irregular = valence.iter().zip(&boundary).filter(|c| !regular(*c)).count();
+    quality.insert("patches.count".into(), Figure::Count(network.patches.len() as u64));
+    quality.insert("patches.irregular_corners".into(), Figure::Count(irregular as u64));
+}
+
+fn grid_figures(model: &Model, patches: &[PatchMesh], quality: &mut Quality, warnings: &mut Vec<Warning>) {
+    let grids: Vec<grid::GridQuality> =
+        model.grids.par_iter().zip(patches).map(|(grid, patch)| grid::measure(grid, patch)).collect();
+    let folds: usize = grids.iter().map(|g| g.folds).sum();
+    let mean = |f: fn(&grid::GridQuality) -> f64| grids.iter().map(f).sum::<f64>() / grids.len().max(1) as f64;
+    quality.insert("grid.points".into(), Figure::Count(model.grids.iter().map(|g| g.points.len() as u64).sum()));
+    quality.insert("grid.folds".into(), Figure::Count(folds as u64));
+    quality.insert("grid.spacing_cv".into(), Figure::Number(mean(|g| g.spacing_cv)));
+    if folds > 0 {
+        let places: Vec<String> =
+            grids.iter().enumerate().filter(|(_, g)| g.folds > 0).map(|(p, _)| p.to_string()).collect();
+        let text = format!("{folds} grid cells are folded over. A curve through the middle of the patch helps.");
+        warnings.push(Warning::new("grid_folds", text, format!("patches {}", few(&places))));
+    }
+}
+
+fn seam_figures(model: &Model, diagonal: f64, quality: &mut Quality, warnings: &mut Vec<Warning>) -> Vec<SeamQuality> {
+    let seams = surface::measure_seams(&model.network, &model.surfaces);
+    let gap = seams.iter().map(|s| s.gap_max).fold(0.0, f64::max);
+    let smooth: Vec<&SeamQuality> = seams.iter().filter(|s| s.kind == CurveKind::Smooth).collect();
+    let total: f64 = smooth.iter().map(|s| s.length).sum();
+    let squares: f64 = smooth.iter().map(|s| s.length * s.angle_rms_deg * s.angle_rms_deg).sum();
+    quality.insert("seam.count".into(), Figure::Count(seams.len() as u64));
+    length(quality, "seam.gap_max", gap, diagonal);
+    let widest = smooth.iter().map(|s| s.angle_max_deg).fold(0.0, f64::max);
+    quality.insert("seam.angle_max_deg".into(), Figure::Number(widest));
+    let rms = if total > 0.0 { (squares / total).sqrt() } else { 0.0 };
+    quality.insert("seam.angle_rms_deg".into(), Figure::Number(rms));
+    let bent = smooth.iter().filter(|s| s.angle_max_deg > SEAM_ANGLE_WARNING_DEG).count();
+    if bent > 0 {
+        let text = format!(
+            "{bent} of {} smooth seams bend by more than {SEAM_ANGLE_WARNING_DEG} degrees somewhere, {widest:.2} at most; \
+             along all smooth seams it is {rms:.2} on average.",
+            smooth.len()
+        );
+        let worst: Vec<String> = worst_seams(&seams).iter().take(3).map(|s| s.curve.to_string()).collect();
+        warnings.push(Warning::new("seam_angle", text, format!("curves {}", few(&worst))));
+    }
+    seams
+}
+
+fn relief_figures(
+    model: &Model,
+    diagonal: f64,
+    quality: &mut Quality,
+    warnings: &mut Vec<Warning>,
+) -> Result<(), PipelineError> {
+    let each = model.surfaces.par_iter().zip(&model.reliefs).zip(&model.grids).map(|((surface, relief), grid)| {
+        let back = relief::displace(surface, relief)?;
+        let miss = back.iter().zip(&grid.points).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        let most = relief.vectors.iter().map(|d| d.length()).fold(0.0, f64::max);
+        Ok((miss, most, relief::fold_over(surface, relief)?.len()))
+    });
+    let each: Vec<(f64, f64, usize)> = each.collect::<Result<_, relief::ReliefError>>()?;
+    let texels: usize = model.reliefs.iter().map(|r| r.vectors.len()).sum();
+    quality.insert("relief.texels".into(), Figure::Count(texels as u64));
+    length(quality, "relief.roundtrip_max", each.iter().map(|e| e.0).fold(0.0, f64::max), diagonal);
+    length(quality, "relief.max", each.iter().map(|e| e.1).fold(0.0, f64::max), diagonal);
+    let folding: usize = each.iter().map(|e| e.2).sum();
+    if folding > 0 {
+        let places: Vec<String> =
+            each.iter().enumerate().filter(|(_, e)| e.2 > 0).map(|(p, _)| p.to_string()).collect();
+        let text = format!(
+            "{folding} of {texels} texels displace the surface beyond its centre of curvature: scaling such a map up \
+             folds the surface over. More control points there help."
+        );
+        warnings.push(Warning::new("relief_folds", text, format!("patches {}", few(&places))));
+    }
+    Ok(())
+}
+
+/// The first few of a list, in words.
+fn few(names: &[String]) -> String {
+    const SHOWN: usize = 8;
+    let head = names[..names.len().min(SHOWN)].join(", ");
+    if names.len() > SHOWN { format!("{head} and {} more", names.len() - SHOWN) } else { head }
+}
