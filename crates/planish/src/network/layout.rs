@@ -35,6 +35,10 @@ const ATTEMPTS: usize = 5;
 /// Attempts at the number of patches asked for: the features decide how many patches a partition gives.
 const COUNT_ATTEMPTS: usize = 3;
 
+/// No part of the surface lies further from the middle of its first cell than this, in sides of a patch, even if
+/// features use up the number of patches elsewhere.
+const COVER: f64 = 2.4;
+
 /// Part of the patches of the first draft that counts as forced by the features.
 const FORCED: f64 = 0.85;
 
@@ -156,7 +160,7 @@ fn draft(
     let mut best: Option<(usize, Complex)> = None;
     for attempt in 0..COUNT_ATTEMPTS {
         observer.progress(0.1 * attempt as f64);
-        let (label, count) = partition::partition(&ground, cells.round() as usize, observer)?;
+        let (label, count) = partition::partition(&ground, cells.round() as usize, COVER * side, observer)?;
         let mut complex = outline::outline(&ground, &label, count, &corner);
         if !polygon::make_even(&work.mesh, &mut complex) {
             return Ok(best.map(|b| b.1));

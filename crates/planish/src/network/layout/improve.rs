@@ -15,7 +15,7 @@ use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// Weight of the squared logarithm of a cell's area over the mean, against the badness of its shape.
-const SIZE_COST: f64 = 0.6;
+const SIZE_COST: f64 = 0.4;
 
 /// Pressure on the number of patches: what one patch too many costs when there are a tenth too many.
 const COUNT_COST: f64 = 2.0;
@@ -24,7 +24,10 @@ const COUNT_COST: f64 = 2.0;
 const LEAST_GAIN: f64 = 0.2;
 
 /// Rounds of changing the connectivity; most meshes settle earlier.
-const CHANGE_ROUNDS: usize = 14;
+const CHANGE_ROUNDS: usize = 12;
+
+/// Batches of relaxing between two rounds of changes: most neighbours of a change fit into the first few.
+const RELAX_BATCHES: usize = 4;
 
 /// Parts every cell into quads. False if some cell could not be parted.
 pub(super) fn quads(bench: &mut Bench) -> bool {
@@ -37,16 +40,16 @@ pub(super) fn quads(bench: &mut Bench) -> bool {
 pub(super) fn relax(bench: &mut Bench, rounds: usize, observer: &dyn Observer) -> Result<(), LayoutError> {
     for _ in 0..rounds {
         let nodes: Vec<u32> = (0..bench.complex.nodes.len() as u32).collect();
-        relax_some(bench, &nodes, observer)?;
+        relax_some(bench, &nodes, usize::MAX, observer)?;
     }
     Ok(())
 }
 
-/// Relaxes `nodes` and the arcs at them once.
-fn relax_some(bench: &mut Bench, nodes: &[u32], observer: &dyn Observer) -> Result<(), LayoutError> {
+/// Relaxes `nodes` and the arcs at them once, each kind in at most `batches` batches.
+fn relax_some(bench: &mut Bench, nodes: &[u32], batches: usize, observer: &dyn Observer) -> Result<(), LayoutError> {
     let cancelled = || if observer.cancelled() { Err(LayoutError::Cancelled) } else { Ok(()) };
     cancelled()?;
-    bench.sweep(nodes, |complex, n| star_change(complex, &complex.star(n)));
+    bench.sweep(nodes, batches, |complex, n| star_change(complex, &complex.star(n)));
     cancelled()?;
     let mut wanted = vec![false; bench.complex.nodes.len()];
     for &n in nodes {
@@ -57,9 +60,9 @@ fn relax_some(bench: &mut Bench, nodes: &[u32], observer: &dyn Observer) -> Resu
         .live_arcs()
         .filter(|&a| bench.complex.arc(2 * a).nodes.iter().any(|&n| wanted[n as usize]))
         .collect();
-    bench.sweep(&arcs, arc_change);
+    bench.sweep(&arcs, batches, arc_change);
     cancelled()?;
-    slide::slide(bench);
+    slide::slide(bench, nodes, batches);
     Ok(())
 }
 
@@ -82,7 +85,7 @@ pub(super) fn improve(bench: &mut Bench, patches: usize, observer: &dyn Observer
         nodes.extend(before..bench.complex.nodes.len() as u32);
         nodes.sort_unstable();
         nodes.dedup();
-        relax_some(bench, &nodes, observer)?;
+        relax_some(bench, &nodes, RELAX_BATCHES, observer)?;
     }
     Ok(())
 }
@@ -157,7 +160,9 @@ impl<'a> Trial<'a> {
     }
 
     fn cell_cost(&self, corners: [DVec3; 4], normal: DVec3, area: f64) -> f64 {
-        badness(corners, normal) + SIZE_COST * (area / self.mean_area).max(1e-6).ln().powi(2)
+        let size = (area / self.mean_area).max(1e-6);
+        // By area where a cell is too large, or parting it would never pay.
+        badness(corners, normal) + SIZE_COST * size.max(1.0) * size.ln().powi(2)
     }
 
     /// Energy of the cells of a change as they are, and their area and centroid.

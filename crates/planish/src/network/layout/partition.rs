@@ -12,7 +12,7 @@ use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
 /// Rounds of Lloyd relaxation; the cells hardly change after these.
-const LLOYD_ROUNDS: usize = 8;
+const LLOYD_ROUNDS: usize = 5;
 
 /// Rounds of adding sites one per bad cell before they are added by the handful.
 const GENTLE_ROUNDS: usize = 40;
@@ -106,8 +106,9 @@ impl<'a> Ground<'a> {
         best.into_iter().map(|b| b.1).collect()
     }
 
-    /// Sites by farthest-point sampling: one per region (more where the surface is closed), then up to `count`.
-    fn sample(&self, count: usize) -> Vec<u32> {
+    /// Sites by farthest-point sampling: one per region (more where the surface is closed), then up to `count` and
+    /// until no face is further than `reach` from its site.
+    fn sample(&self, count: usize, reach: f64) -> Vec<u32> {
         let n = self.area.len();
         let mut region = vec![NONE; n];
         let mut closed = Vec::new();
@@ -149,14 +150,17 @@ impl<'a> Ground<'a> {
                 }
             }
         }
-        let more = count.saturating_sub(first.len());
-        for _ in 0..more {
+        let mut left = count.saturating_sub(first.len());
+        loop {
             let far =
                 (0..n as u32).max_by(|&a, &b| distance[a as usize].total_cmp(&distance[b as usize]).then(b.cmp(&a)));
             match far {
-                Some(f) if distance[f as usize] > 0.0 => add(f, &mut distance, &mut label),
+                Some(f) if distance[f as usize] > if left > 0 { 0.0 } else { reach } => {
+                    add(f, &mut distance, &mut label)
+                }
                 _ => break,
             }
+            left = left.saturating_sub(1);
         }
         sites
     }
@@ -226,14 +230,15 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// Parts the faces into about `count` cells, each a disk that does not meet itself: a label per face and the
+/// Parts the faces into about `count` cells (more where one would reach further than `reach`), each a disk that does not meet itself: a label per face and the
 /// number of labels.
 pub(super) fn partition(
     ground: &Ground,
     count: usize,
+    reach: f64,
     observer: &dyn Observer,
 ) -> Result<(Vec<u32>, usize), LayoutError> {
-    let mut sites = ground.sample(count);
+    let mut sites = ground.sample(count, reach);
     for _ in 0..LLOYD_ROUNDS {
         if observer.cancelled() {
             return Err(LayoutError::Cancelled);
@@ -241,16 +246,19 @@ pub(super) fn partition(
         let (label, _) = ground.cells(&sites);
         sites = ground.middles(&label, sites.len());
     }
+    let (mut label, mut distance) = ground.cells(&sites);
     for round in 0.. {
         if observer.cancelled() {
             return Err(LayoutError::Cancelled);
         }
-        let (label, distance) = ground.cells(&sites);
         let mut wanted = ground.wanted(&label, &distance, sites.len(), round >= GENTLE_ROUNDS);
         wanted.retain(|f| !sites.contains(f));
         if wanted.is_empty() {
             return Ok((label, sites.len()));
         }
+        let first = sites.len() as u32;
+        let sources: Vec<(u32, u32)> = wanted.iter().enumerate().map(|(i, &f)| (f, first + i as u32)).collect();
+        ground.grow(&sources, &mut distance, &mut label);
         sites.extend(wanted);
     }
     unreachable!("the rounds end when every face is its own cell")

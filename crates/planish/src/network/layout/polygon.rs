@@ -21,6 +21,9 @@ pub(super) const VALENCE_COST: f64 = 1.5;
 /// Cost of a cell corner of 180 degrees or more, where a patch has no normal of its own.
 const FLAT_COST: f64 = 8.0;
 
+/// A corner further off square than this makes a surface that is hard to fit, and costs steeply.
+const STEEP_DEG: f64 = 45.0;
+
 /// Rounds over all cells; each sees the choices of its neighbours.
 const ROUNDS: usize = 6;
 
@@ -256,7 +259,8 @@ pub(super) fn badness(corners: [DVec3; 4], normal: DVec3) -> f64 {
         if angle < -0.5 {
             angle += std::f64::consts::TAU;
         }
-        sum += ((angle.to_degrees() - 90.0) / 45.0).powi(2);
+        let off = (angle.to_degrees() - 90.0).abs();
+        sum += (off / 45.0).powi(2) + ((off - STEEP_DEG).max(0.0) / 15.0).powi(2);
     }
     let side = |k: usize| corners[k].distance(corners[(k + 1) % 4]);
     let aspect = ((side(0) + side(2)) / (side(1) + side(3)).max(f64::MIN_POSITIVE)).max(f64::MIN_POSITIVE).ln();

@@ -447,11 +447,14 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Makes `changes` in rounds of disjoint ones, each built by `plan` when its turn comes.
-    pub fn sweep(&mut self, items: &[u32], plan: impl Fn(&Complex, u32) -> Option<Change>) -> usize {
+    /// Makes the changes that `plan` builds for `items`, in at most `batches` batches of disjoint ones.
+    pub fn sweep(&mut self, items: &[u32], batches: usize, plan: impl Fn(&Complex, u32) -> Option<Change>) -> usize {
         let mut waiting = items.to_vec();
         let mut made = 0;
-        while !waiting.is_empty() {
+        for _ in 0..batches {
+            if waiting.is_empty() {
+                break;
+            }
             let mut taken = vec![false; self.complex.cells.len()];
             let (mut now, mut later) = (Vec::new(), Vec::new());
             for &item in &waiting {

@@ -28,11 +28,15 @@ pub(super) struct Slide {
     pub sides: Vec<(Change, Vec<(u32, usize)>)>,
 }
 
-/// Slides every node that lies inside a line once. Returns how many moved.
-pub(super) fn slide(bench: &mut Bench) -> usize {
-    let mut waiting: Vec<u32> = (0..bench.complex.nodes.len() as u32).collect();
+/// Slides the nodes that lie inside a line once, in at most `batches` batches of disjoint ones. Returns how many
+/// moved.
+pub(super) fn slide(bench: &mut Bench, nodes: &[u32], batches: usize) -> usize {
+    let mut waiting = nodes.to_vec();
     let mut made = 0;
-    while !waiting.is_empty() {
+    for _ in 0..batches {
+        if waiting.is_empty() {
+            break;
+        }
         let mut taken = vec![false; bench.complex.cells.len()];
         let (mut now, mut later) = (Vec::new(), Vec::new());
         for &node in &waiting {

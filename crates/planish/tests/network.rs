@@ -1,0 +1,188 @@
+//! The network stage: layouts on shapes of known topology, and imprinting.
+
+mod common;
+
+use planish::mesh::{Adjacency, FacePoint, TriMesh, shapes, sharp_edges};
+use planish::network::{
+    Corner, Curve, CurveKind, ImprintError, LayoutError, LayoutParams, Network, Patch, Side, imprint, layout,
+};
+use planish::{DVec3, Silent};
+
+/// Shapes with the Euler number of each.
+fn surfaces() -> Vec<(&'static str, TriMesh, i64)> {
+    vec![
+        ("sphere", shapes::sphere(1.0, 4), 2),
+        ("torus", shapes::torus(1.0, 0.4, 60, 30), 0),
+        ("cylinder with sharp rims", shapes::cylinder(1.0, 2.0, 48), 2),
+        ("box", shapes::cuboid(DVec3::new(1.0, 2.0, 3.0), 8), 2),
+        ("saddle", shapes::saddle(0.4, 24), 1),
+        ("annulus", shapes::annulus(0.5, 1.0, 48), 0),
+        ("double torus", shapes::double_torus(6), -2),
+        ("two spheres", shapes::two_spheres(3), 4),
+    ]
+}
+
+fn params(patches: usize) -> LayoutParams {
+    LayoutParams { patches, ..LayoutParams::default() }
+}
+
+fn length(mesh: &TriMesh, network: &Network, kind: CurveKind) -> f64 {
+    let of = |c: &Curve| c.points.windows(2).map(|w| w[0].position(mesh).distance(w[1].position(mesh))).sum::<f64>();
+    network.curves.iter().filter(|c| c.kind == kind).map(of).sum()
+}
+
+#[test]
+fn every_layout_is_disks_that_cover_the_mesh_to_1e_9_of_its_area() {
+    for (name, mesh, euler) in surfaces() {
+        let network = layout(&mesh, &params(24), &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let patches = imprint(&mesh, &network).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(patches.len(), network.patches.len());
+        let area = |m: &TriMesh| (0..m.triangles.len()).map(|t| m.area(t)).sum::<f64>();
+        let parts: Vec<f64> = patches.iter().map(|p| area(&p.mesh)).collect();
+        let (sum, whole) = (parts.iter().sum::<f64>(), area(&mesh));
+        assert!((sum - whole).abs() < 1e-9 * whole, "{name}: {sum} of {whole}");
+        let mean = whole / parts.len() as f64;
+        let largest = parts.iter().cloned().fold(0.0, f64::max);
+        assert!(largest < 8.0 * mean, "{name}: largest patch {:.1} times the mean", largest / mean);
+        let count = network.corners.len() as i64 - network.curves.len() as i64 + network.patches.len() as i64;
+        assert_eq!(count, euler, "{name}: corners - curves + patches");
+    }
+}
+
+#[test]
+fn sharp_edges_and_boundaries_are_curves_to_1e_9_of_their_length() {
+    for (name, mesh, _) in surfaces() {
+        let adjacency = Adjacency::new(&mesh);
+        let sharp = sharp_edges(&mesh, &adjacency, 40.0);
+        let (mut edges, mut rim) = (0.0, 0.0);
+        for h in 0..sharp.len() as u32 {
+            let (a, b) = (mesh.origin(h), mesh.origin(planish::mesh::next(h)));
+            let d = mesh.points[a as usize].distance(mesh.points[b as usize]);
+            if adjacency.opposite[h as usize] == planish::mesh::NONE {
+                rim += d;
+            } else if sharp[h as usize] {
+                edges += d / 2.0;
+            }
+        }
+        let network = layout(&mesh, &params(24), &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
+        for (kind, want) in [(CurveKind::Feature, edges), (CurveKind::Boundary, rim)] {
+            let got = length(&mesh, &network, kind);
+            assert!((got - want).abs() <= 1e-9 * want.max(1.0), "{name}: {kind:?} {got} of {want}");
+        }
+    }
+}
+
+#[test]
+fn corners_of_a_torus_of_60_patches_are_square_within_20_degrees_in_the_mean() {
+    let mesh = shapes::torus(1.0, 0.4, 90, 45);
+    let network = layout(&mesh, &params(60), &Silent).expect("a torus has a layout");
+    assert!(network.patches.len().abs_diff(60) <= 12, "{} patches", network.patches.len());
+    let mut off = Vec::new();
+    for patch in imprint(&mesh, &network).expect("disks") {
+        for k in 0..4 {
+            let (out, back) = (&patch.sides[k], &patch.sides[(k + 3) % 4]);
+            let at = |v: u32| patch.mesh.points[v as usize];
+            let (i, j) = (out.len() / 4, back.len() - 1 - back.len() / 4);
+            let angle = (at(out[i.max(1)]) - at(out[0])).angle_between(at(back[j.min(back.len() - 2)]) - at(out[0]));
+            off.push((angle.to_degrees() - 90.0).abs());
+        }
+    }
+    let mean = off.iter().sum::<f64>() / off.len() as f64;
+    assert!(mean < 20.0, "{mean} degrees");
+}
+
+#[test]
+fn layouts_are_equal_on_1_and_4_threads() {
+    let mesh = shapes::demo(7, 6000);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| layout(&mesh, &params(40), &Silent)).expect("the demo has a layout")
+    };
+    assert_eq!(on(1), on(4));
+}
+
+#[test]
+fn a_mesh_of_two_triangles_has_a_layout_of_one_patch() {
+    let square = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+    let mesh = TriMesh::new(square.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
+    let network = layout(&mesh, &params(1), &Silent).expect("a square has a layout");
+    let patches = imprint(&mesh, &network).expect("disks");
+    assert!((1..=4).contains(&patches.len()), "{} patches", patches.len());
+}
+
+#[test]
+fn meshes_without_faces_or_with_three_faces_on_an_edge_are_refused() {
+    assert_eq!(layout(&TriMesh::default(), &params(10), &Silent), Err(LayoutError::Empty));
+    let points = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, -DVec3::Y];
+    let mesh = TriMesh::new(points, vec![[0, 1, 2], [1, 0, 3], [0, 1, 4]]);
+    assert_eq!(layout(&mesh, &params(10), &Silent), Err(LayoutError::NotManifold { edges: 1 }));
+}
+
+/// A unit square of two triangles as one patch, with `extra` curves.
+fn square_with(extra: Vec<Curve>) -> (TriMesh, Network) {
+    let square = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+    let mesh = TriMesh::new(square.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
+    let corner = |face, k| Corner { place: FacePoint::corner(face, k) };
+    let corners = vec![corner(0, 0), corner(0, 1), corner(0, 2), corner(1, 2)];
+    let side = |corners: [u32; 2], face, a, b| Curve {
+        corners,
+        kind: CurveKind::Boundary,
+        points: vec![FacePoint::corner(face, a), FacePoint::corner(face, b)],
+    };
+    let mut curves = vec![side([0, 1], 0, 0, 1), side([1, 2], 0, 1, 2), side([2, 3], 1, 1, 2), side([3, 0], 1, 2, 0)];
+    curves.extend(extra);
+    let sides = std::array::from_fn(|k| Side { curve: k as u32, reversed: false });
+    (mesh, Network { corners, curves, patches: vec![Patch { sides }] })
+}
+
+#[test]
+fn an_imprinted_square_is_the_square() {
+    let (mesh, network) = square_with(Vec::new());
+    let patches = imprint(&mesh, &network).expect("one disk");
+    assert_eq!(patches[0].mesh.triangles.len(), 2);
+    assert!(patches[0].sides.iter().all(|s| s.len() == 2));
+}
+
+#[test]
+fn curves_that_cross_are_named_with_the_place() {
+    let inside = |a: [f64; 3], b: [f64; 3]| Curve {
+        corners: [0, 0],
+        kind: CurveKind::Smooth,
+        points: vec![FacePoint { face: 0, bary: a }, FacePoint { face: 0, bary: b }],
+    };
+    let crossed = vec![
+        inside([0.6, 0.2, 0.2], [0.2, 0.2, 0.6]),
+        inside([0.6, 0.1, 0.3], [0.1, 0.6, 0.3]),
+        inside([0.5, 0.3, 0.2], [0.2, 0.1, 0.7]),
+    ];
+    let (mesh, network) = square_with(crossed);
+    match imprint(&mesh, &network) {
+        Err(ImprintError::Crossing { curves, .. }) => assert!(curves.len() >= 2, "{curves:?}"),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_part_that_no_patch_covers_is_refused() {
+    let (mut mesh, network) = square_with(Vec::new());
+    let first = mesh.points.len() as u32;
+    mesh.points.extend([DVec3::Z, DVec3::Z + DVec3::X, DVec3::Z + DVec3::Y]);
+    mesh.triangles.push([first, first + 1, first + 2]);
+    assert!(matches!(imprint(&mesh, &network), Err(ImprintError::Uncovered { faces: 1, .. })));
+}
+
+#[test]
+fn real_meshes_have_layouts_of_disks_with_no_patch_above_8_times_the_mean() {
+    for name in ["fandisk", "goathead", "casting"] {
+        let Some(mesh) = common::data_mesh(&format!("{name}.ply")) else { continue };
+        let network = layout(&mesh, &params(100), &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let areas: Vec<f64> = imprint(&mesh, &network)
+            .unwrap_or_else(|e| panic!("{name}: {e}"))
+            .iter()
+            .map(|p| (0..p.mesh.triangles.len()).map(|t| p.mesh.area(t)).sum())
+            .collect();
+        let mean = areas.iter().sum::<f64>() / areas.len() as f64;
+        let largest = areas.iter().cloned().fold(0.0, f64::max);
+        assert!(largest <= 8.0 * mean, "{name}: {:.1}", largest / mean);
+    }
+}
