@@ -245,7 +245,7 @@ mod tests {
         let path = folder.path().join("n.json");
         write_network(&path, &network, &mesh).unwrap();
         assert_eq!(read_network(&path, &mesh).unwrap(), network);
-        assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 5 + 4 + 4 + 1 + 6 + 1);
+        assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 4 + (4 + 4 + 1) + 2 * 3 + 1);
     }
 
     #[test]
