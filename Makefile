@@ -12,7 +12,9 @@ SHELL   := /bin/bash
 CARGO   ?= cargo
 PLANISH := target/release/planish
 PYTHON  := .venv/bin/python
+DATA    := $(or $(PLANISH_DATA),../shared/data)
 
+.NOTPARALLEL:
 .PHONY: build demo test test-rust test-readers lint bench docs clean
 .DELETE_ON_ERROR:
 
@@ -25,11 +27,14 @@ demo: build
 
 test: test-rust test-readers
 
-test-rust: .stamp/packages
-	$(CARGO) test --release --locked --workspace
+# PLANISH_PYTHON: tests of the file formats read their files back with other libraries, too.
+test-rust: .stamp/packages .stamp/readers
+	@test -d "$(DATA)" || echo "skipped: the tests on measured meshes; there is no $(DATA), and PLANISH_DATA names none"
+	PLANISH_PYTHON=$(abspath $(PYTHON)) $(CARGO) test --release --locked --workspace
 
-# Needs the program, which test-rust has built already when both run.
-test-readers: build .stamp/readers
+# The program as the tests above have built it; `build` would compile what depends on test-only features again.
+test-readers: .stamp/packages .stamp/readers
+	$(CARGO) test --release --locked --workspace --no-run --quiet
 	$(PYTHON) -m pytest -q -rs tests/readers
 
 lint: .stamp/packages
@@ -37,7 +42,7 @@ lint: .stamp/packages
 	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
 
 bench: .stamp/packages
-	$(CARGO) bench --locked -p planish --bench pipeline
+	$(CARGO) bench --profile release --locked --workspace --bench pipeline
 
 docs: build
 	$(CARGO) doc --release --locked --no-deps -p planish -p planish-io

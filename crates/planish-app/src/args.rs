@@ -166,8 +166,10 @@ pub struct Layout {
 /// `planish fit`
 #[derive(Args, Debug)]
 pub struct Fit {
-    /// The mesh: PLY, OBJ, STL, GLB or glTF
-    pub mesh: PathBuf,
+    /// The mesh: PLY, OBJ, STL, GLB or glTF; or a model, whose network and grids are kept: only its surfaces, seams
+    /// and relief are made anew, with its own parameters where no option says otherwise
+    #[arg(value_name = "MESH|MODEL.planish")]
+    pub input: PathBuf,
     /// Network on the mesh [default: an automatic one]
     #[arg(long, value_name = "NETWORK.json")]
     pub network: Option<PathBuf>,
@@ -258,6 +260,19 @@ impl AllStages {
             fit: self.fit.params(seed)?,
             stitch: self.stitch.params(seed)?,
         })
+    }
+
+    /// The parameters for the surfaces of a model that is there already: `stored` with the given options in place.
+    /// # Errors
+    /// If an option is given for a stage that does not run again.
+    pub fn params_over(&self, stored: PipelineParams, seed: Option<u64>) -> Result<PipelineParams, Failure> {
+        if let Some(flag) = self.layout.first_given().or_else(|| self.grid.first_given()) {
+            return Err(Failure::usage(flag, "does not go with a model, whose network and grids are kept")
+                .hint("fit its mesh: `planish export MODEL.planish --surface mesh -o MESH.ply`"));
+        }
+        let fit = self.fit.params_over(stored.fit, seed)?;
+        let stitch = self.stitch.params_over(stored.stitch, seed)?;
+        Ok(PipelineParams { fit, stitch, ..stored })
     }
 
     /// The fit tolerance if the user demanded one, as a fraction of the diagonal.

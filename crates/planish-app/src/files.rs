@@ -41,7 +41,8 @@ pub fn content(path: &Path) -> Result<Content, Failure> {
     if is_model(path) { Ok(Content::Model(Box::new(model(path)?))) } else { Ok(Content::Mesh(mesh(path)?)) }
 }
 
-fn is_model(path: &Path) -> bool {
+/// True for the name of a project file.
+pub fn is_model(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("planish"))
 }
 

@@ -39,7 +39,14 @@ impl<P: StageParams> StageOptions<P> {
     /// # Errors
     /// If the stage refuses a value.
     pub fn params(&self, seed: Option<u64>) -> Result<P, Failure> {
-        self.merge(seed).map_err(|e| Failure::usage(format!("options of the {} stage", P::STAGE), e))
+        self.params_over(P::default(), seed)
+    }
+
+    /// The stage's parameters: `base` with the given options in place.
+    /// # Errors
+    /// If the stage refuses a value.
+    pub fn params_over(&self, base: P, seed: Option<u64>) -> Result<P, Failure> {
+        self.merge(base, seed).map_err(|e| Failure::usage(format!("options of the {} stage", P::STAGE), e))
     }
 
     /// The number given for `variant` of the field `name`, if the user gave one.
@@ -47,8 +54,14 @@ impl<P: StageParams> StageOptions<P> {
         self.given.get(name)?.get(variant)?.as_f64()
     }
 
-    fn merge(&self, seed: Option<u64>) -> Result<P, serde_json::Error> {
-        let mut fields = serde_json::to_value(P::default())?;
+    /// The first option that the user gave, as it is written on the command line.
+    pub fn first_given(&self) -> Option<String> {
+        let field = fields::<P>().into_iter().find(|f| self.given.contains_key(&f.name))?;
+        Some(format!("--{}", field.flag))
+    }
+
+    fn merge(&self, base: P, seed: Option<u64>) -> Result<P, serde_json::Error> {
+        let mut fields = serde_json::to_value(base)?;
         if let Value::Object(fields) = &mut fields {
             fields.extend(self.given.clone());
             if let (Some(seed), true) = (seed, fields.contains_key("seed")) {
@@ -154,7 +167,7 @@ impl Field {
             Kind::Flag => Ok(Value::Bool(text == "true")),
             Kind::Choice(_) => Ok(Value::String(text.into())),
             Kind::Wholes { count } => {
-                let numbers: Result<Vec<u64>, _> = text.split(',').map(|n| n.trim().parse::<u64>()).collect();
+                let numbers: Result<Vec<u64>, _> = text.split([',', 'x']).map(|n| n.trim().parse::<u64>()).collect();
                 match numbers {
                     Ok(numbers) if count.is_none_or(|c| c == numbers.len()) => Ok(numbers.into()),
                     _ => wrong(&match count {
@@ -267,14 +280,15 @@ fn kind_of(property: &Value, schema: &Value) -> Option<(Kind, bool)> {
         let count = property["minItems"].as_u64().filter(|n| property["maxItems"].as_u64() == Some(*n));
         return Some((Kind::Wholes { count: count.map(|n| n as usize) }, false));
     }
+    let nullable = types.contains(&"null");
     let (min, max) = (property["minimum"].as_f64(), property["maximum"].as_f64());
-    let kind = match types.iter().find(|t| **t != "null")? {
-        &"boolean" => Kind::Flag,
-        &"integer" => Kind::Whole { min, max },
-        &"number" => Kind::Real { min, max },
+    let kind = match types.into_iter().find(|t| *t != "null")? {
+        "boolean" => Kind::Flag,
+        "integer" => Kind::Whole { min, max },
+        "number" => Kind::Real { min, max },
         _ => return None,
     };
-    Some((kind, types.contains(&"null")))
+    Some((kind, nullable))
 }
 
 /// The words of a plain enum.

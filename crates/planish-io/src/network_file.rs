@@ -245,7 +245,7 @@ mod tests {
         let path = folder.path().join("n.json");
         write_network(&path, &network, &mesh).unwrap();
         assert_eq!(read_network(&path, &mesh).unwrap(), network);
-        assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 5 + 4 + 4 + 1 + 6 + 1);
+        assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 4 + (4 + 4 + 1) + 2 * 3 + 1);
     }
 
     #[test]
@@ -253,7 +253,8 @@ mod tests {
         let (mesh, good) = square();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("n.json");
-        let faults: [(&str, fn(&mut Network)); 6] = [
+        type Spoil = fn(&mut Network);
+        let faults: [(&str, Spoil); 6] = [
             ("corner 1", |n| n.corners[1].place.face = 2),
             ("curve 2, point 0", |n| n.curves[2].points[0].bary = [0.5, 0.0, 0.0]),
             ("curve 3", |n| n.curves[3].corners[1] = 4),

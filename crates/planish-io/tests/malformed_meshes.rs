@@ -48,6 +48,7 @@ fn table() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("twice.ply", ply(&with("float z", "float x"), &good()), "property \"x\" stands twice (line 6)"),
         ("encoding.ply", ply(&with("ascii", "morse"), &good()), "unknown encoding \"morse\" (line 2)"),
         ("count.ply", ply(&with("vertex 3", "vertex -3"), &good()), "\"-3\" is no count of elements (line 3)"),
+        ("version.ply", ply("ply\nformat ascii 7.0\n", ""), "version \"7.0\" of PLY is unknown (line 2)"),
         ("orphan.ply", ply("ply\nformat ascii 1.0\nproperty float x\n", ""), "before the first element (line 3)"),
         ("endless.ply", ply("ply\nformat ascii 1.0\n", ""), "the header has no end_header"),
         ("novertex.ply", ply("ply\nformat ascii 1.0\nend_header\n", ""), "there is no element \"vertex\""),

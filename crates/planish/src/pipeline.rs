@@ -189,6 +189,36 @@ pub fn refit(
     Ok(clock.records)
 }
 
+/// What [`assess`] finds.
+#[derive(Clone, Debug)]
+pub struct Assessed {
+    /// The stages that ran.
+    pub stages: Vec<StageRecord>,
+    /// Figures of quality.
+    pub quality: Quality,
+    /// How the patches meet, in the order of the curves.
+    pub seams: Vec<SeamQuality>,
+    /// What a user should know.
+    pub warnings: Vec<Warning>,
+}
+
+/// Measures a finished model against its mesh, as [`fit`] does at its end.
+/// # Errors
+/// If the parts of the model do not belong together.
+pub fn assess(model: &Model, observer: &dyn PipelineObserver) -> Result<Assessed, PipelineError> {
+    let mut clock = Clock::new(observer, &WEIGHTS);
+    let measured = measure(model, &mut clock).map_err(|e| or_cancelled(e, observer))?;
+    let quality::Measured { quality, seams, warnings } = measured;
+    Ok(Assessed { stages: clock.records, quality, seams, warnings })
+}
+
+fn measure(model: &Model, clock: &mut Clock) -> Result<quality::Measured, PipelineError> {
+    let (mesh, network) = (&model.mesh, &model.network);
+    let patches = clock.stage("imprint", |_| network::imprint(mesh, network), |p| [("patches", p.len())])?;
+    let repairs = Repairs::default();
+    clock.stage("measure", |o| quality::measure(model, &patches, &repairs, o), |m| [("seams", m.seams.len())])
+}
+
 /// A stage that was stopped fails with an error of its own; to the caller it is always the same.
 fn or_cancelled(error: PipelineError, observer: &dyn PipelineObserver) -> PipelineError {
     if observer.cancelled() { PipelineError::Cancelled } else { error }

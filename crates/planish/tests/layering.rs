@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms and the floor each stands on; a room may use its own and lower floors. The ground floor also speaks of
 /// meshes in its queries, and those are plain types.
-const FLOORS: [(&str, u32); 14] = [
+const FLOORS: [(&str, u32); 15] = [
     ("observe", 0),
     ("linalg", 0),
     ("geom", 1),
@@ -18,6 +18,7 @@ const FLOORS: [(&str, u32); 14] = [
     ("grid", 7),
     ("surface", 8),
     ("relief", 9),
+    ("model", 10),
     ("render", 10),
     ("pipeline", 11),
 ];

@@ -1,5 +1,7 @@
 //! Meshes: adjacency, diagnosis, repair, walking, paths, closest places, comparison.
 
+#![allow(clippy::print_stdout)] // figures and skipped tests are told to who runs them
+
 mod common;
 
 use planish::geom::{Bvh, random};

@@ -1,37 +1,27 @@
-//! `planish fit`: mesh and network to a model.
+//! `planish fit`: mesh and network to a model; or the surfaces of a model anew.
 
-use super::run::{Job, fitted, summary, verdict};
-use super::{Session, commit_report};
+use super::run::{Job, fitted, seam_rows, summary, verdict};
+use super::{Session, commit_report, pipeline_failure};
 use crate::args::Fit;
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::products::Staged;
+use planish::model::{HistoryEntry, Model};
+use planish::pipeline::{self, PipelineParams};
 use planish_io::Up;
+use planish_io::report::Report;
 
 pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
     files::check_extension(&args.output, &["planish"])?;
     let staged = Staged::file(&args.output)?;
     let own_report = session.stage_report()?;
-    let params = args.stages.params(session.common.seed)?;
-    let (input, read) = session.step("read", || files::mesh(&args.mesh))?;
-    let network = files::optional_network(args.network.as_deref(), &input)?;
-    let demanded = args.stages.demanded_tolerance();
-    let job = Job {
-        command: "fit",
-        path: &args.mesh,
-        input: &input,
-        network: network.zip(args.network.as_deref()),
-        params,
-        demanded,
-        output: &args.output,
-        up: Up::default(),
-    };
-    let (mut report, model) = fitted(session, job, vec![read])?;
+    let (mut report, model) = if files::is_model(&args.input) { refit(session, args)? } else { anew(session, args)? };
     let write = || planish_io::write_model(staged.file_path(), &model).map_err(|e| Failure::usage(&args.output, e));
     let ((), record) = session.step("write", write)?;
     report.stages.push(record);
     staged.commit()?;
     commit_report(own_report, &report)?;
+    let demanded = args.stages.demanded_tolerance();
     if !session.common.quiet {
         session.tell_warnings(&report);
         let mut table = summary(&report, demanded);
@@ -39,4 +29,59 @@ pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
         table.print();
     }
     Ok(verdict(&report, demanded))
+}
+
+/// A model of a mesh.
+fn anew(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
+    let params = args.stages.params(session.common.seed)?;
+    let (input, read) = session.step("read", || files::mesh(&args.input))?;
+    let network = files::optional_network(args.network.as_deref(), &input)?;
+    let job = Job {
+        command: "fit",
+        path: &args.input,
+        input: &input,
+        network: network.zip(args.network.as_deref()),
+        params,
+        demanded: args.stages.demanded_tolerance(),
+        output: &args.output,
+        up: Up::default(),
+    };
+    fitted(session, job, vec![read])
+}
+
+/// A model with the mesh, network and grids of another, and surfaces of its own.
+fn refit(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
+    if args.network.is_some() {
+        return Err(Failure::usage("--network", "does not go with a model, which has its own")
+            .hint("fit its mesh: `planish export MODEL.planish --surface mesh -o MESH.ply`"));
+    }
+    // Options that cannot be are told before the file is read.
+    args.stages.params_over(PipelineParams::default(), session.common.seed)?;
+    let (mut model, read) = session.step("read", || files::model(&args.input))?;
+    if model.grids.is_empty() {
+        return Err(Failure::input(&args.input, "has no grids to fit surfaces to").hint("fit its mesh"));
+    }
+    let stored = match model.params.as_str() {
+        "" => PipelineParams::default(),
+        json => serde_json::from_str(json).map_err(|e| {
+            Failure::input(&args.input, format!("has parameters of another version ({e})")).hint("fit its mesh")
+        })?,
+    };
+    let params = args.stages.params_over(stored, session.common.seed)?;
+    if let Some(units) = session.common.units {
+        model.units = units.into();
+    }
+    let mut report = Report::new("fit", files::model_facts(&args.input, &model, model.units));
+    let wrong = |e| pipeline_failure(&args.input, None, e);
+    let fitted = pipeline::refit(&mut model, &params, &session.bars).map_err(wrong)?;
+    let found = pipeline::assess(&model, &session.bars).map_err(wrong)?;
+    report.stages = vec![read];
+    report.stages.extend(fitted);
+    report.stages.extend(found.stages);
+    report.quality = found.quality;
+    report.warnings = found.warnings;
+    report.seams = seam_rows(&model, &found.seams);
+    model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
+    model.history.push(HistoryEntry { command: "refit".into(), parameters: model.params.clone() });
+    Ok((report, model))
 }

@@ -140,7 +140,8 @@ pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
     table
 }
 
-fn seam_rows(model: &Model, seams: &[planish::surface::SeamQuality]) -> Vec<SeamRow> {
+/// The seams of a report, worst first.
+pub fn seam_rows(model: &Model, seams: &[planish::surface::SeamQuality]) -> Vec<SeamRow> {
     let uses = model.network.uses();
     pipeline::worst_seams(seams)
         .into_iter()

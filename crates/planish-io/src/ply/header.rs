@@ -131,6 +131,11 @@ pub(super) fn header(bytes: &[u8]) -> Result<Header, ReadError> {
                     b"binary_big_endian" => Encoding::BigEndian,
                     other => return Err(wrong(format!("unknown encoding \"{}\"", shown(other)), line, REWRITE)),
                 });
+                // A missing version is let pass: it says nothing else.
+                if let Some(version) = words.next().filter(|v| *v != b"1.0") {
+                    let what = format!("version \"{}\" of PLY is unknown", shown(version));
+                    return Err(wrong(what, line, "write the file as PLY 1.0"));
+                }
             }
             b"element" => elements.push(element(words, line)?),
             b"property" => {

@@ -330,9 +330,9 @@ fn stages(page: &mut String, report: &Report) {
             memory(stage.peak_bytes)
         );
     }
-    let _ = write!(
+    let _ = writeln!(
         page,
-        "</tbody><tfoot><tr><td>All</td><td class=\"n\">{} s</td><td></td><td></td><td></td></tr></tfoot></table></div>\n",
+        "</tbody><tfoot><tr><td>All</td><td class=\"n\">{} s</td><td></td><td></td><td></td></tr></tfoot></table></div>",
         number(total)
     );
 }

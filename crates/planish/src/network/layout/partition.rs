@@ -31,9 +31,14 @@ pub(super) struct Ground<'a> {
 }
 
 /// An `f64` that sorts.
-#[derive(PartialEq, PartialOrd)]
+#[derive(PartialEq)]
 struct Sorted(f64);
 impl Eq for Sorted {}
+impl PartialOrd for Sorted {
+    fn partial_cmp(&self, other: &Sorted) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
 impl Ord for Sorted {
     fn cmp(&self, other: &Sorted) -> std::cmp::Ordering {
         self.0.total_cmp(&other.0)

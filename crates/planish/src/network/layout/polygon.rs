@@ -214,7 +214,7 @@ fn sector_angle(mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex, h: u32
     let arc = complex.arc(h);
     let chain = &arc.chain;
     let (first, second) =
-        if h % 2 == 0 { (chain[0], chain[1]) } else { (chain[chain.len() - 1], chain[chain.len() - 2]) };
+        if h.is_multiple_of(2) { (chain[0], chain[1]) } else { (chain[chain.len() - 1], chain[chain.len() - 2]) };
     let (Place::Vertex(v), Place::Vertex(w)) = (first, second) else { return std::f64::consts::PI };
     let fixed = fixed_neighbours(complex, v);
     let Some(mut e) = half_edge(&mesh.triangles, adjacency, v, w) else { return std::f64::consts::PI };
