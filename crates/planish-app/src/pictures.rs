@@ -31,6 +31,13 @@ const GROUND: [u8; 3] = [250, 250, 251];
 /// Stripes over the half sphere: enough to show a kink of half a degree, few enough to be told apart.
 const STRIPES: f64 = 9.0;
 
+/// Quads of the mesh that stands for the surfaces, about: half of those seen from all sides are visible.
+const QUADS: usize = 2 * SIZE.0 * SIZE.1;
+/// Quads per knot span and direction at most.
+const CUTS_PER_SPAN: usize = 8;
+/// Steps of the colour table: finer than a byte of colour can show.
+const COLORS: usize = 1024;
+
 /// Draws all pictures of a report.
 /// # Errors
 /// If the parts of the model do not belong together.
@@ -45,7 +52,9 @@ pub fn pictures(model: &Model, report: &Report, up: Up) -> Result<Vec<Picture>, 
         let image = render::render(mesh, &look, &camera, SIZE.0, SIZE.1).map_err(Failure::fault)?;
         png(&image)
     };
-    let base = pipeline::surface_mesh(model).map_err(Failure::fault)?;
+    // One quad per sample is as fine as can be seen.
+    let cuts = (QUADS / pipeline::span_count(model).max(1)).isqrt().clamp(1, CUTS_PER_SPAN);
+    let base = pipeline::surface_mesh_cut(model, cuts).map_err(Failure::fault)?;
     let displaced = pipeline::displaced_mesh(model).map_err(Failure::fault)?;
     let unit = report.input.units.as_str();
     let mut pictures = Vec::new();
@@ -69,7 +78,9 @@ pub fn pictures(model: &Model, report: &Report, up: Up) -> Result<Vec<Picture>, 
     add("Displaced", caption.into(), draw(&displaced, look)?);
 
     let (values, top) = deviation(&model.mesh, &base);
-    let colors: Vec<[u8; 3]> = values.iter().map(|d| render::field_color((d / top).min(1.0))).collect();
+    let table: Vec<[u8; 3]> = (0..=COLORS).map(|k| render::field_color(k as f64 / COLORS as f64)).collect();
+    let colors: Vec<[u8; 3]> =
+        values.iter().map(|d| table[((d / top).clamp(0.0, 1.0) * COLORS as f64).round() as usize]).collect();
     let caption = "Distance of the input from the surfaces without displacement: what the maps have to carry. 98 of 100 \
                    places lie within the scale.";
     let look = Look { paint: Paint::PerVertex(&colors), hollows: 0.0, ..Look::default() };
@@ -167,11 +178,13 @@ fn deviation(mesh: &TriMesh, surface: &TriMesh) -> (Vec<f64>, f64) {
 fn png(image: &Image) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, image.width as u32, image.height as u32);
-    encoder.set_color(png::ColorType::Rgba);
+    encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::High);
+    encoder.set_compression(png::Compression::Balanced);
     let mut writer = encoder.write_header().map_err(Failure::fault)?;
-    writer.write_image_data(&image.rgba).map_err(Failure::fault)?;
+    // The ground is opaque: a fourth byte would say nothing.
+    let rgb: Vec<u8> = image.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    writer.write_image_data(&rgb).map_err(Failure::fault)?;
     writer.finish().map_err(Failure::fault)?;
     Ok(bytes)
 }

@@ -6,7 +6,7 @@
 mod quality;
 mod record;
 
-pub use quality::{SEAM_ANGLE_WARNING_DEG, displaced_mesh, surface_mesh, worst_seams};
+pub use quality::{SEAM_ANGLE_WARNING_DEG, displaced_mesh, span_count, surface_mesh, surface_mesh_cut, worst_seams};
 pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
 
 use crate::grid::{self, GridError, GridParams};

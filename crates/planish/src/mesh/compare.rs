@@ -177,10 +177,12 @@ impl Side {
         Ok(Side { mesh, sums, bvh })
     }
 
-    /// Sample number `n` of the stream `seed`: position and normal.
-    fn sample(&self, seed: u64, n: u64) -> (DVec3, DVec3) {
+    /// Sample number `n` of `count` of the stream `seed`: position and normal.
+    fn sample(&self, seed: u64, n: u64, count: usize) -> (DVec3, DVec3) {
         let [pick, r, s] = [0, 1, 2].map(|k| random::unit(seed, 3 * n + k));
-        let goal = pick * self.sums[self.sums.len() - 1];
+        // The n-th sample lies in the n-th of equal shares of the area: less spread than free choice, and
+        // neighbours in the mesh are asked one after the other.
+        let goal = (n as f64 + pick) / count as f64 * self.sums[self.sums.len() - 1];
         let t = self.sums.partition_point(|&sum| sum <= goal).min(self.sums.len() - 1);
         let [a, b, c] = self.mesh.corners(t);
         let r = r.sqrt();
@@ -206,7 +208,7 @@ fn measure(
         observer.progress((pass as f64 + result.len() as f64 / params.samples as f64) / 2.0);
         let range = result.len()..(result.len() + CHUNK).min(params.samples);
         result.par_extend(range.into_par_iter().map(|n| {
-            let (p, m) = from.sample(seed, n as u64);
+            let (p, m) = from.sample(seed, n as u64, params.samples);
             let hit = to.bvh.closest(p);
             let n = to.mesh.normal(hit.place.face as usize);
             (hit.distance, m.cross(n).length().atan2(m.dot(n)).to_degrees())

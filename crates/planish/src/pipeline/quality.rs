@@ -7,12 +7,18 @@ use crate::model::Model;
 use crate::network::{CurveKind, Network, PatchMesh};
 use crate::observe::Observer;
 use crate::relief;
-use crate::surface::{self, SeamQuality};
+use crate::surface::basis::uniform_parameters;
+use crate::surface::{self, SeamQuality, Surface};
 use rayon::prelude::*;
 
-/// Triangles per knot span and direction in the mesh that stands for a surface when distances are measured:
+/// Quads per knot span and direction, at most, in the mesh that stands for a surface when distances are measured:
 /// between them a cubic span with a turn of 30 degrees leaves its chord by less than 1/500 of its length.
 const CUTS_PER_SPAN: usize = 6;
+/// Fewer quads do if the mesh leaves the surfaces by this share of the distances to be measured (root mean squares):
+/// it then adds a thousandth to them.
+const CHORD_SHARE: f64 = 0.05;
+/// Distances below this share of the diagonal are not told apart: the precision of files with `f32` positions.
+const FINEST: f64 = 1e-7;
 /// Smooth seams that bend by more are told to the user: half a degree is the default of a common CAD program.
 pub const SEAM_ANGLE_WARNING_DEG: f64 = 0.5;
 
@@ -45,6 +51,7 @@ pub(super) fn measure(
     length(&mut quality, "surface.patch_rms_max", worst.reduce(|| 0.0, f64::max), diagonal);
     let base = surface_mesh(model)?;
     distances(&mut quality, "surface", &compare(&model.mesh, &base, &Share(observer, 0.1, 0.45))?, diagonal);
+    drop(base);
     let displaced = displaced_mesh(model)?;
     distances(&mut quality, "displaced", &compare(&model.mesh, &displaced, &Share(observer, 0.55, 0.45))?, diagonal);
     relief_figures(model, diagonal, &mut quality, &mut warnings)?;
@@ -63,8 +70,48 @@ pub fn displaced_mesh(model: &Model) -> Result<TriMesh, PipelineError> {
 /// # Errors
 /// If the parts of the model do not belong together.
 pub fn surface_mesh(model: &Model) -> Result<TriMesh, PipelineError> {
-    let shapes = relief::span_shapes(&model.surfaces, CUTS_PER_SPAN);
+    // Sampling relies on sound surfaces.
+    model.surfaces.iter().try_for_each(Surface::check).map_err(relief::ReliefError::from)?;
+    surface_mesh_cut(model, cuts_to_measure(model))
+}
+
+/// The smooth surfaces of a model as one mesh, with `cuts` quads per knot span and direction.
+/// # Errors
+/// If the parts of the model do not belong together.
+pub fn surface_mesh_cut(model: &Model, cuts: usize) -> Result<TriMesh, PipelineError> {
+    let shapes = relief::span_shapes(&model.surfaces, cuts);
     Ok(relief::surface_mesh(&model.network, &model.surfaces, &shapes)?)
+}
+
+/// Knot spans of all surfaces of a model.
+pub fn span_count(model: &Model) -> usize {
+    relief::span_shapes(&model.surfaces, 1).iter().map(|[rows, cols]| (rows - 1) * (cols - 1)).sum()
+}
+
+/// Quads per knot span that let distances to the surfaces be measured on their mesh.
+///
+/// A triangle of a net of steps `h` leaves a surface by at most `h^2 (|S_uu| + 2 |S_uv| + |S_vv|) / 8` (Filip,
+/// Magedson, Markot 1986, *Surface Algorithms Using Bounds on Derivatives*).
+fn cuts_to_measure(model: &Model) -> usize {
+    let diagonal = model.mesh.bounds().diagonal();
+    let squares = |s: &Surface, wanted: f64| {
+        let [rows, cols] = relief::span_shapes(std::slice::from_ref(s), 1)[0];
+        let (us, vs) = (uniform_parameters(cols), uniform_parameters(rows));
+        let (hu, hv) = (1.0 / (cols - 1) as f64, 1.0 / (rows - 1) as f64);
+        let [uu, uv, vv] = [[2, 0], [1, 1], [0, 2]].map(|order| s.sample(&us, &vs, order));
+        let leave =
+            uu.iter().zip(&uv).zip(&vv).map(|((uu, uv), vv)| {
+                (hu * hu * uu.length() + 2.0 * hu * hv * uv.length() + hv * hv * vv.length()) / 8.0
+            });
+        (leave.map(|e| e * e).sum::<f64>(), us.len() * vs.len(), wanted * wanted * (us.len() * vs.len()) as f64)
+    };
+    let each: Vec<(f64, usize, f64)> =
+        model.surfaces.par_iter().zip(&model.grids).map(|(s, g)| squares(s, surface::deviation_of(s, g).rms)).collect();
+    let count = each.iter().map(|e| e.1).sum::<usize>().max(1) as f64;
+    let leave = (each.iter().map(|e| e.0).sum::<f64>() / count).sqrt();
+    let wanted = CHORD_SHARE * (each.iter().map(|e| e.2).sum::<f64>() / count).sqrt().max(FINEST * diagonal);
+    // A number that is none asks for the finest.
+    (1..CUTS_PER_SPAN).find(|&cuts| leave / (cuts * cuts) as f64 <= wanted).unwrap_or(CUTS_PER_SPAN)
 }
 
 fn compare(input: &TriMesh, result: &TriMesh, observer: &dyn Observer) -> Result<Comparison, PipelineError> {

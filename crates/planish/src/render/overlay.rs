@@ -110,3 +110,18 @@ fn written(value: f64, span: f64) -> String {
     let digits = (1 - span.abs().max(1e-12).log10().floor() as i32).clamp(0, 6) as usize;
     format!("{value:.digits$}")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::written;
+
+    #[test]
+    fn numbers_of_a_scale_have_the_two_digits_that_its_span_needs() {
+        let ticks = |low: f64, high: f64| [0.0, 0.5, 1.0].map(|x| written(low + (high - low) * x, high - low));
+        assert_eq!(ticks(-1.0, 1.0), ["-1.0", "0", "1.0"]);
+        assert_eq!(ticks(0.0, 0.02), ["0", "0.010", "0.020"]);
+        assert_eq!(ticks(0.0, 250.0), ["0", "125", "250"]);
+        assert_eq!(ticks(0.0, 2e-6), ["0", "1.00e-6", "2.00e-6"]);
+        assert_eq!(written(f64::NAN, 1.0), "NaN");
+    }
+}

@@ -16,7 +16,7 @@ pub(super) type Sample = Option<Vec3>;
 const TABLE: usize = 1024;
 
 pub(super) fn shade(mesh: &TriMesh, look: &Look, frame: &Frame, seen: &Seen) -> Vec<Sample> {
-    let normals = corner_normals(mesh, look.crease_deg);
+    let normals = corner_normals(mesh, look.crease_deg, seen);
     let open = if look.hollows > 0.0 { openness(mesh, frame, seen) } else { Vec::new() };
     let table: Vec<Vec3> = (0..=TABLE).map(|k| light(field_color(k as f64 / TABLE as f64))).collect();
     (0..seen.face.len())
@@ -30,7 +30,7 @@ pub(super) fn shade(mesh: &TriMesh, look: &Look, frame: &Frame, seen: &Seen) -> 
             let ray = frame.ray(x as f64 + 0.5, y as f64 + 0.5);
             let corners = mesh.corners(face as usize);
             let bary = weights(corners, frame.camera.eye, ray);
-            let [l, m, n]: [DVec3; 3] = std::array::from_fn(|k| normals[3 * face as usize + k]);
+            let [l, m, n] = normals.of(face);
             let mut normal = (l * bary[0] + m * bary[1] + n * bary[2]).normalize_or(-frame.camera.forward);
             let geometric = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
             let back = geometric.dot(ray) > 0.0;
@@ -121,41 +121,62 @@ fn zebra(frame: &Frame, normal: DVec3, view: DVec3, stripes: f64) -> Vec3 {
     }
 }
 
-/// Normals at the corners: mean over the triangles of the fan that no sharp edge parts.
-fn corner_normals(mesh: &TriMesh, crease_deg: f64) -> Vec<DVec3> {
-    let count = 3 * mesh.triangles.len();
-    let facets: Vec<DVec3> = (0..count / 3).into_par_iter().map(|t| mesh.area_vector(t)).collect();
+/// Normals at the corners of the triangles that are seen.
+struct CornerNormals {
+    /// Place among `normals`, for each triangle that is seen.
+    place: Vec<u32>,
+    normals: Vec<[DVec3; 3]>,
+}
+
+impl CornerNormals {
+    fn of(&self, face: u32) -> [DVec3; 3] {
+        self.normals[self.place[face as usize] as usize]
+    }
+}
+
+/// Mean over the triangles of the fan at a corner that no sharp edge parts.
+fn corner_normals(mesh: &TriMesh, crease_deg: f64, seen: &Seen) -> CornerNormals {
+    let mut place = vec![NOTHING; mesh.triangles.len()];
+    let mut faces = Vec::new();
+    for &face in seen.face.iter().filter(|&&f| f != NOTHING) {
+        let place = &mut place[face as usize];
+        if *place == NOTHING {
+            *place = faces.len() as u32;
+            faces.push(face);
+        }
+    }
     if crease_deg <= 0.0 {
-        return (0..count).map(|c| facets[c / 3].normalize_or_zero()).collect();
+        let normals = faces.par_iter().map(|&f| [mesh.area_vector(f as usize).normalize_or_zero(); 3]).collect();
+        return CornerNormals { place, normals };
     }
     let adjacency = Adjacency::new(mesh);
     let sharp = sharp_edges(mesh, &adjacency, crease_deg);
     let passable = |h: u32| adjacency.opposite[h as usize] != NONE && !sharp[h as usize];
-    (0..count as u32)
-        .into_par_iter()
-        .map(|corner| {
-            let mut sum = facets[corner as usize / 3];
-            // Counter-clockwise over the edge that comes in, then clockwise over the edge that goes out.
-            let mut h = corner;
-            loop {
-                let incoming = crate::mesh::previous(h);
-                if !passable(incoming) {
-                    break;
-                }
-                h = adjacency.opposite[incoming as usize];
-                if h == corner {
-                    return sum.normalize_or_zero();
-                }
-                sum += facets[h as usize / 3];
+    let facet = |h: u32| mesh.area_vector(h as usize / 3);
+    let at = |corner: u32| {
+        let mut sum = facet(corner);
+        // Counter-clockwise over the edge that comes in, then clockwise over the edge that goes out.
+        let mut h = corner;
+        loop {
+            let incoming = crate::mesh::previous(h);
+            if !passable(incoming) {
+                break;
             }
-            let mut h = corner;
-            while passable(h) {
-                h = next(adjacency.opposite[h as usize]);
-                sum += facets[h as usize / 3];
+            h = adjacency.opposite[incoming as usize];
+            if h == corner {
+                return sum.normalize_or_zero();
             }
-            sum.normalize_or_zero()
-        })
-        .collect()
+            sum += facet(h);
+        }
+        let mut h = corner;
+        while passable(h) {
+            h = next(adjacency.opposite[h as usize]);
+            sum += facet(h);
+        }
+        sum.normalize_or_zero()
+    };
+    let normals = faces.par_iter().map(|&f| [0, 1, 2].map(|k| at(3 * f + k))).collect();
+    CornerNormals { place, normals }
 }
 
 /// Directions looked at per pixel to find hollows.
