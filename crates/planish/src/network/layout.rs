@@ -17,14 +17,15 @@ mod refine;
 mod slide;
 
 use super::imprint::Shared;
-use super::{Corner, Curve, CurveKind, Network, Patch, Side, imprint};
-use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh};
+use super::{Corner, Curve, Network, Patch, Side, imprint};
+use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
 use crate::observe::Observer;
 use complex::Complex;
 use recut::Bench;
 use refine::Refined;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 
 /// Edges of the working mesh against the side of a patch: short enough for a curve to find its way.
 const EDGE_TO_SIDE: f64 = 0.12;
@@ -101,9 +102,16 @@ pub fn layout(mesh: &TriMesh, params: &LayoutParams, observer: &dyn Observer) ->
     let side = (area / params.patches.max(1) as f64).sqrt();
     let mut edge = EDGE_TO_SIDE * side;
     let (sharp, _) = lines::feature_lines(mesh, &adjacency, params);
+    let mut fixed = vec![false; mesh.points.len()];
+    for h in 0..sharp.len() as u32 {
+        if sharp[h as usize] || adjacency.opposite[h as usize] == NONE {
+            fixed[mesh.origin(h) as usize] = true;
+            fixed[mesh.origin(next(h)) as usize] = true;
+        }
+    }
     for _ in 0..ATTEMPTS {
-        let work = refine::refine(mesh, edge);
-        if let Some(complex) = draft(&work, mesh, &adjacency, &sharp, side, params, observer)? {
+        let work = refine::refine(mesh, edge, &fixed);
+        if let Some((work, complex)) = draft(work, &sharp, side, params, observer)? {
             let work_adjacency = Adjacency::new(&work.mesh);
             if let Some(mut bench) = Bench::new(&work.mesh, &work_adjacency, complex)
                 && improve::quads(&mut bench)
@@ -141,54 +149,71 @@ fn check(mesh: &TriMesh) -> Result<(), LayoutError> {
     }
 }
 
-/// The complex of even cells, with about as many quads to come as asked for. `None` if the working mesh is too
-/// coarse.
+/// The complex of even cells, with about as many quads to come as asked for, and the working mesh that it lies on.
+/// `None` if the cells cannot be made even.
 fn draft(
-    work: &Refined,
-    mesh: &TriMesh,
-    adjacency: &Adjacency,
+    work: Refined,
     sharp: &[bool],
     side: f64,
     params: &LayoutParams,
     observer: &dyn Observer,
-) -> Result<Option<Complex>, LayoutError> {
-    let work_adjacency = Adjacency::new(&work.mesh);
-    let work_sharp = carry(work, mesh, adjacency, &work_adjacency, sharp);
-    let ground = partition::Ground::new(&work.mesh, &work_adjacency, &work_sharp);
-    let corner = outline::corners(&ground, side / 4.0);
+) -> Result<Option<(Refined, Complex)>, LayoutError> {
+    let adjacency = Adjacency::new(&work.mesh);
+    let work_sharp = carry(&work, &adjacency, sharp);
+    let ground = partition::Ground::new(&work.mesh, &adjacency, &work_sharp);
     let mut cells = (params.patches as f64 / 2.0).max(1.0);
-    let mut best: Option<(usize, Complex)> = None;
+    let mut best: Option<(usize, Refined, Complex)> = None;
     for attempt in 0..COUNT_ATTEMPTS {
         observer.progress(0.1 * attempt as f64);
         let (label, count) = partition::partition(&ground, cells.round() as usize, COVER * side, observer)?;
-        let mut complex = outline::outline(&ground, &label, count, &corner);
-        if !polygon::make_even(&work.mesh, &mut complex) {
-            return Ok(best.map(|b| b.1));
+        let (finer, mut complex) = draw(&work, &ground, sharp, &label, count, side / 4.0);
+        if !polygon::make_even(&finer.mesh, &mut complex) {
+            break;
         }
         let quads: usize = complex.live_cells().map(|c| complex.loop_of(c).len() / 2 - 1).sum();
         let miss = quads.abs_diff(params.patches);
         if best.as_ref().is_none_or(|b| miss < b.0) {
-            best = Some((miss, complex));
+            best = Some((miss, finer, complex));
         }
         let ratio = params.patches as f64 / quads.max(1) as f64;
-        if (0.9..1.1).contains(&ratio) || (ratio < 1.0 && cells <= 1.0) {
+        let fewest = cells.round() < 2.0 || count as f64 > 1.5 * cells;
+        if (0.9..1.1).contains(&ratio) || (ratio < 1.0 && fewest) {
             break;
         }
         cells = (cells * ratio).max(1.0);
     }
-    Ok(best.map(|b| b.1))
+    Ok(best.map(|b| (b.1, b.2)))
+}
+
+/// The complex of labelled cells. Arcs of a single edge get an inner vertex: the working mesh is split there.
+fn draw(
+    work: &Refined,
+    ground: &partition::Ground,
+    sharp: &[bool],
+    label: &[u32],
+    count: usize,
+    reach: f64,
+) -> (Refined, Complex) {
+    let complex = outline::outline(ground, label, count, &outline::corners(ground, reach));
+    let short: HashSet<[u32; 2]> = complex
+        .live_arcs()
+        .filter_map(|a| match complex.arc(2 * a).chain[..] {
+            [imprint::Place::Vertex(a), imprint::Place::Vertex(b)] => Some([a.min(b), a.max(b)]),
+            _ => None,
+        })
+        .collect();
+    let (finer, from) = refine::split(work, |a, b| short.contains(&[a, b]));
+    let label: Vec<u32> = from.iter().map(|&f| label[f as usize]).collect();
+    let adjacency = Adjacency::new(&finer.mesh);
+    let finer_sharp = carry(&finer, &adjacency, sharp);
+    let ground = partition::Ground::new(&finer.mesh, &adjacency, &finer_sharp);
+    let complex = outline::outline(&ground, &label, count, &outline::corners(&ground, reach));
+    (finer, complex)
 }
 
 /// The sharp half-edges of the working mesh: the pieces of those of the input.
-fn carry(
-    work: &Refined,
-    mesh: &TriMesh,
-    adjacency: &Adjacency,
-    work_adjacency: &Adjacency,
-    sharp: &[bool],
-) -> Vec<bool> {
-    let _ = (mesh, adjacency);
-    let mut carried = vec![false; work_adjacency.opposite.len()];
+fn carry(work: &Refined, adjacency: &Adjacency, sharp: &[bool]) -> Vec<bool> {
+    let mut carried = vec![false; adjacency.opposite.len()];
     for (f, (face, corners)) in work.parent.iter().enumerate() {
         for k in 0..3 {
             let (a, b) = (corners[k], corners[(k + 1) % 3]);
@@ -257,5 +282,3 @@ fn common_face(adjacency: &Adjacency, triangles: &[[u32; 3]], pair: &[imprint::P
         .find(|&f| pair.iter().all(|p| p.on_face(adjacency, triangles, f).is_some()))
         .expect("neighbouring places share a face")
 }
-
-const _: CurveKind = CurveKind::Smooth;

@@ -13,70 +13,82 @@ pub(super) struct Refined {
     pub parent: Vec<(u32, [[f64; 3]; 3])>,
 }
 
-/// Splits every edge longer than `longest` at its middle until none is left.
-pub(super) fn refine(mesh: &TriMesh, longest: f64) -> Refined {
+/// Splits every edge longer than `longest` at its middle until none is left. Edges with both ends on a fixed line
+/// (`fixed`, per vertex) are split once in any case: a curve across a narrow strip needs an inner vertex.
+pub(super) fn refine(mesh: &TriMesh, longest: f64, fixed: &[bool]) -> Refined {
     let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let mut out = Refined {
+    let mut work = Refined {
         mesh: TriMesh::new(mesh.points.clone(), mesh.triangles.clone()),
         parent: (0..mesh.triangles.len() as u32).map(|f| (f, unit)).collect(),
     };
-    for _ in 0..ROUNDS {
-        let adjacency = Adjacency::new(&out.mesh);
-        let mut middle: HashMap<u32, u32> = HashMap::new();
-        let mut points = std::mem::take(&mut out.mesh.points);
-        for h in 0..adjacency.opposite.len() as u32 {
-            let tri = out.mesh.triangles[h as usize / 3];
-            let (a, b) = (tri[h as usize % 3] as usize, tri[next(h) as usize % 3] as usize);
-            let o = adjacency.opposite[h as usize];
-            if (o == NONE || h < o) && points[a].distance(points[b]) > longest {
-                let m = points.len() as u32;
-                // From the lower vertex, so that the place does not depend on the face.
-                let (a, b) = (a.min(b), a.max(b));
-                points.push(points[a].midpoint(points[b]));
-                middle.insert(h, m);
-                if o != NONE {
-                    middle.insert(o, m);
-                }
-            }
-        }
-        let mut triangles = Vec::with_capacity(out.mesh.triangles.len());
-        let mut parent = Vec::with_capacity(out.parent.len());
-        for (f, (&tri, &(face, bary))) in out.mesh.triangles.iter().zip(&out.parent).enumerate() {
-            let mids: [Option<u32>; 3] = std::array::from_fn(|k| middle.get(&(3 * f as u32 + k as u32)).copied());
-            let half = |k: usize| -> [f64; 3] { std::array::from_fn(|i| (bary[k][i] + bary[(k + 1) % 3][i]) / 2.0) };
-            // Corners 0..3 are the triangle's, 3..6 the middles of its edges.
-            let names =
-                [tri[0], tri[1], tri[2], mids[0].unwrap_or(NONE), mids[1].unwrap_or(NONE), mids[2].unwrap_or(NONE)];
-            let places = [bary[0], bary[1], bary[2], half(0), half(1), half(2)];
-            let split: Vec<usize> = (0..3).filter(|&k| mids[k].is_some()).collect();
-            let pieces: Vec<[usize; 3]> = match split[..] {
-                [] => vec![[0, 1, 2]],
-                [k] => vec![[k, 3 + k, (k + 2) % 3], [3 + k, (k + 1) % 3, (k + 2) % 3]],
-                [_, _] => {
-                    let k = (0..3).find(|&k| mids[k].is_none()).expect("one edge is whole");
-                    let (a, b, c) = (k, (k + 1) % 3, (k + 2) % 3);
-                    let (m, n) = (3 + b, 3 + c); // on b-c and c-a
-                    let at = |i: usize| points[names[i] as usize];
-                    if at(a).distance(at(m)) <= at(b).distance(at(n)) {
-                        vec![[m, c, n], [a, b, m], [a, m, n]]
-                    } else {
-                        vec![[m, c, n], [a, b, n], [b, m, n]]
-                    }
-                }
-                _ => vec![[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
-            };
-            for piece in pieces {
-                triangles.push(piece.map(|i| names[i]));
-                parent.push((face, piece.map(|i| places[i])));
-            }
-        }
-        out.mesh = TriMesh::new(points, triangles);
-        out.parent = parent;
-        if middle.is_empty() {
+    for round in 0..ROUNDS {
+        let points = &work.mesh.points;
+        let chosen = |a: u32, b: u32| {
+            let narrow = round == 0 && fixed[a as usize] && fixed[b as usize];
+            narrow || points[a as usize].distance(points[b as usize]) > longest
+        };
+        let (finer, from) = split(&work, chosen);
+        if from.len() == work.parent.len() {
             break;
         }
+        work = finer;
     }
-    out
+    work
+}
+
+/// Splits the edges between the vertices that `chosen` accepts (lower vertex first) at their middle. Returns the
+/// finer mesh and for each of its faces the face that it is a part of.
+pub(super) fn split(work: &Refined, chosen: impl Fn(u32, u32) -> bool) -> (Refined, Vec<u32>) {
+    let adjacency = Adjacency::new(&work.mesh);
+    let mut middle: HashMap<u32, u32> = HashMap::new();
+    let mut points = work.mesh.points.clone();
+    for h in 0..adjacency.opposite.len() as u32 {
+        let o = adjacency.opposite[h as usize];
+        let (a, b) = (work.mesh.origin(h), work.mesh.origin(next(h)));
+        // From the lower vertex, so that the place does not depend on the face.
+        let (a, b) = (a.min(b), a.max(b));
+        if (o == NONE || h < o) && chosen(a, b) {
+            let m = points.len() as u32;
+            points.push(points[a as usize].midpoint(points[b as usize]));
+            middle.insert(h, m);
+            if o != NONE {
+                middle.insert(o, m);
+            }
+        }
+    }
+    let mut from = Vec::with_capacity(work.parent.len());
+    let mut triangles = Vec::with_capacity(work.mesh.triangles.len());
+    let mut parent = Vec::with_capacity(work.parent.len());
+    for (f, (&tri, &(face, bary))) in work.mesh.triangles.iter().zip(&work.parent).enumerate() {
+        let mids: [Option<u32>; 3] = std::array::from_fn(|k| middle.get(&(3 * f as u32 + k as u32)).copied());
+        let half = |k: usize| -> [f64; 3] { std::array::from_fn(|i| (bary[k][i] + bary[(k + 1) % 3][i]) / 2.0) };
+        // Corners 0..3 are the triangle's, 3..6 the middles of its edges.
+        let names = [tri[0], tri[1], tri[2], mids[0].unwrap_or(NONE), mids[1].unwrap_or(NONE), mids[2].unwrap_or(NONE)];
+        let places = [bary[0], bary[1], bary[2], half(0), half(1), half(2)];
+        let split: Vec<usize> = (0..3).filter(|&k| mids[k].is_some()).collect();
+        let pieces: Vec<[usize; 3]> = match split[..] {
+            [] => vec![[0, 1, 2]],
+            [k] => vec![[k, 3 + k, (k + 2) % 3], [3 + k, (k + 1) % 3, (k + 2) % 3]],
+            [_, _] => {
+                let k = (0..3).find(|&k| mids[k].is_none()).expect("one edge is whole");
+                let (a, b, c) = (k, (k + 1) % 3, (k + 2) % 3);
+                let (m, n) = (3 + b, 3 + c); // on b-c and c-a
+                let at = |i: usize| points[names[i] as usize];
+                if at(a).distance(at(m)) <= at(b).distance(at(n)) {
+                    vec![[m, c, n], [a, b, m], [a, m, n]]
+                } else {
+                    vec![[m, c, n], [a, b, n], [b, m, n]]
+                }
+            }
+            _ => vec![[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
+        };
+        for piece in pieces {
+            triangles.push(piece.map(|i| names[i]));
+            parent.push((face, piece.map(|i| places[i])));
+            from.push(f as u32);
+        }
+    }
+    (Refined { mesh: TriMesh::new(points, triangles), parent }, from)
 }
 
 impl Refined {
