@@ -69,7 +69,7 @@ def terminal(request):
 
 
 def test_bars_show_the_stage_and_are_gone_at_the_end(terminal, tmp_path):
-    run = terminal("demo", "-o", "out", "--triangles", 40000, cwd=tmp_path)
+    run = terminal("demo", "-o", "out", "--triangles", 20000, cwd=tmp_path)
     assert run.read(120, BAR), run.seen
     run.read(240)
     assert run.process.wait() == 0
