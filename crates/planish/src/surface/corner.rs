@@ -9,6 +9,7 @@
 //! corner whatever the resolution.
 
 use super::Surface;
+use super::fold::MeanNormals;
 use super::sides::{is_smooth, place};
 use crate::network::Network;
 use glam::{DMat3, DVec3};
@@ -98,8 +99,13 @@ struct Wedge {
 }
 
 /// Finds the sectors of all corners and their planes.
-pub(crate) fn planes(network: &Network, surfaces: &[Surface], curves: &[Vec<DVec3>]) -> Planes {
-    let wedges: Vec<Wedge> = (0..4 * surfaces.len()).map(|w| wedge(network, &surfaces[w / 4], w / 4, w % 4)).collect();
+pub(crate) fn planes(
+    network: &Network,
+    surfaces: &[Surface],
+    means: &[MeanNormals],
+    curves: &[Vec<DVec3>],
+) -> Planes {
+    let wedges: Vec<Wedge> = (0..4 * surfaces.len()).map(|w| wedge(network, &surfaces[w / 4], &means[w / 4], w / 4, w % 4)).collect();
     let mut around: Vec<[Vec<usize>; 2]> = vec![Default::default(); network.curves.len()];
     for (w, wedge) in wedges.iter().enumerate() {
         wedge.ends.iter().for_each(|&(c, e)| around[c][e].push(w));
@@ -140,7 +146,7 @@ pub(crate) fn planes(network: &Network, surfaces: &[Surface], curves: &[Vec<DVec
     found
 }
 
-fn wedge(network: &Network, surface: &Surface, patch: usize, k: usize) -> Wedge {
+fn wedge(network: &Network, surface: &Surface, means: &MeanNormals, patch: usize, k: usize) -> Wedge {
     let (next, before) = (network.patches[patch].sides[k], network.patches[patch].sides[(k + 3) % 4]);
     let (u, v) = place(k, false, 0.0);
     let jet = surface.jet(u, v);
@@ -153,7 +159,7 @@ fn wedge(network: &Network, surface: &Surface, patch: usize, k: usize) -> Wedge 
         u: jet.u * to_u,
         v: jet.v * to_v,
         twist: jet.uv * to_u * to_v,
-        normal: jet.area_vector().normalize_or_zero(),
+        normal: means.mend(jet.area_vector(), u, v),
         angle: jet.area_vector().length().atan2(to_u * to_v * jet.u.dot(jet.v)),
     }
 }
