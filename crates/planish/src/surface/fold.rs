@@ -20,7 +20,8 @@ const CREDIBLE: f64 = 0.5;
 /// Relative length of `S_u x S_v` below which there is no normal: corners with an angle of 0 or 180 degrees.
 const FLAT: f64 = 1e-6;
 
-/// Number of samples at which the surface points against its grid.
+/// Number of samples at which a surface points against the grid that it was fitted to; four per knot span and
+/// direction are looked at. 0 for a surface that does not fold.
 pub fn folds(surface: &Surface, grid: &Grid) -> usize {
     let means = MeanNormals::new(grid, [surface.cols, surface.rows]);
     let spans = [surface.cols - 3, surface.rows - 3];

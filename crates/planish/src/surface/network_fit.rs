@@ -25,7 +25,7 @@ const ROUNDS: usize = 3;
 
 /// Weights of the smoothing that folded patches get, one after the other until they are open: from a tenth of what
 /// the nodes weigh to a surface that is all but the blend of its boundary.
-const SMOOTHING: [f64; 5] = [0.1, 1.0, 10.0, 100.0, 1000.0];
+const SMOOTHING: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
 
 /// How to fit the surfaces of a network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -44,9 +44,9 @@ pub struct FitParams {
 }
 
 impl Default for FitParams {
-    /// A tolerance of 1/500 of the diagonal and four cells per span: the smooth shape; the relief has the rest.
+    /// A tolerance of 1/1000 of the diagonal and four cells per span: the smooth shape; the relief has the rest.
     fn default() -> FitParams {
-        FitParams { resolution: Resolution::Tolerance(2e-3), cells_per_span: 4.0, smoothing: 0.01 }
+        FitParams { resolution: Resolution::Tolerance(1e-3), cells_per_span: 4.0, smoothing: 0.01 }
     }
 }
 
@@ -97,13 +97,23 @@ pub fn fit_network(
             surfaces = fit(&counts, &smoothing)?;
         }
     }
+    let folded =
+        |surfaces: &[Surface]| -> Vec<usize> { surfaces.par_iter().zip(grids).map(|(s, g)| folds(s, g)).collect() };
+    let mut counted = folded(&surfaces);
     for weight in SMOOTHING.into_iter().filter(|&w| w > params.smoothing) {
-        let folded: Vec<bool> = surfaces.par_iter().zip(grids).map(|(s, g)| folds(s, g) > 0).collect();
-        if !folded.contains(&true) {
+        if counted.iter().all(|&n| n == 0) {
             break;
         }
-        smoothing.iter_mut().zip(&folded).filter(|(_, folded)| **folded).for_each(|(s, _)| *s = weight);
+        let trial: Vec<f64> = smoothing.iter().zip(&counted).map(|(&s, &n)| if n > 0 { weight } else { s }).collect();
+        let found = folded(&fit(&counts, &trial)?);
+        // A fold that smoothing does not at least halve is the grid's own, and the detail would be lost for nothing.
+        for p in 0..grids.len() {
+            if counted[p] > 0 && 2 * found[p] <= counted[p] {
+                smoothing[p] = weight;
+            }
+        }
         surfaces = fit(&counts, &smoothing)?;
+        counted = folded(&surfaces);
     }
     Ok(surfaces)
 }

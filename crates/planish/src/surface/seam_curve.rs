@@ -24,8 +24,8 @@ const ALIKE: f64 = 0.94;
 const FEWEST_BENT: usize = 6;
 /// Damping of the conditions at the ends, each of diagonal 1: contradicting ones share their miss.
 const DAMPING: f64 = 1e-7;
-/// How far a leg of the control polygon may change, over its length: a turn of 45 degrees.
-const LEEWAY: f64 = 0.77;
+/// How far a leg of the control polygon may change, over its length: a turn of 60 degrees.
+const LEEWAY: f64 = 1.0;
 /// Conditions depend on the direction that they change a little; the second pass sees to that.
 const PASSES: usize = 2;
 /// Samples per knot span of a field of normals, enough for its cubic and the products with cubics.
@@ -44,7 +44,8 @@ struct Condition {
 }
 
 /// Moves a curve so that at its ends it runs in the planes there and bends as they say.
-pub(crate) fn constrain(curve: &[DVec3], planes: [Vec<Plane>; 2], direction: &Direction) -> Vec<DVec3> {
+/// `index` is that of the curve.
+pub(crate) fn constrain(index: usize, curve: &[DVec3], planes: [Vec<Plane>; 2], direction: &Direction) -> Vec<DVec3> {
     let mut moved = curve.to_vec();
     if planes.iter().all(Vec::is_empty) {
         return moved;
@@ -52,7 +53,7 @@ pub(crate) fn constrain(curve: &[DVec3], planes: [Vec<Plane>; 2], direction: &Di
     // Without the bends if those distort the curve, as it was if its tangents would.
     for bent in [true, false] {
         for _ in 0..PASSES {
-            moved = meet(curve, &conditions(&moved, &planes, bent), direction);
+            moved = meet(curve, &conditions(index, &moved, &planes, bent), direction);
         }
         if keeps_shape(curve, &moved) {
             return moved;
@@ -68,7 +69,7 @@ fn keeps_shape(curve: &[DVec3], moved: &[DVec3]) -> bool {
     legs.into_iter().all(|(a, b)| ((b[1] - b[0]) - (a[1] - a[0])).length() <= LEEWAY * (a[1] - a[0]).length())
 }
 
-fn conditions(curve: &[DVec3], planes: &[Vec<Plane>; 2], bent: bool) -> Vec<Condition> {
+fn conditions(at: usize, curve: &[DVec3], planes: &[Vec<Plane>; 2], bent: bool) -> Vec<Condition> {
     let n = curve.len();
     let (first, second) = end_weights(n);
     let mut list = Vec::new();
@@ -82,13 +83,17 @@ fn conditions(curve: &[DVec3], planes: &[Vec<Plane>; 2], bent: bool) -> Vec<Cond
                 value: -first[0] * normal.dot(curve[index(0)]),
             });
         };
-        if let [a, b] = planes[..]
+        if let [a, b] = &planes[..]
             && a.normal.dot(b.normal) > ALIKE
         {
             tangency((a.normal + b.normal).normalize());
             continue;
         }
         planes.iter().for_each(|p| tangency(p.normal));
+        let turned = planes.iter().find_map(|p| Some((p, p.direction(at, end)?)));
+        if let Some((plane, d)) = turned {
+            tangency(plane.normal.cross(d));
+        }
         for plane in planes.iter().filter(|p| bent && p.credible && n >= FEWEST_BENT) {
             list.push(Condition {
                 weights: vec![(index(1), second[1]), (index(2), second[2])],

@@ -103,11 +103,11 @@ pub fn stitch(
     let curves: Vec<Vec<DVec3>> = (0..uses.len())
         .into_par_iter()
         .map(|c| {
-            let ends: [Vec<Plane>; 2] = [0, 1].map(|e| planes.at(c, e).copied().collect());
+            let ends: [Vec<Plane>; 2] = [0, 1].map(|e| planes.at(c, e).cloned().collect());
             if uses[c].is_empty() {
                 Vec::new()
             } else {
-                constrain(&fitted[c], ends, directions.get(nodes[c], counts[c]))
+                constrain(c, &fitted[c], ends, directions.get(nodes[c], counts[c]))
             }
         })
         .collect();
