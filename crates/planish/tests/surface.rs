@@ -409,3 +409,39 @@ fn stitch_is_the_same_to_the_bit_on_1_and_4_threads() {
     };
     assert_eq!(run(1), run(4));
 }
+
+#[test]
+fn a_control_point_pulled_over_its_neighbours_is_a_fold_and_a_wavy_sheet_has_none() {
+    let work = wavy([41, 33]);
+    let mut surfaces = fit(&work, &control(8, 8));
+    for (s, g) in surfaces.iter().zip(&work.grids) {
+        assert_eq!(surface::folds(s, g), 0);
+    }
+    let (s, g) = (&mut surfaces[0], &work.grids[0]);
+    let pull = (s.at(7, 3) - s.at(0, 3)) * 0.6;
+    s.control[3 * 8 + 2] += pull;
+    assert!(surface::folds(s, g) > 0);
+}
+
+#[test]
+fn the_default_leaves_four_cells_to_every_span_however_rough_the_grid() {
+    let rough = |p: DVec3| {
+        let b = blob(p);
+        b * (1.0 + 0.02 * (b.x * 911.7 + b.y * 573.3 + b.z * 771.1).sin())
+    };
+    let work = cube(41, CurveKind::Smooth, rough);
+    for (s, g) in fit(&work, &FitParams::default()).iter().zip(&work.grids) {
+        assert!(s.cols - 3 <= (g.cols - 1) / 4 && s.rows - 3 <= (g.rows - 1) / 4, "{} x {}", s.rows, s.cols);
+        assert_eq!(surface::folds(s, g), 0);
+    }
+}
+
+#[test]
+fn parameters_out_of_range_are_named() {
+    let work = wavy([12, 15]);
+    for (cells_per_span, smoothing, wrong) in [(0.5, 0.0, "cells_per_span"), (4.0, f64::NAN, "smoothing")] {
+        let params = FitParams { cells_per_span, smoothing, ..FitParams::default() };
+        let error = surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap_err();
+        assert!(matches!(error, FitError::Parameter { name, .. } if name == wrong), "{error}");
+    }
+}

@@ -359,9 +359,7 @@ pub(crate) fn cut(mesh: &TriMesh, adjacency: &Adjacency, curves: &[&[Place]]) ->
         }
         for (i, pair) in curve.windows(2).enumerate() {
             match shared_face(adjacency, &mesh.triangles, &pair[0], &pair[1]) {
-                Some(Shared::Face(f)) => {
-                    segments.entry(f).or_default().push(Segment { ends: [chain[i], chain[i + 1]], curve: c })
-                }
+                Some(Shared::Face(f)) => segments.entry(f).or_default().push(Segment { ends: [chain[i], chain[i + 1]], curve: c }),
                 Some(Shared::Edge) => {}
                 None => {
                     let p = points[chain[i] as usize];
