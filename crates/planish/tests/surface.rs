@@ -9,8 +9,13 @@ use planish::network::CurveKind;
 use planish::surface::{self, FitError, FitParams, Resolution, StitchParams, Surface};
 use planish::{Observer, Silent};
 
+/// Plain least squares, up to one control point per node.
+fn plain(resolution: Resolution) -> FitParams {
+    FitParams { resolution, cells_per_span: 1.0, smoothing: 0.0 }
+}
+
 fn control(m: usize, n: usize) -> FitParams {
-    FitParams { resolution: Resolution::Control([m, n]) }
+    plain(Resolution::Control([m, n]))
 }
 
 fn fit(work: &Patchwork, params: &FitParams) -> Vec<Surface> {
@@ -171,7 +176,7 @@ fn a_tolerance_is_kept_in_every_patch_with_counts_equal_along_chords() {
         for work in [cube(41, CurveKind::Smooth, blob), wavy([41, 33])] {
             let points: Vec<DVec3> = work.grids.iter().flat_map(|g| g.points.clone()).collect();
             let size = planish::geom::Aabb::of(&points).diagonal();
-            let surfaces = fit(&work, &FitParams { resolution: Resolution::Tolerance(fraction) });
+            let surfaces = fit(&work, &plain(Resolution::Tolerance(fraction)));
             for (s, g) in surfaces.iter().zip(&work.grids) {
                 let rms = surface::deviation_of(s, g).rms;
                 assert!(rms <= fraction * size, "{rms:e} at {fraction:e} with {} x {}", s.rows, s.cols);
@@ -183,8 +188,7 @@ fn a_tolerance_is_kept_in_every_patch_with_counts_equal_along_chords() {
 #[test]
 fn a_looser_tolerance_takes_fewer_control_points() {
     let work = cube(41, CurveKind::Smooth, blob);
-    let count =
-        |f| fit(&work, &FitParams { resolution: Resolution::Tolerance(f) }).iter().map(|s| s.control.len()).sum();
+    let count = |f| fit(&work, &plain(Resolution::Tolerance(f))).iter().map(|s| s.control.len()).sum();
     let counts: [usize; 3] = [1e-2, 1e-3, 1e-4].map(count);
     assert!(counts[0] < counts[1] && counts[1] < counts[2], "{counts:?}");
 }
@@ -194,7 +198,7 @@ fn counts_per_curve_reach_the_whole_chord() {
     let work = wavy([12, 15]);
     let mut list = vec![5; work.network.curves.len()];
     list[work.network.patches[0].sides[0].curve as usize] = 9;
-    let surfaces = fit(&work, &FitParams { resolution: Resolution::PerCurve(list) });
+    let surfaces = fit(&work, &plain(Resolution::PerCurve(list)));
     // Patches 0, 2 and 4 stand above each other.
     let shapes: Vec<_> = surfaces.iter().map(|s| (s.cols, s.rows)).collect();
     assert_eq!(shapes, [(9, 5), (5, 5), (9, 5), (5, 5), (9, 5), (5, 5)]);
@@ -208,7 +212,7 @@ fn bad_input_is_an_error_that_says_what() {
     };
     assert_eq!(run(&work, &control(10, 5)), FitError::TooFewPoints { points: 9, control: 10 });
     assert_eq!(run(&work, &control(3, 5)), FitError::TooFewControl { control: 3 });
-    assert!(matches!(run(&work, &FitParams { resolution: Resolution::Tolerance(0.0) }), FitError::Parameter { .. }));
+    assert!(matches!(run(&work, &plain(Resolution::Tolerance(0.0))), FitError::Parameter { .. }));
     work.grids[2].points[3] += DVec3::X * 1e-3;
     assert!(matches!(run(&work, &control(5, 5)), FitError::OpenSeam { .. }));
     work.grids[2].points[40].x = f64::NAN;
@@ -237,7 +241,7 @@ fn fit_is_the_same_to_the_bit_on_1_and_4_threads() {
     let work = cube(33, CurveKind::Smooth, blob);
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| fit(&work, &FitParams { resolution: Resolution::Tolerance(1e-4) }))
+        pool.install(|| fit(&work, &plain(Resolution::Tolerance(1e-4))))
     };
     assert_eq!(run(1), run(4));
 }
@@ -404,4 +408,40 @@ fn stitch_is_the_same_to_the_bit_on_1_and_4_threads() {
         pool.install(|| stitched(&work, 9).1)
     };
     assert_eq!(run(1), run(4));
+}
+
+#[test]
+fn a_control_point_pulled_over_its_neighbours_is_a_fold_and_a_wavy_sheet_has_none() {
+    let work = wavy([41, 33]);
+    let mut surfaces = fit(&work, &control(8, 8));
+    for (s, g) in surfaces.iter().zip(&work.grids) {
+        assert_eq!(surface::folds(s, g), 0);
+    }
+    let (s, g) = (&mut surfaces[0], &work.grids[0]);
+    let pull = (s.at(7, 3) - s.at(0, 3)) * 0.6;
+    s.control[3 * 8 + 2] += pull;
+    assert!(surface::folds(s, g) > 0);
+}
+
+#[test]
+fn the_default_leaves_four_cells_to_every_span_however_rough_the_grid() {
+    let rough = |p: DVec3| {
+        let b = blob(p);
+        b * (1.0 + 0.02 * (b.x * 911.7 + b.y * 573.3 + b.z * 771.1).sin())
+    };
+    let work = cube(41, CurveKind::Smooth, rough);
+    for (s, g) in fit(&work, &FitParams::default()).iter().zip(&work.grids) {
+        assert!(s.cols - 3 <= (g.cols - 1) / 4 && s.rows - 3 <= (g.rows - 1) / 4, "{} x {}", s.rows, s.cols);
+        assert_eq!(surface::folds(s, g), 0);
+    }
+}
+
+#[test]
+fn parameters_out_of_range_are_named() {
+    let work = wavy([12, 15]);
+    for (cells_per_span, smoothing, wrong) in [(0.5, 0.0, "cells_per_span"), (4.0, f64::NAN, "smoothing")] {
+        let params = FitParams { cells_per_span, smoothing, ..FitParams::default() };
+        let error = surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap_err();
+        assert!(matches!(error, FitError::Parameter { name, .. } if name == wrong), "{error}");
+    }
 }

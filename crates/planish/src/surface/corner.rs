@@ -9,6 +9,7 @@
 //! corner whatever the resolution.
 
 use super::Surface;
+use super::fold::MeanNormals;
 use super::sides::{is_smooth, place};
 use crate::network::Network;
 use glam::{DMat3, DVec3};
@@ -23,17 +24,22 @@ const LEAN: f64 = 0.8;
 /// Largest turn of the normal within the first knot span, radians: more cannot be told from noise. Seams are not
 /// made to bend by it then, and the normals turn by this much.
 const TURN: f64 = 1.0;
+/// Angles that a patch may have between its sides at a corner within smooth seams, radians: 20 to 160 degrees. At 0 and
+/// 180 it has no normal there, beyond them the normal points inwards.
+const WEDGE: std::ops::RangeInclusive<f64> = 0.35..=2.79;
 /// Weight of "no curvature" in the second fundamental form, against one for each seam: only decides for sectors
 /// too thin to say.
 const CALM: f64 = 1e-6;
 
 /// The tangent plane of a sector with its second fundamental form.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Plane {
     pub normal: DVec3,
     axes: [DVec3; 2],
     /// `L, M, N` in `axes`.
     form: DVec3,
+    /// Directions for the ends of curves whose own would leave a patch with an angle below zero or above 180 degrees.
+    spread: Vec<((usize, usize), DVec3)>,
     /// False where the seams bend too fast for their knots to be told how.
     pub credible: bool,
 }
@@ -49,6 +55,11 @@ impl Plane {
     pub fn turn(&self, d: DVec3) -> DVec3 {
         let (x, y) = (self.axes[0].dot(d), self.axes[1].dot(d));
         -self.axes[0] * (self.form.x * x + self.form.y * y) - self.axes[1] * (self.form.y * x + self.form.z * y)
+    }
+
+    /// The unit direction in which an end of a curve must leave, if its own does not do.
+    pub fn direction(&self, curve: usize, end: usize) -> Option<DVec3> {
+        self.spread.iter().find(|(e, _)| *e == (curve, end)).map(|(_, d)| *d)
     }
 
     /// The part of `d` in the plane.
@@ -98,8 +109,9 @@ struct Wedge {
 }
 
 /// Finds the sectors of all corners and their planes.
-pub(crate) fn planes(network: &Network, surfaces: &[Surface], curves: &[Vec<DVec3>]) -> Planes {
-    let wedges: Vec<Wedge> = (0..4 * surfaces.len()).map(|w| wedge(network, &surfaces[w / 4], w / 4, w % 4)).collect();
+pub(crate) fn planes(network: &Network, surfaces: &[Surface], means: &[MeanNormals], curves: &[Vec<DVec3>]) -> Planes {
+    let wedges: Vec<Wedge> =
+        (0..4 * surfaces.len()).map(|w| wedge(network, &surfaces[w / 4], &means[w / 4], w / 4, w % 4)).collect();
     let mut around: Vec<[Vec<usize>; 2]> = vec![Default::default(); network.curves.len()];
     for (w, wedge) in wedges.iter().enumerate() {
         wedge.ends.iter().for_each(|&(c, e)| around[c][e].push(w));
@@ -140,7 +152,7 @@ pub(crate) fn planes(network: &Network, surfaces: &[Surface], curves: &[Vec<DVec
     found
 }
 
-fn wedge(network: &Network, surface: &Surface, patch: usize, k: usize) -> Wedge {
+fn wedge(network: &Network, surface: &Surface, means: &MeanNormals, patch: usize, k: usize) -> Wedge {
     let (next, before) = (network.patches[patch].sides[k], network.patches[patch].sides[(k + 3) % 4]);
     let (u, v) = place(k, false, 0.0);
     let jet = surface.jet(u, v);
@@ -153,9 +165,62 @@ fn wedge(network: &Network, surface: &Surface, patch: usize, k: usize) -> Wedge 
         u: jet.u * to_u,
         v: jet.v * to_v,
         twist: jet.uv * to_u * to_v,
-        normal: jet.area_vector().normalize_or_zero(),
+        normal: means.mend(jet.area_vector(), u, v),
         angle: jet.area_vector().length().atan2(to_u * to_v * jet.u.dot(jet.v)),
     }
+}
+
+/// New directions for the curves around a corner inside smooth seams where the angle of a patch is out of bounds:
+/// the angles nearest to the given ones that are within them and add up to a full turn. Empty if all is well, or if
+/// the sector does not close.
+fn spread(sector: &[&Wedge], normal: DVec3, curves: &[Vec<DVec3>]) -> Vec<((usize, usize), DVec3)> {
+    use std::f64::consts::{FRAC_PI_2, TAU};
+    let n = sector.len();
+    let mut order = vec![0];
+    while order.len() < n {
+        let last = sector[order[order.len() - 1]].ends[1];
+        match (1..n).find(|k| !order.contains(k) && sector[*k].ends[0] == last) {
+            Some(next) => order.push(next),
+            None => return Vec::new(),
+        }
+    }
+    if n < 3 || sector[order[n - 1]].ends[1] != sector[0].ends[0] {
+        return Vec::new();
+    }
+    let (x, y) = normal.any_orthonormal_pair();
+    let bearing: Vec<f64> = order
+        .iter()
+        .map(|&w| {
+            let (c, e) = sector[w].ends[0];
+            let d = end_derivatives(&curves[c], e).0;
+            normal.dot(x.cross(y)).signum() * d.dot(y).atan2(d.dot(x))
+        })
+        .collect();
+    // From -90 to 270 degrees: a patch turned over has a small negative angle, one bent outwards more than 180.
+    let angle = |k: usize| (bearing[(k + 1) % n] - bearing[k] + FRAC_PI_2).rem_euclid(TAU) - FRAC_PI_2;
+    let angles: Vec<f64> = (0..n).map(angle).collect();
+    if angles.iter().all(|a| WEDGE.contains(a)) {
+        return Vec::new();
+    }
+    let moved = |shift: f64| angles.iter().map(move |a| (a + shift).clamp(*WEDGE.start(), *WEDGE.end()));
+    let (mut low, mut high) = (-TAU, TAU);
+    for _ in 0..60 {
+        let middle = (low + high) / 2.0;
+        if moved(middle).sum::<f64>() < TAU { low = middle } else { high = middle }
+    }
+    let mut ends = Vec::new();
+    let (mut at, mut turns, mut bearings) = (bearing[0], DVec3::ZERO, Vec::new());
+    for (k, step) in moved(low).enumerate() {
+        bearings.push(at);
+        turns += DVec3::new((bearing[k] - at).cos(), (bearing[k] - at).sin(), 0.0);
+        at += step;
+    }
+    let turn = turns.y.atan2(turns.x);
+    for (&w, bearing) in order.iter().zip(bearings) {
+        let (sin, cos) = (bearing + turn).sin_cos();
+        ends.push((sector[w].ends[0], x * cos + y * (normal.dot(x.cross(y)).signum() * sin)));
+    }
+    ends
 }
 
 fn plane(network: &Network, sector: &[&Wedge], ends: &[(usize, usize)], curves: &[Vec<DVec3>]) -> Option<Plane> {
@@ -182,7 +247,8 @@ fn plane(network: &Network, sector: &[&Wedge], ends: &[(usize, usize)], curves: 
         return None;
     }
     let (x, y) = normal.any_orthonormal_pair();
-    let mut plane = Plane { normal, axes: [x, y], form: DVec3::ZERO, credible: true };
+    let mut plane =
+        Plane { normal, axes: [x, y], form: DVec3::ZERO, spread: spread(sector, normal, curves), credible: true };
     // Least squares for L, M, N from the seams' normal curvature and the patches' twist.
     // The form's own norm, L² + 2 M² + N², does not depend on the axes.
     let (mut matrix, mut rhs) = (DMat3::from_diagonal(DVec3::new(1.0, 2.0, 1.0) * CALM), DVec3::ZERO);

@@ -35,7 +35,7 @@ pub fn fit(points: &[DVec3], rows: usize, cols: usize, control: [usize; 2]) -> R
     if points.len() != rows * cols {
         return Err(FitError::Shape { patch: 0, rows, cols, points: points.len() });
     }
-    let (along_v, along_u) = (Direction::new(rows, control[0])?, Direction::new(cols, control[1])?);
+    let (along_v, along_u) = (Direction::new(rows, control[0], 0.0)?, Direction::new(cols, control[1], 0.0)?);
     let projection = project(points, &along_u, &along_v);
     let mut net = vec![DVec3::ZERO; control[0] * control[1]];
     solve_inside(&mut net, &projection, &along_u, &along_v, 0);
@@ -54,7 +54,10 @@ pub(crate) struct Direction {
 }
 
 impl Direction {
-    pub fn new(count: usize, control: usize) -> Result<Direction, FitError> {
+    /// * `smoothing` - weight of the bends of the control polygon against the distances of the nodes that fall on one
+    ///   control point: 0 for plain least squares; large values leave straight lines, and of a surface with given
+    ///   boundary the bilinear blend of that boundary
+    pub fn new(count: usize, control: usize, smoothing: f64) -> Result<Direction, FitError> {
         if control < FEWEST_CONTROL {
             return Err(FitError::TooFewControl { control });
         }
@@ -71,6 +74,7 @@ impl Direction {
                 }
             }
         }
+        add_bends(&mut gram, &knots, smoothing * (count - 1) as f64 / (control - 3) as f64);
         let factor = |inset: usize| {
             BandedCholesky::factor(gram.part(inset..control - inset))
                 .ok_or(FitError::Singular { points: count, control })
@@ -112,6 +116,26 @@ impl Direction {
     }
 }
 
+/// Adds `weight` times the squared second differences of the control points by their Greville abscissae, scaled so
+/// that they are `1, -2, 1` inside: `B^T B` becomes the matrix of a smoothing spline. Straight lines at constant
+/// speed cost nothing.
+fn add_bends(gram: &mut Banded, knots: &[f64], weight: f64) {
+    if weight == 0.0 {
+        return;
+    }
+    let n = gram.len();
+    let place = |i: usize| (knots[i + 1] + knots[i + 2] + knots[i + 3]) / 3.0 * (n - 3) as f64;
+    for i in 1..n - 1 {
+        let (before, after) = (1.0 / (place(i) - place(i - 1)), 1.0 / (place(i + 1) - place(i)));
+        let row = [before, -before - after, after];
+        for a in 0..3 {
+            for b in 0..=a {
+                gram.add(i - 1 + a, i - 1 + b, weight * row[a] * row[b]);
+            }
+        }
+    }
+}
+
 /// The directions of a whole network, factored once per pair of node count and control count.
 pub(crate) struct Directions(BTreeMap<(usize, usize), Direction>);
 
@@ -120,7 +144,7 @@ impl Directions {
         let mut map = BTreeMap::new();
         for pair in pairs {
             if let std::collections::btree_map::Entry::Vacant(slot) = map.entry(pair) {
-                slot.insert(Direction::new(pair.0, pair.1)?);
+                slot.insert(Direction::new(pair.0, pair.1, 0.0)?);
             }
         }
         Ok(Directions(map))
@@ -241,6 +265,23 @@ pub(crate) fn solve_inside(
         along_u.factor(inset).solve(row);
         net[j * m + inset..j * m + m - inset].copy_from_slice(row);
     }
+}
+
+/// What [`project`] would give for nodes on the surface of this net: a fit to it moves the surface least.
+pub(crate) fn project_net(net: &[DVec3], along_u: &Direction, along_v: &Direction) -> Vec<DVec3> {
+    let (m, n) = (along_u.control(), along_v.control());
+    let times = |gram: &Banded, i: usize, at: &dyn Fn(usize) -> DVec3| -> DVec3 {
+        gram.columns(i).fold(DVec3::ZERO, |sum, k| sum + at(k) * gram.get(i, k))
+    };
+    let mut half = Vec::with_capacity(m * n);
+    for j in 0..n {
+        half.extend((0..m).map(|i| times(&along_u.gram, i, &|k| net[j * m + k])));
+    }
+    let mut out = Vec::with_capacity(m * n);
+    for j in 0..n {
+        out.extend((0..m).map(|i| times(&along_v.gram, j, &|k| half[k * m + i])));
+    }
+    out
 }
 
 /// The surface of a control net.

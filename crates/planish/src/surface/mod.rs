@@ -2,7 +2,7 @@
 //!
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, ch. 4, 6 and 8.
 //! 1. basis and evaluation - `basis`, `evaluate`      2. one grid - `fit`, eq. 4.4
-//! 3. a network without gaps - `network_fit`, `resolution`
+//! 3. a network without gaps and folds - `network_fit`, `resolution`, `fold`
 //! 4. smooth seams - `corner`, `seam_curve`, `stitch`, §8.1      5. how good it is - `quality`, eq. 6.1
 
 pub mod basis;
@@ -10,6 +10,7 @@ mod corner;
 mod error;
 mod evaluate;
 mod fit;
+mod fold;
 mod network_fit;
 mod quality;
 mod resolution;
@@ -21,6 +22,7 @@ pub use error::FitError;
 pub use evaluate::Jet;
 pub(crate) use evaluate::RowSampler;
 pub use fit::{FEWEST_CONTROL, fit};
+pub use fold::folds;
 pub use network_fit::{FitParams, fit_network};
 pub use quality::{Deviation, SeamQuality, deviation, deviation_of, measure_seams};
 pub use resolution::Resolution;

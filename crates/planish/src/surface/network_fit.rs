@@ -6,7 +6,8 @@
 //! the network is fitted once, from corner to corner, and both patches fit their inside for it. So seams are
 //! exact, and no patch pays for its neighbour.
 
-use super::fit::{Direction, Directions, project, solve_inside, surface_of};
+use super::fit::{Direction, Directions, FEWEST_CONTROL, project, solve_inside, surface_of};
+use super::fold::folds;
 use super::resolution::{self, Resolution};
 use super::sides::{check_grids, curve_nodes, diagonal, node, side_len};
 use super::{FitError, Surface, deviation_of};
@@ -22,18 +23,30 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Rounds that may raise the counts after the first choice: the fixed boundaries cost little, so that two do.
 const ROUNDS: usize = 3;
 
+/// Weights of the smoothing that folded patches get, one after the other until they are open: from a tenth of what
+/// the nodes weigh to a surface that is all but the blend of its boundary.
+const SMOOTHING: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
+
 /// How to fit the surfaces of a network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FitParams {
     /// How many control points, directly or by a tolerance.
     pub resolution: Resolution,
+    /// Fewest grid cells per knot span in each direction; a tolerance that asks for more control points is not
+    /// reached. Spans of a cell or two follow the noise of a scan and swing between its points.
+    #[schemars(range(min = 1.0, max = 1e3), extend("unit" = "cells"))]
+    pub cells_per_span: f64,
+    /// Weight of bends of the control net against the distances of the grid's points: 0 for plain least squares;
+    /// more leaves more of the detail to the relief.
+    #[schemars(range(min = 0.0, max = 1e4))]
+    pub smoothing: f64,
 }
 
 impl Default for FitParams {
-    /// A tolerance of 1/2000 of the diagonal: the coarse shape; the relief has the rest.
+    /// A tolerance of 1/1000 of the diagonal and four cells per span: the smooth shape; the relief has the rest.
     fn default() -> FitParams {
-        FitParams { resolution: Resolution::Tolerance(5e-4) }
+        FitParams { resolution: Resolution::Tolerance(1e-3), cells_per_span: 4.0, smoothing: 0.01 }
     }
 }
 
@@ -52,66 +65,108 @@ pub fn fit_network(
     observer: &dyn Observer,
 ) -> Result<Vec<Surface>, FitError> {
     let nodes = check_grids(network, grids)?;
+    let cells = params.cells_per_span;
+    if !(cells >= 1.0 && cells.is_finite()) {
+        return Err(FitError::Parameter { name: "cells_per_span", value: cells, wanted: "1 or more" });
+    }
+    if !(params.smoothing >= 0.0 && params.smoothing.is_finite()) {
+        return Err(FitError::Parameter { name: "smoothing", value: params.smoothing, wanted: "0 or more" });
+    }
     let size = diagonal(grids);
-    let mut counts = resolution::counts(network, grids, &nodes, &params.resolution, size)?;
-    let &Resolution::Tolerance(fraction) = &params.resolution else {
-        return fit_counts(network, grids, &nodes, &counts, observer);
-    };
-    for _ in 0..ROUNDS {
-        let surfaces = fit_counts(network, grids, &nodes, &counts, observer)?;
-        let over: Vec<bool> =
-            surfaces.par_iter().zip(grids).map(|(s, g)| deviation_of(s, g).rms > fraction * size).collect();
-        let mut raised = counts.clone();
-        for (patch, _) in network.patches.iter().zip(&over).filter(|(_, over)| **over) {
-            for c in patch.sides.map(|side| side.curve as usize) {
-                raised[c] = resolution::finer(counts[c]);
+    let spans = |n: usize| (n.saturating_sub(1) as f64 / cells) as usize;
+    let most: Vec<usize> = nodes.iter().map(|&n| (spans(n) + 3).clamp(FEWEST_CONTROL, n.max(FEWEST_CONTROL))).collect();
+    let mut counts = resolution::counts(network, grids, &most, &params.resolution, size)?;
+    let mut smoothing = vec![params.smoothing; grids.len()];
+    let fit = |counts: &[usize], smoothing: &[f64]| fit_counts(network, grids, &nodes, counts, smoothing, observer);
+    let mut surfaces = fit(&counts, &smoothing)?;
+    if let &Resolution::Tolerance(fraction) = &params.resolution {
+        for _ in 0..ROUNDS {
+            let over: Vec<bool> =
+                surfaces.par_iter().zip(grids).map(|(s, g)| deviation_of(s, g).rms > fraction * size).collect();
+            let mut raised = counts.clone();
+            for (patch, _) in network.patches.iter().zip(&over).filter(|(_, over)| **over) {
+                for c in patch.sides.map(|side| side.curve as usize) {
+                    raised[c] = resolution::finer(counts[c]);
+                }
+            }
+            let raised = resolution::level(network, raised, Some(&most));
+            if raised == counts {
+                break;
+            }
+            counts = raised;
+            surfaces = fit(&counts, &smoothing)?;
+        }
+    }
+    let folded =
+        |surfaces: &[Surface]| -> Vec<usize> { surfaces.par_iter().zip(grids).map(|(s, g)| folds(s, g)).collect() };
+    let mut counted = folded(&surfaces);
+    for weight in SMOOTHING.into_iter().filter(|&w| w > params.smoothing) {
+        if counted.iter().all(|&n| n == 0) {
+            break;
+        }
+        let trial: Vec<f64> = smoothing.iter().zip(&counted).map(|(&s, &n)| if n > 0 { weight } else { s }).collect();
+        let found = folded(&fit(&counts, &trial)?);
+        // A fold that smoothing does not at least halve is the grid's own, and the detail would be lost for nothing.
+        for p in 0..grids.len() {
+            if counted[p] > 0 && 2 * found[p] <= counted[p] {
+                smoothing[p] = weight;
             }
         }
-        let raised = resolution::level(network, &nodes, raised, true);
-        if raised == counts {
-            return Ok(surfaces);
-        }
-        counts = raised;
+        surfaces = fit(&counts, &smoothing)?;
+        counted = folded(&surfaces);
     }
-    fit_counts(network, grids, &nodes, &counts, observer)
+    Ok(surfaces)
 }
 
-/// Fits with known counts of nodes and control points along the curves.
+/// Fits with known counts of nodes and control points along the curves, and a smoothing for each patch; a curve
+/// takes the larger one of its patches.
 fn fit_counts(
     network: &Network,
     grids: &[Grid],
     nodes: &[usize],
     counts: &[usize],
+    smoothing: &[f64],
     observer: &dyn Observer,
 ) -> Result<Vec<Surface>, FitError> {
     let used = nodes.iter().zip(counts).filter(|(n, _)| **n > 0).map(|(&n, &c)| (n, c));
     let directions = Directions::new(used)?;
     let uses = network.uses();
-    let curves: Vec<Vec<DVec3>> = curve_nodes(network, &uses, grids)
+    let curves: Vec<Result<Vec<DVec3>, FitError>> = curve_nodes(network, &uses, grids)
         .into_par_iter()
-        .zip(counts)
-        .map(|(nodes, &count)| match nodes.len() {
-            0 => Vec::new(),
-            n => fit_curve(&nodes, directions.get(n, count)),
+        .enumerate()
+        .map(|(c, nodes)| {
+            let most = uses[c].iter().map(|&(p, _)| smoothing[p as usize]).fold(0.0, f64::max);
+            Ok(match (nodes.len(), most) {
+                (0, _) => Vec::new(),
+                (n, 0.0) => fit_curve(&nodes, directions.get(n, counts[c])),
+                (n, most) => fit_curve(&nodes, &Direction::new(n, counts[c], most)?),
+            })
         })
         .collect();
+    let curves = curves.into_iter().collect::<Result<Vec<_>, _>>()?;
     let done = AtomicUsize::new(0);
-    let surfaces: Vec<Option<Surface>> = network
+    let surfaces: Vec<Result<Surface, FitError>> = network
         .patches
         .par_iter()
         .zip(grids)
-        .map(|(patch, grid)| {
+        .zip(smoothing)
+        .map(|((patch, grid), &smoothing)| {
             if observer.cancelled() {
-                return None;
+                return Err(FitError::Cancelled);
             }
             let [along_u, along_v] = patch_directions(patch, grid, &directions, counts);
             let projection = project(&grid.points, along_u, along_v);
-            let net = fill(patch, &curves, &projection, along_u, along_v);
+            let smooth = |d: &Direction| Direction::new(d.basis.len(), d.control(), smoothing);
+            let net = if smoothing > 0.0 {
+                fill(patch, &curves, &projection, &smooth(along_u)?, &smooth(along_v)?)
+            } else {
+                fill(patch, &curves, &projection, along_u, along_v)
+            };
             observer.progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / grids.len() as f64);
-            Some(surface_of(net, along_u, along_v))
+            Ok(surface_of(net, along_u, along_v))
         })
         .collect();
-    surfaces.into_iter().collect::<Option<Vec<_>>>().ok_or(FitError::Cancelled)
+    surfaces.into_iter().collect()
 }
 
 /// The directions along `u` and `v` of a patch.

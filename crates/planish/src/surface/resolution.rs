@@ -32,11 +32,11 @@ pub enum Resolution {
     Tolerance(f64),
 }
 
-/// Control points along each curve for `resolution`. `nodes` are the grid counts along the curves.
+/// Control points along each curve for `resolution`; a tolerance gets at most `most`.
 pub(crate) fn counts(
     network: &Network,
     grids: &[Grid],
-    nodes: &[usize],
+    most: &[usize],
     resolution: &Resolution,
     diagonal: f64,
 ) -> Result<Vec<usize>, FitError> {
@@ -76,14 +76,15 @@ pub(crate) fn counts(
             }
         }
     }
-    Ok(level(network, nodes, wanted, matches!(resolution, Resolution::Tolerance(_))))
+    let most = matches!(resolution, Resolution::Tolerance(_)).then_some(most);
+    Ok(level(network, wanted, most))
 }
 
-/// Gives every curve the largest count of its chord, at most the chord's nodes if `bounded`.
-pub(crate) fn level(network: &Network, nodes: &[usize], mut counts: Vec<usize>, bounded: bool) -> Vec<usize> {
+/// Gives every curve the largest count of its chord, at most `most` of it.
+pub(crate) fn level(network: &Network, mut counts: Vec<usize>, most: Option<&[usize]>) -> Vec<usize> {
     let chords = network.chords();
     for (c, &chord) in chords.iter().enumerate() {
-        let bound = if bounded && nodes[c] > 0 { nodes[c] } else { usize::MAX };
+        let bound = most.map_or(usize::MAX, |most| most[c]);
         counts[chord as usize] = counts[chord as usize].max(counts[c]).min(bound);
     }
     chords.iter().map(|&chord| counts[chord as usize]).collect()
@@ -102,7 +103,7 @@ fn fewest(grid: &Grid, along_u: bool, rms: f64) -> Result<usize, FitError> {
     let total: f64 = centred.iter().map(|p| p.length_squared()).sum();
     let allowed = rms * rms * (count * lines) as f64;
     for control in LADDER.into_iter().take_while(|&l| l < count) {
-        let direction = Direction::new(count, control)?;
+        let direction = Direction::new(count, control, 0.0)?;
         // |P|² - |projection|²: what the fit of every line leaves.
         let mut explained = 0.0;
         if along_u {

@@ -9,6 +9,7 @@ use super::FitError;
 use super::basis::{BasisRows, uniform_knots, uniform_parameters};
 use super::corner::{Plane, Planes, end_derivatives, end_weights};
 use super::fit::Direction;
+use super::fold::MeanNormals;
 use super::sides::place;
 use super::{Jet, Surface};
 use crate::linalg::{Banded, BandedCholesky};
@@ -23,6 +24,8 @@ const ALIKE: f64 = 0.94;
 const FEWEST_BENT: usize = 6;
 /// Damping of the conditions at the ends, each of diagonal 1: contradicting ones share their miss.
 const DAMPING: f64 = 1e-7;
+/// How far a leg of the control polygon may change, over its length: a turn of 60 degrees.
+const LEEWAY: f64 = 1.0;
 /// Conditions depend on the direction that they change a little; the second pass sees to that.
 const PASSES: usize = 2;
 /// Samples per knot span of a field of normals, enough for its cubic and the products with cubics.
@@ -41,18 +44,32 @@ struct Condition {
 }
 
 /// Moves a curve so that at its ends it runs in the planes there and bends as they say.
-pub(crate) fn constrain(curve: &[DVec3], planes: [Vec<Plane>; 2], direction: &Direction) -> Vec<DVec3> {
+/// `index` is that of the curve.
+pub(crate) fn constrain(index: usize, curve: &[DVec3], planes: [Vec<Plane>; 2], direction: &Direction) -> Vec<DVec3> {
     let mut moved = curve.to_vec();
     if planes.iter().all(Vec::is_empty) {
         return moved;
     }
-    for _ in 0..PASSES {
-        moved = meet(curve, &conditions(&moved, &planes), direction);
+    // Without the bends if those distort the curve, as it was if its tangents would.
+    for bent in [true, false] {
+        for _ in 0..PASSES {
+            moved = meet(curve, &conditions(index, &moved, &planes, bent), direction);
+        }
+        if keeps_shape(curve, &moved) {
+            return moved;
+        }
+        moved.copy_from_slice(curve);
     }
     moved
 }
 
-fn conditions(curve: &[DVec3], planes: &[Vec<Plane>; 2]) -> Vec<Condition> {
+/// True if no leg of the control polygon turned or grew by more than [`LEEWAY`] of its length.
+fn keeps_shape(curve: &[DVec3], moved: &[DVec3]) -> bool {
+    let legs = curve.windows(2).zip(moved.windows(2));
+    legs.into_iter().all(|(a, b)| ((b[1] - b[0]) - (a[1] - a[0])).length() <= LEEWAY * (a[1] - a[0]).length())
+}
+
+fn conditions(at: usize, curve: &[DVec3], planes: &[Vec<Plane>; 2], bent: bool) -> Vec<Condition> {
     let n = curve.len();
     let (first, second) = end_weights(n);
     let mut list = Vec::new();
@@ -66,14 +83,18 @@ fn conditions(curve: &[DVec3], planes: &[Vec<Plane>; 2]) -> Vec<Condition> {
                 value: -first[0] * normal.dot(curve[index(0)]),
             });
         };
-        if let [a, b] = planes[..]
+        if let [a, b] = &planes[..]
             && a.normal.dot(b.normal) > ALIKE
         {
             tangency((a.normal + b.normal).normalize());
             continue;
         }
         planes.iter().for_each(|p| tangency(p.normal));
-        for plane in planes.iter().filter(|p| p.credible && n >= FEWEST_BENT) {
+        let turned = planes.iter().find_map(|p| Some((p, p.direction(at, end)?)));
+        if let Some((plane, d)) = turned {
+            tangency(plane.normal.cross(d));
+        }
+        for plane in planes.iter().filter(|p| bent && p.credible && n >= FEWEST_BENT) {
             list.push(Condition {
                 weights: vec![(index(1), second[1]), (index(2), second[2])],
                 normal: plane.normal,
@@ -127,6 +148,7 @@ fn meet(curve: &[DVec3], conditions: &[Condition], direction: &Direction) -> Vec
 pub(crate) fn normals(
     network: &Network,
     surfaces: &[Surface],
+    means: &[MeanNormals],
     curve: usize,
     uses: [(u32, u8); 2],
     control: &[DVec3],
@@ -144,14 +166,14 @@ pub(crate) fn normals(
                     let side = network.patches[p as usize].sides[k as usize];
                     let (u, v) = place(k as usize, side.reversed, t);
                     let jet: Jet = surfaces[p as usize].jet(u, v);
-                    jet.area_vector().normalize_or_zero()
+                    means[p as usize].mend(jet.area_vector(), u, v)
                 })
                 .sum();
             last = sum.try_normalize().unwrap_or(last);
             last
         })
         .collect();
-    let direction = Direction::new(parameters.len(), n)?;
+    let direction = Direction::new(parameters.len(), n, 0.0)?;
     let mut net = vec![DVec3::ZERO; n];
     direction.fit_curve(mean.iter().copied(), &mut net, 0);
     for end in 0..2 {

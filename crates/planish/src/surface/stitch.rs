@@ -13,7 +13,8 @@
 
 use super::basis::{basis_at, is_uniform, uniform_knots, uniform_parameters};
 use super::corner::{Plane, planes};
-use super::fit::{Directions, project, solve_inside, surface_of};
+use super::fit::{Directions, project_net, solve_inside, surface_of};
+use super::fold::{MeanNormals, folds};
 use super::network_fit::{fill, patch_directions};
 use super::seam_curve::{SPAN_SAMPLES, constrain, normals};
 use super::sides::{along_curve, check, check_grids, is_smooth, node, side_len};
@@ -30,6 +31,9 @@ use serde::{Deserialize, Serialize};
 /// Diagonals of the ring's matrix: samples couple four neighbours of three numbers, and folding the ring into a
 /// line doubles the distance.
 const RING_BAND: usize = 23;
+
+/// What the stiffness is multiplied by, one after the other, while a patch comes out folded.
+const EASING: [f64; 4] = [1.0, 0.3, 0.1, 0.0];
 
 /// How to smooth seams.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -93,15 +97,17 @@ pub fn stitch(
             })
         })
         .collect();
-    let planes = planes(network, surfaces, &fitted);
+    let means: Vec<MeanNormals> =
+        grids.par_iter().zip(surfaces).map(|(g, s)| MeanNormals::new(g, [s.cols, s.rows])).collect();
+    let planes = planes(network, surfaces, &means, &fitted);
     let curves: Vec<Vec<DVec3>> = (0..uses.len())
         .into_par_iter()
         .map(|c| {
-            let ends: [Vec<Plane>; 2] = [0, 1].map(|e| planes.at(c, e).copied().collect());
+            let ends: [Vec<Plane>; 2] = [0, 1].map(|e| planes.at(c, e).cloned().collect());
             if uses[c].is_empty() {
                 Vec::new()
             } else {
-                constrain(&fitted[c], ends, directions.get(nodes[c], counts[c]))
+                constrain(c, &fitted[c], ends, directions.get(nodes[c], counts[c]))
             }
         })
         .collect();
@@ -111,13 +117,13 @@ pub fn stitch(
     let projected: Vec<Option<(Surface, Vec<DVec3>)>> = network
         .patches
         .par_iter()
-        .zip(grids)
-        .map(|(patch, grid)| {
+        .enumerate()
+        .map(|(p, patch)| {
             if observer.cancelled() {
                 return None;
             }
-            let [along_u, along_v] = patch_directions(patch, grid, &directions, &counts);
-            let projection = project(&grid.points, along_u, along_v);
+            let [along_u, along_v] = patch_directions(patch, &grids[p], &directions, &counts);
+            let projection = project_net(&surfaces[p].control, along_u, along_v);
             let net = fill(patch, &curves, &projection, along_u, along_v);
             Some((surface_of(net, along_u, along_v), projection))
         })
@@ -128,7 +134,7 @@ pub fn stitch(
     let fields: Vec<Result<Vec<DVec3>, FitError>> = (0..uses.len())
         .into_par_iter()
         .map(|c| match uses[c][..] {
-            [a, b] if is_seam(c) => normals(network, &filled, c, [a, b], &curves[c], &planes),
+            [a, b] if is_seam(c) => normals(network, &filled, &means, c, [a, b], &curves[c], &planes),
             _ => Ok(Vec::new()),
         })
         .collect();
@@ -140,10 +146,22 @@ pub fn stitch(
         .enumerate()
         .map(|(p, patch)| {
             let [along_u, along_v] = patch_directions(patch, &grids[p], &directions, &counts);
-            let mut net = filled[p].control.clone();
-            turn_ring(&mut net, along_v.control(), along_u.control(), patch, &fields, params.stiffness);
-            solve_inside(&mut net, &projections[p], along_u, along_v, 2);
-            surface_of(net, along_u, along_v)
+            let mut best = filled[p].clone();
+            let mut fewest = usize::MAX;
+            for easing in EASING {
+                let mut net = filled[p].control.clone();
+                turn_ring(&mut net, along_v.control(), along_u.control(), patch, &fields, params.stiffness * easing);
+                solve_inside(&mut net, &projections[p], along_u, along_v, 2);
+                let surface = surface_of(net, along_u, along_v);
+                let count = folds(&surface, &grids[p]);
+                if count < fewest {
+                    (best, fewest) = (surface, count);
+                }
+                if fewest == 0 {
+                    break;
+                }
+            }
+            best
         })
         .collect();
     stop()?;
