@@ -225,6 +225,10 @@ impl Bvh {
             let node = &self.nodes[link as usize];
             let base = top;
             for k in 0..WIDE {
+                // A lane without a child: between its planes lies everything.
+                if node.min[0][k] > node.max[0][k] {
+                    continue;
+                }
                 let Some(near) = ray.enters(node, k, start) else { continue };
                 let mut at = top;
                 while at > base && stack[at - 1].2 < near {
