@@ -17,6 +17,13 @@ use std::collections::BTreeMap;
 /// Weight of the squared logarithm of a cell's area over the mean, against the badness of its shape.
 const SIZE_COST: f64 = 0.4;
 
+/// Weight of the squared logarithm of a cell's area over that of the flat quad between its corners: a cell around
+/// the end of a limb is large where its corners do not show it.
+const BULGE_COST: f64 = 2.0;
+
+/// Area against the flat quad that costs nothing: a cell of ordinary curvature and relief.
+const BULGE_FREE: f64 = 1.4;
+
 /// Pressure on the number of patches: what one patch too many costs when there are a tenth too many.
 const COUNT_COST: f64 = 2.0;
 
@@ -24,10 +31,10 @@ const COUNT_COST: f64 = 2.0;
 const LEAST_GAIN: f64 = 0.2;
 
 /// Rounds of changing the connectivity; most meshes settle earlier.
-const CHANGE_ROUNDS: usize = 12;
+const CHANGE_ROUNDS: usize = 20;
 
 /// Batches of relaxing between two rounds of changes: most neighbours of a change fit into the first few.
-const RELAX_BATCHES: usize = 4;
+const RELAX_BATCHES: usize = 1000;
 
 /// Parts every cell into quads. False if some cell could not be parted.
 pub(super) fn quads(bench: &mut Bench) -> bool {
@@ -161,8 +168,10 @@ impl<'a> Trial<'a> {
 
     fn cell_cost(&self, corners: [DVec3; 4], normal: DVec3, area: f64) -> f64 {
         let size = (area / self.mean_area).max(1e-6);
+        let flat = (corners[2] - corners[0]).cross(corners[3] - corners[1]).length() / 2.0;
+        let bulge = (area / flat.max(1e-6 * area) / BULGE_FREE).max(1.0).ln();
         // By area where a cell is too large, or parting it would never pay.
-        badness(corners, normal) + SIZE_COST * size.max(1.0) * size.ln().powi(2)
+        badness(corners, normal) + SIZE_COST * size.max(1.0) * size.ln().powi(2) + BULGE_COST * bulge * bulge
     }
 
     /// Energy of the cells of a change as they are, and their area and centroid.

@@ -19,7 +19,7 @@ use std::collections::BinaryHeap;
 pub(super) const VALENCE_COST: f64 = 1.5;
 
 /// Cost of a cell corner of 180 degrees or more, where a patch has no normal of its own.
-const FLAT_COST: f64 = 8.0;
+const FLAT_COST: f64 = 16.0;
 
 /// A corner further off square than this makes a surface that is hard to fit, and costs steeply.
 const STEEP_DEG: f64 = 45.0;
