@@ -86,7 +86,7 @@ impl Unit {
         Unit { center: bounds.center(), scale }
     }
 
-    fn from_world(&self, p: DVec3) -> DVec3 {
+    fn tree_from_world(&self, p: DVec3) -> DVec3 {
         (p - self.center) * self.scale
     }
 }
@@ -123,7 +123,7 @@ impl Bvh {
         let mut items: Vec<Item> = (0..mesh.triangles.len())
             .into_par_iter()
             .map(|t| {
-                let [a, b, c] = mesh.corners(t).map(|p| unit.from_world(p).as_vec3a());
+                let [a, b, c] = mesh.corners(t).map(|p| unit.tree_from_world(p).as_vec3a());
                 Item { min: a.min(b).min(c) - PAD, max: a.max(b).max(c) + PAD, face: t as u32 }
             })
             .collect();
@@ -135,7 +135,7 @@ impl Bvh {
 
     /// The place of the surface closest to `point`.
     pub fn closest(&self, point: DVec3) -> SurfaceHit {
-        let own = self.unit.from_world(point);
+        let own = self.unit.tree_from_world(point);
         let (i, bary) = if own.abs().max_element() < NEAR {
             let interval = Interval::of(own);
             self.nearest(point, |node| interval.squares(node).to_array().map(f64::from))
@@ -200,7 +200,7 @@ impl Bvh {
     /// The first triangle met from `origin` along the unit vector `direction` within `reach`.
     pub fn first_hit(&self, origin: DVec3, direction: DVec3, reach: f64) -> Option<RayHit> {
         let ray = Ray::new(origin, direction);
-        let start = self.unit.from_world(origin);
+        let start = self.unit.tree_from_world(origin);
         let mut best = reach;
         let mut found = None;
         let mut stack = [(0u32, 0u32, 0.0); STACK];

@@ -1,5 +1,5 @@
 //! Shared by the stage tests: real meshes when they are there, and groups of made ones.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::print_stdout)]
 
 use planish::DVec3;
 use planish::mesh::{TriMesh, shapes};
