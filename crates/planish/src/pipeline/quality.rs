@@ -153,6 +153,21 @@ fn distances(quality: &mut Quality, name: &str, found: &Comparison, diagonal: f6
     }
 }
 
+/// Edges of the mesh under feature curves: half the number of their ends. Points of a curve that are no vertices
+/// of the mesh only divide an edge.
+fn feature_edges(network: &Network) -> u64 {
+    let mut ends = 0;
+    for curve in network.curves.iter().filter(|c| c.kind == CurveKind::Feature) {
+        let last = curve.points.len() - 1;
+        for (i, point) in curve.points.iter().enumerate() {
+            if point.bary.contains(&1.0) {
+                ends += if i == 0 || i == last { 1 } else { 2 };
+            }
+        }
+    }
+    ends / 2
+}
+
 pub(super) fn mesh_figures(
     mesh: &TriMesh,
     network: &Network,
@@ -161,11 +176,10 @@ pub(super) fn mesh_figures(
     warnings: &mut Vec<Warning>,
 ) {
     let facts = mesh::diagnose(mesh);
-    let sharp = network.curves.iter().filter(|c| c.kind == CurveKind::Feature).map(|c| c.points.len() - 1);
     quality.insert("mesh.triangles".into(), Figure::Count(facts.triangles as u64));
     quality.insert("mesh.watertight".into(), Figure::Flag(facts.watertight));
     quality.insert("mesh.manifold".into(), Figure::Flag(facts.manifold));
-    quality.insert("mesh.feature_edges".into(), Figure::Count(sharp.sum::<usize>() as u64));
+    quality.insert("mesh.feature_edges".into(), Figure::Count(feature_edges(network)));
     if repairs.any() {
         warnings.push(Warning::new("mesh_repaired", in_words(repairs), ""));
     }
