@@ -33,11 +33,17 @@ pub(super) fn quads(bench: &mut Bench) -> bool {
     bench.complex.live_cells().all(|c| bench.complex.loop_of(c).len() == 4)
 }
 
-/// Relaxes all nodes and arcs in `rounds` rounds.
+/// Relaxes all nodes and arcs in up to `rounds` rounds; after the first, those that moved and their neighbours.
 pub(super) fn relax(bench: &mut Bench, rounds: usize, observer: &dyn Observer) -> Result<(), LayoutError> {
+    let mut nodes: Vec<u32> = (0..bench.complex.nodes.len() as u32).collect();
     for _ in 0..rounds {
-        let nodes: Vec<u32> = (0..bench.complex.nodes.len() as u32).collect();
+        let before: Vec<u32> = bench.complex.nodes.iter().map(|n| n.vertex).collect();
         relax_some(bench, &nodes, usize::MAX, observer)?;
+        let moved = |n: u32| bench.complex.nodes[n as usize].vertex != before[n as usize];
+        let arcs = bench.complex.live_arcs().map(|a| bench.complex.arc(2 * a).nodes);
+        nodes = arcs.filter(|ends| ends.iter().any(|&n| moved(n))).flatten().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
     }
     Ok(())
 }
