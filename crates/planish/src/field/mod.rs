@@ -1,0 +1,96 @@
+//! Fields: what is inside, what is outside, and where a grid line passes from one to the other.
+//!
+//! [K01] Kobbelt, Botsch, Schwanecke, Seidel, *Feature Sensitive Surface Extraction from Volume Data*, §3.
+//!
+//! Two interfaces, both towards the same product, the directed distance field (`Directed`): the sides of the
+//! nodes of a lattice, and on every lattice edge whose ends differ one hit with its normal.
+//!
+//! * [`Field`] answers point by point: solids, blended point samples, swept tools. `sample` walks the lattice
+//!   for it, skips what [`Field::crosses`] rules out, and finds the hits by bracketing.
+//! * Sources that know better how to fill whole lines make a `Directed` themselves: meshes by rasterising,
+//!   scalar grids row by row.
+//!
+//! Directed fields on one lattice combine by `csg`.
+//!
+//! Departs from [K01]: hits are kept only on edges that change side (§3 stores three distances per node), in rows
+//! of the lattice, so memory grows with the surface; and a field may not know a side at all ([`Side::Unknown`]),
+//! where the surface then stays open.
+
+use crate::geom::Aabb;
+use glam::DVec3;
+
+/// On which side of the surface a point lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// In the body.
+    Inside,
+    /// In the free space.
+    Outside,
+    /// The field has no data here: no surface passes between this point and any other.
+    Unknown,
+}
+
+/// A field that is asked point by point.
+///
+/// Only [`Field::bounds`], [`Field::value`] and [`Field::gradient`] must be written; the others have defaults that
+/// are right but may be slow.
+///
+/// A value is a *pseudo-distance*: negative inside, positive outside, continuous where it is known, zero on the
+/// surface. It need not be a metric distance; what counts is its sign, its zero set, and its gradient there.
+/// All answers must be functions of the point alone (the same bits on any thread and in any order).
+pub trait Field: Sync {
+    /// A box that holds the whole surface; outside it everything is [`Side::Outside`] or unknown.
+    fn bounds(&self) -> Aabb;
+
+    /// The pseudo-distance at `p`, world units; NaN where the field does not know.
+    fn value(&self, p: DVec3) -> f64;
+
+    /// Unit gradient of the value at `p`, outward near the surface. Zero where there is none (unknown or flat).
+    /// Asked at hits, where it is the normal of the surface.
+    fn gradient(&self, p: DVec3) -> DVec3;
+
+    /// The side of `p`. A value of exactly zero is outside (the one rule for ties everywhere).
+    fn side(&self, p: DVec3) -> Side {
+        side_of(self.value(p))
+    }
+
+    /// Values at many points, in the same order; a hook for fields that answer batches faster.
+    /// `values` has the length of `points`.
+    fn values(&self, points: &[DVec3], values: &mut [f64]) {
+        for (v, &p) in values.iter_mut().zip(points) {
+            *v = self.value(p);
+        }
+    }
+
+    /// Gradients at many points, in the same order; `gradients` has the length of `points`.
+    fn gradients(&self, points: &[DVec3], gradients: &mut [DVec3]) {
+        for (g, &p) in gradients.iter_mut().zip(points) {
+            *g = self.gradient(p);
+        }
+    }
+
+    /// May the surface cross this box, or may the box hold points of known and unknown side? `false` promises that
+    /// all points of the box are on one side, that of its centre. The default says yes to everything, so that
+    /// nothing is missed and nothing skipped.
+    fn crosses(&self, _aabb: &Aabb) -> bool {
+        true
+    }
+
+    /// Typical angle by which [`Field::gradient`] misses the true normal, degrees: 0 for exact sources. Normals that
+    /// differ by less than about three times this are no evidence of a feature; the extractor widens its
+    /// threshold accordingly.
+    fn noise_deg(&self) -> f64 {
+        0.0
+    }
+}
+
+/// The side that a value stands for.
+pub fn side_of(value: f64) -> Side {
+    if value.is_nan() {
+        Side::Unknown
+    } else if value < 0.0 {
+        Side::Inside
+    } else {
+        Side::Outside
+    }
+}
