@@ -2,12 +2,12 @@
 //!
 //! [K01] Kobbelt, Botsch, Schwanecke, Seidel, *Feature Sensitive Surface Extraction from Volume Data*, §3.
 //!
-//! Two interfaces, both towards the same product, the directed distance field (`Directed`): the sides of the
+//! Two interfaces, both towards the same product, the directed distance field ([`Directed`]): the sides of the
 //! nodes of a lattice, and on every lattice edge whose ends differ one hit with its normal.
 //!
-//! * [`Field`] answers point by point: solids, blended point samples, swept tools. `sample` walks the lattice
+//! * [`Field`] answers point by point: solids, blended point samples, swept tools. [`sample`] walks the lattice
 //!   for it, skips what [`Field::crosses`] rules out, and finds the hits by bracketing.
-//! * Sources that know better how to fill whole lines make a `Directed` themselves: meshes by rasterising,
+//! * Sources that know better how to fill whole lines make a [`Directed`] themselves: meshes by rasterising,
 //!   scalar grids row by row.
 //!
 //! Directed fields on one lattice combine by `csg`.
@@ -16,8 +16,35 @@
 //! of the lattice, so memory grows with the surface; and a field may not know a side at all ([`Side::Unknown`]),
 //! where the surface then stays open.
 
+pub mod directed;
+mod lattice;
+mod mesh_field;
+pub mod sample;
+mod winding;
+
+pub use directed::Directed;
+pub use lattice::{Lattice, LatticeError, Spacing};
+pub use mesh_field::MeshField;
+pub use sample::sample;
+pub use winding::Winding;
+
 use crate::geom::Aabb;
+use crate::mesh::MeshError;
 use glam::DVec3;
+
+/// Why a field cannot be made or sampled.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FieldError {
+    /// A mesh is damaged.
+    #[error("{0}")]
+    Mesh(MeshError),
+    /// The lattice is no lattice, or too large.
+    #[error("{0}")]
+    Lattice(#[from] LatticeError),
+    /// The observer wants no result any more.
+    #[error("sampling cancelled")]
+    Cancelled,
+}
 
 /// On which side of the surface a point lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,4 +120,24 @@ pub fn side_of(value: f64) -> Side {
     } else {
         Side::Outside
     }
+}
+
+/// A source that knows its sharp edges better than the hits around a cell tell.
+///
+/// The extractor guesses where a feature passes a face of a cell, and where it runs inside; a source may correct that.
+pub trait Creases: Sync {
+    /// Where the feature between two hits passes the plane of nodes perpendicular to `axis` through `guess`; `None`
+    /// if the guess is as good as anything. `a` and `b` are position and normal of the hits, `size` that of a cell.
+    fn face_point(
+        &self,
+        axis: usize,
+        guess: DVec3,
+        a: (DVec3, DVec3),
+        b: (DVec3, DVec3),
+        size: f64,
+    ) -> Option<DVec3>;
+
+    /// A place of the feature inside a cell, near `guess`; `through` are the points at which it passes the cell's
+    /// faces, `corner` whether several features meet here, `size` that of a cell.
+    fn inner_point(&self, guess: DVec3, through: &[DVec3], corner: bool, size: f64) -> Option<DVec3>;
 }
