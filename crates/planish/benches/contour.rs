@@ -19,15 +19,16 @@ fn main() {
         [name, n] => (name.as_str(), n.parse().unwrap()),
         _ => ("fandisk", 65),
     };
-    let Some(mesh) = common::measured(name) else { return };
+    let Some(mesh) = common::data_mesh(&format!("{name}.ply")) else { return };
     for plain in [true, false] {
         let t0 = Instant::now();
         let field = MeshField::new(&mesh).unwrap();
         let lattice = Lattice::around(&field.bounds(), Spacing::Resolution(n)).unwrap();
         let directed = field.sample(&lattice, &Silent).unwrap();
+        let creases = field.creases(&lattice, 0.9);
         let t1 = Instant::now();
         let params = ContourParams { plain, ..Default::default() };
-        let found = contour::extract(&directed, None, &params, &Silent).unwrap();
+        let found = contour::extract(&directed, Some(&creases), &params, &Silent).unwrap();
         let t2 = Instant::now();
         let d = diagnose(&found.mesh);
         eprintln!(

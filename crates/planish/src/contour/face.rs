@@ -147,7 +147,10 @@ fn place(
     if q.cmpgt(low + near).all() && q.cmplt(high - near).all() {
         return Some((lift(q), None));
     }
-    Some((lift(q.clamp(low + margin, high - margin)), Some(lift(q))))
+    // Along the feature, so that its vertices keep their order, not across it.
+    let kept = lift(q.clamp(low + margin, high - margin));
+    let wish = refine.and_then(|r| r.nearest(kept, size.max_element())).unwrap_or(lift(q));
+    Some((kept, Some(wish)))
 }
 
 /// True if the two polylines of a face do not meet.

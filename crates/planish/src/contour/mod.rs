@@ -16,6 +16,7 @@ mod cell;
 mod face;
 mod feature;
 mod patch;
+mod polish;
 mod topology;
 mod walk;
 
@@ -188,8 +189,14 @@ pub fn extract(
         counts.fallbacks += sheet.fallbacks;
         counts.pushed += sheet.pushed;
     }
-    counts.kept = wishes.len();
-    let mesh = TriMesh::new(points, triangles);
+    let mut mesh = TriMesh::new(points, triangles);
+    let cells = sheets.iter().scan(0, |first, sheet| {
+        let own = *first;
+        *first += sheet.triangles.len() as u32;
+        Some(sheet.cells.iter().map(move |(at, t)| (*at, own + t)))
+    });
+    counts.moved = polish::polish(&mut mesh, field, base, cells.flatten().collect(), &wishes);
+    counts.kept = wishes.len() - counts.moved;
     let mut extracted = Extracted { mesh, tags: tags(kinds, edges), counts };
     drop_unused(&mut extracted);
     extracted.tags.mark(&mut extracted.mesh);

@@ -231,14 +231,14 @@ impl Patcher<'_> {
                 p = corner;
             }
         }
-        let size = (high - low).max_element();
         if let Some(refine) = self.refine {
-            p = refine.inner_point(p, &points, shape == Shape::Corner, size).unwrap_or(p);
+            p = refine.inner_point(p, &points, shape == Shape::Corner, low, high).unwrap_or(p);
         }
         let kind = if shape == Shape::Corner { FeatureKind::Corner } else { FeatureKind::Edge };
         let (clamped, moved) = inside(p, low, high);
         let mut apex = clamped;
-        let mut wish = moved.then_some(p);
+        let along = |r: &dyn Creases| r.nearest(clamped, (high - low).max_element());
+        let mut wish = moved.then(|| self.refine.filter(|_| shape == Shape::Edge).and_then(along).unwrap_or(p));
         let mut given_up = !features || !p.is_finite() || !within(p, low, high, FAR);
         if !given_up && turned(l, apex) {
             // A clamped apex may see its fan from the wrong side, the free one not.

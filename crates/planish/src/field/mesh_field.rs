@@ -74,6 +74,11 @@ impl<'a> MeshField<'a> {
         Aabb::of(self.mesh.triangles.iter().flatten().map(|&v| &self.mesh.points[v as usize]))
     }
 
+    /// The sharp edges of the mesh on `lattice`: those between normals whose cosine is below `sharp`.
+    pub fn creases(&self, lattice: &Lattice, sharp: f64) -> super::MeshCreases {
+        super::MeshCreases::new(self.mesh, self.turn as f64, lattice, sharp)
+    }
+
     /// Samples the mesh on `lattice`.
     /// # Errors
     /// [`FieldError::Cancelled`].

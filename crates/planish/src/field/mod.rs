@@ -16,12 +16,14 @@
 //! of the lattice, so memory grows with the surface; and a field may not know a side at all ([`Side::Unknown`]),
 //! where the surface then stays open.
 
+mod creases;
 pub mod directed;
 mod lattice;
 mod mesh_field;
 pub mod sample;
 mod winding;
 
+pub use creases::MeshCreases;
 pub use directed::Directed;
 pub use lattice::{Lattice, LatticeError, Spacing};
 pub use mesh_field::MeshField;
@@ -137,7 +139,10 @@ pub trait Creases: Sync {
         size: f64,
     ) -> Option<DVec3>;
 
-    /// A place of the feature inside a cell, near `guess`; `through` are the points at which it passes the cell's
-    /// faces, `corner` whether several features meet here, `size` that of a cell.
-    fn inner_point(&self, guess: DVec3, through: &[DVec3], corner: bool, size: f64) -> Option<DVec3>;
+    /// A place of the feature inside the cell from `low` to `high`, near `guess`; `through` are the points at which it
+    /// passes the cell's faces, `corner` whether several features seem to meet here.
+    fn inner_point(&self, guess: DVec3, through: &[DVec3], corner: bool, low: DVec3, high: DVec3) -> Option<DVec3>;
+
+    /// The place of a feature nearest to `p`, within `reach`: where a vertex goes that had to stay in its cell.
+    fn nearest(&self, p: DVec3, reach: f64) -> Option<DVec3>;
 }
