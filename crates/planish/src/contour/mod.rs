@@ -17,12 +17,15 @@ mod face;
 mod feature;
 mod patch;
 mod polish;
+mod refine;
 mod topology;
 mod walk;
 
 use crate::field::{Creases, Directed};
 use crate::mesh::{FeatureKind, FeatureTags, TriMesh};
 use crate::observe::Observer;
+pub use refine::FieldCreases;
+
 use face::FacePoints;
 use glam::DVec3;
 use patch::{INNER, Patcher, Scratch, Sheet};
