@@ -473,8 +473,8 @@ mod tests {
                 let c = place(n);
                 let aabb = Aabb { min: c - 0.1, max: c + 0.15 };
                 let [low, high] = solid.interval(&aabb);
-                for m in 0..10 {
-                    let r = |k| random::unit(n, 3 * m + k);
+                for m in 0..10u64 {
+                    let r = |k: u64| random::unit(n, 3 * m + k);
                     let p = aabb.min + (aabb.max - aabb.min) * DVec3::new(r(0), r(1), r(2));
                     let d = solid.value(p);
                     assert!(low <= d && d <= high, "{name}");
