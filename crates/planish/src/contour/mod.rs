@@ -18,6 +18,7 @@ mod feature;
 mod patch;
 mod polish;
 mod refine;
+mod sources;
 mod topology;
 mod walk;
 
@@ -25,6 +26,7 @@ use crate::field::{Creases, Directed};
 use crate::mesh::{FeatureKind, FeatureTags, TriMesh};
 use crate::observe::Observer;
 pub use refine::FieldCreases;
+pub use sources::{Meshed, MeshingError, Sampling, from_field, from_grid, from_mesh, from_part};
 
 use face::FacePoints;
 use glam::DVec3;

@@ -256,7 +256,7 @@ mod tests {
     use crate::geom::random;
 
     #[test]
-    fn sloped_sweeps_are_the_least_of_2000_places_of_the_tool_within_1e_5() {
+    fn sloped_sweeps_are_the_least_of_2000_places_of_the_tool_within_their_spacing() {
         let stock = Aabb { min: DVec3::splat(-1e3), max: DVec3::splat(1e3) };
         for tool in [Tool::Ball { radius: 0.5 }, Tool::Flat { radius: 0.4 }, Tool::Bull { radius: 0.5, corner: 0.2 }] {
             for (n, to) in [DVec3::new(1.0, 0.5, -0.7), DVec3::new(0.8, 0.0, 0.0), DVec3::new(0.0, 0.0, -0.6)]
@@ -275,7 +275,7 @@ mod tests {
                         })
                         .fold(f64::INFINITY, f64::min);
                     let found = milling.cut(p).0;
-                    assert!(found <= least + 1e-9 && found > least - 1e-5, "{tool:?} {to} {p}: {found} {least}");
+                    assert!(found <= least + 1e-9 && found > least - 4e-4, "{tool:?} {to} {p}: {found} {least}");
                 }
             }
         }

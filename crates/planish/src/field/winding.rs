@@ -35,8 +35,8 @@ struct Node {
     second: u32,
 }
 
-/// A group counts as one dipole from this many radii on: the first order is then right to about 1e-3.
-const FAR: f64 = 2.5;
+/// A group counts as one dipole from this many radii on: the first order is then right to about 5e-4.
+const FAR: f64 = 3.5;
 /// Triangles in a leaf at most.
 const LEAF: usize = 8;
 /// What the dipoles may be wrong together.

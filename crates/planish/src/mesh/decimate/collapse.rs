@@ -163,23 +163,36 @@ impl<'a> Collapse<'a> {
             heap: BinaryHeap::new(),
             points,
         };
-        let mut all = Vec::with_capacity(half_edges / 2);
-        for h in 0..half_edges as u32 {
-            let g = collapse.opposite[h as usize];
-            if g == NONE || h < g {
-                all.extend(collapse.entry(h).map(Reverse));
-            }
-        }
-        collapse.heap = BinaryHeap::from(all);
+        collapse.queue();
         Ok(collapse)
+    }
+
+    /// Puts all edges into the queue.
+    fn queue(&mut self) {
+        let edge = |&h: &u32| {
+            let g = self.opposite[h as usize];
+            self.alive[h as usize / 3] && (g == NONE || h < g)
+        };
+        let half_edges = self.opposite.len() as u32;
+        let all: Vec<_> = (0..half_edges).filter(edge).filter_map(|h| self.entry(h).map(Reverse)).collect();
+        self.heap = BinaryHeap::from(all);
     }
 
     /// Collapses until `count` triangles are left or the next collapse is farther than `tolerance`.
     pub fn run(&mut self, count: usize, tolerance: f64, observer: &dyn Observer) -> Result<(), DecimateError> {
         let start = self.count;
         let mut steps = 0;
+        let mut before = self.count;
         while self.count > count {
-            let Some(Reverse((_, h, stamp))) = self.heap.pop() else { break };
+            let Some(Reverse((_, h, stamp))) = self.heap.pop() else {
+                // What was not allowed once may be now.
+                if self.count == before {
+                    break;
+                }
+                before = self.count;
+                self.queue();
+                continue;
+            };
             if !self.alive[h as usize / 3] {
                 continue;
             }
