@@ -13,6 +13,8 @@
 
 mod caps;
 mod cell;
+#[cfg(test)]
+mod certificate;
 mod face;
 mod feature;
 mod patch;
