@@ -22,8 +22,8 @@ struct Polish<'a> {
     field: &'a Directed,
     /// First name of the hits of each axis.
     base: [u32; 3],
-    /// Cells in the order of z, y, x with their first triangle.
-    cells: Vec<([u32; 3], u32)>,
+    /// Cells in the order of z, y, x with the range of their triangles.
+    cells: Vec<([u32; 3], u32, u32)>,
 }
 
 /// Moves the vertices of `wishes`; returns how many arrived where they belong.
@@ -31,7 +31,7 @@ pub fn polish(
     mesh: &mut TriMesh,
     field: &Directed,
     base: [u32; 3],
-    cells: Vec<([u32; 3], u32)>,
+    cells: Vec<([u32; 3], u32, u32)>,
     wishes: &[Wish],
 ) -> usize {
     if wishes.is_empty() {
@@ -130,17 +130,18 @@ impl Polish<'_> {
         for z in clamp(a.z, 2)..=clamp(b.z, 2) {
             for y in clamp(a.y, 1)..=clamp(b.y, 1) {
                 let (x0, x1) = (clamp(a.x, 0), clamp(b.x, 0));
-                let first = self.cells.partition_point(|(c, _)| [c[2], c[1], c[0]] < [z, y, x0]);
-                for n in first..self.cells.len() {
-                    let (c, t) = self.cells[n];
+                let first = self.cells.partition_point(|(c, ..)| [c[2], c[1], c[0]] < [z, y, x0]);
+                for &(c, first, end) in &self.cells[first..] {
                     if c[2] != z || c[1] != y || c[0] > x1 {
                         break;
                     }
-                    let end = self.cells.get(n + 1).map_or(self.mesh.triangles.len() as u32, |c| c.1);
-                    found.extend(t..end);
+                    found.extend(first..end);
                 }
             }
         }
+        // Merged cells name their triangles in each of their parts.
+        found.sort_unstable();
+        found.dedup();
         found
     }
 }
