@@ -226,7 +226,7 @@ impl Patcher<'_> {
             // A bent edge looks like a corner; it is one only if that explains the hits much better.
             let rms = |p: DVec3| scratch.planes.iter().map(|(s, n)| n.dot(p - s).powi(2)).sum::<f64>();
             let edge = solve(&scratch.planes, middle, Shape::Edge);
-            if rms(edge) < CORNER_GAIN * rms(p) || !within(p, low, high, 0.0) {
+            if rms(edge) < CORNER_GAIN * rms(p) || !within(p, low, high, POKE) {
                 (shape, p) = (Shape::Edge, edge);
             }
         } else if shape == Shape::Edge && points.len() > 2 {
@@ -242,7 +242,7 @@ impl Patcher<'_> {
         let kind = if shape == Shape::Corner { FeatureKind::Corner } else { FeatureKind::Edge };
         let (clamped, moved) = inside(p, low, high);
         let mut apex = clamped;
-        let along = |r: &dyn Creases| r.nearest(clamped, (high - low).max_element());
+        let along = |r: &dyn Creases| r.nearest(clamped, (high - low).max_element(), &scratch.planes);
         let mut wish = moved.then(|| self.refine.filter(|_| shape == Shape::Edge).and_then(along).unwrap_or(p));
         let mut given_up = !features || !p.is_finite() || !within(p, low, high, FAR);
         if !given_up && turned(l, apex) {
@@ -322,6 +322,8 @@ impl Patcher<'_> {
     }
 }
 
+/// A corner may poke out of its cell by so much, in cells.
+const POKE: f64 = 0.5;
 /// A corner must explain the hits so many times better than an edge (squared distances).
 const CORNER_GAIN: f64 = 16.0;
 
