@@ -278,7 +278,7 @@ fn random_tree(seed: u64) -> Solid {
 fn five_hundred_random_trees_of_solids_are_certified() {
     for seed in 0..500 {
         let tree = Part::Solid(random_tree(seed));
-        let n = 14 + (seed % 20) as usize;
+        let n = 12 + (seed % 14) as usize;
         match contour::from_part(&tree, at(n), &ContourParams::default(), &Silent) {
             Ok(made) => {
                 certified(&format!("tree {seed}"), &made.extracted.mesh);
@@ -302,6 +302,58 @@ fn meshes_are_bitwise_equal_on_1_2_and_5_threads() {
     };
     let one = run(1);
     assert!(one == run(2) && one == run(5));
+}
+
+#[test]
+fn adaptive_meshes_are_certified_within_their_tolerance_and_smaller_by_far() {
+    let tolerance = 0.004;
+    let adaptive = ContourParams { adaptive: Some(tolerance), ..Default::default() };
+    for seed in 0..40 {
+        let tree = Part::Solid(random_tree(seed));
+        if let Ok(made) = contour::from_part(&tree, at(24), &adaptive, &Silent) {
+            certified(&format!("adaptive tree {seed}"), &made.extracted.mesh);
+        }
+    }
+    let part = Part::Solid(box_of(DVec3::new(2.0, 1.4, 0.9)).difference(Solid::Cylinder { radius: 0.3, height: 2.0 }));
+    let coarse = contour::from_part(&part, at(64), &adaptive, &Silent).unwrap();
+    let fine = contour::from_part(&part, at(64), &ContourParams::default(), &Silent).unwrap();
+    let (a, b) = (&coarse.extracted.mesh, &fine.extracted.mesh);
+    let d = certified("adaptive part", a);
+    assert_eq!(d.genus, Some(1));
+    assert!(a.triangles.len() * 3 < b.triangles.len(), "{} of {}", a.triangles.len(), b.triangles.len());
+    let volume = |m: &TriMesh| diagnose(m).volume.unwrap();
+    assert!((volume(a) / volume(b) - 1.0).abs() < 1e-3);
+    let bvh = planish::geom::Bvh::new(a);
+    for p in &b.points {
+        assert!(bvh.closest(*p).distance < 1.5 * tolerance, "{p}");
+    }
+}
+
+#[test]
+fn decimating_and_smoothing_keep_the_feature_lines_of_an_extracted_part() {
+    let part = Part::Solid(box_of(DVec3::new(2.0, 1.4, 0.9)).difference(Solid::Cylinder { radius: 0.3, height: 2.0 }));
+    let made = contour::from_part(&part, at(64), &ContourParams::default(), &Silent).unwrap().extracted;
+    let on_edges = |p: DVec3, tolerance: f64| {
+        let q = (p.abs() - DVec3::new(1.0, 0.7, 0.45)).abs();
+        let flat = [q.x, q.y, q.z].iter().filter(|d| **d < tolerance).count();
+        flat >= 2 || (q.z < tolerance && (p.truncate().length() - 0.3).abs() < tolerance)
+    };
+    let target = planish::mesh::DecimateTarget::Ratio(0.05);
+    let params = planish::mesh::DecimateParams { target, ..Default::default() };
+    let less = planish::mesh::decimate(&made.mesh, Some(&made.tags), &params, &Silent).unwrap();
+    let d = certified("decimated", &less.mesh);
+    assert_eq!(d.genus, Some(1));
+    assert!(d.triangles <= made.mesh.triangles.len() / 19);
+    for e in &less.tags.edges {
+        let [a, b] = e.map(|v| less.mesh.points[v as usize]);
+        assert!(on_edges(a, 2e-3) && on_edges((a + b) / 2.0, 0.02), "{a} {b}");
+    }
+    let params = planish::mesh::SmoothParams { noise: Some(0.002), strength: 1.0 };
+    let smooth = planish::mesh::smooth(&made.mesh, Some(&made.tags), &params, &Silent).unwrap();
+    certified("smoothed", &smooth.mesh);
+    for v in (0..smooth.mesh.points.len()).filter(|&v| made.tags.vertices[v] != FeatureKind::None) {
+        assert!(on_edges(smooth.mesh.points[v], 0.01), "{}", smooth.mesh.points[v]);
+    }
 }
 
 #[test]

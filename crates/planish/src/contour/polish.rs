@@ -38,9 +38,10 @@ pub fn polish(
         return 0;
     }
     let stars = stars(mesh, wishes);
+    let starts: Vec<DVec3> = wishes.iter().map(|(v, _)| mesh.points[*v as usize]).collect();
     let polish = Polish { mesh, field, base, cells };
     let mut open: Vec<usize> = (0..wishes.len()).collect();
-    let mut arrived = 0;
+    let mut arrived = vec![false; wishes.len()];
     for _ in 0..ROUNDS {
         open.retain(|&w| {
             let (v, target) = wishes[w];
@@ -48,7 +49,7 @@ pub fn polish(
             for way in WAYS {
                 polish.mesh.points[v as usize] = if way == 1.0 { target } else { start.lerp(target, way) };
                 if polish.allowed(&stars[w]) {
-                    arrived += (way == 1.0) as usize;
+                    arrived[w] = way == 1.0;
                     return way != 1.0;
                 }
             }
@@ -56,7 +57,23 @@ pub fn polish(
             true
         });
     }
-    arrived
+    // A vertex that moved before its neighbours turns triangles for a while. Where that stayed, it goes back.
+    for _ in 0..ROUNDS {
+        for (w, &(v, _)) in wishes.iter().enumerate() {
+            let here = polish.mesh.points[v as usize];
+            let turned = polish.turned_in(&stars[w]);
+            if turned == 0 || here == starts[w] {
+                continue;
+            }
+            polish.mesh.points[v as usize] = starts[w];
+            if polish.turned_in(&stars[w]) < turned && polish.allowed(&stars[w]) {
+                arrived[w] = false;
+            } else {
+                polish.mesh.points[v as usize] = here;
+            }
+        }
+    }
+    arrived.into_iter().filter(|&a| a).count()
 }
 
 /// Triangles around each vertex that wants to move.
@@ -77,16 +94,13 @@ fn stars(mesh: &TriMesh, wishes: &[Wish]) -> Vec<Vec<u32>> {
 }
 
 impl Polish<'_> {
-    /// True if the triangles of `star`, as they are now, meet nothing and face the way their hits do.
+    /// True if the triangles of `star`, as they are now, meet nothing.
     fn allowed(&self, star: &[u32]) -> bool {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for &t in star {
             let corners = self.mesh.corners(t as usize);
             low = corners.into_iter().fold(low, DVec3::min);
             high = corners.into_iter().fold(high, DVec3::max);
-            if self.turned(t, corners) {
-                return false;
-            }
         }
         let all = self.near(low, high);
         star.iter().all(|&s| {
@@ -98,6 +112,11 @@ impl Polish<'_> {
                 apart || !triangles_meet(p, names, q, self.mesh.triangles[t as usize])
             })
         })
+    }
+
+    /// Triangles of `star` that face against their hits.
+    fn turned_in(&self, star: &[u32]) -> usize {
+        star.iter().filter(|&&t| self.turned(t, self.mesh.corners(t as usize))).count()
     }
 
     /// True if a triangle faces against the normals of all hits among its corners.
