@@ -16,7 +16,9 @@ mod zone;
 use planish::contour::{self, ContourParams};
 use planish::field::{GridParams, Lattice, MeshField, ScalarGrid, Spacing, sample_grid};
 use planish::geom::random;
-use planish::mesh::{CompareParams, DecimateParams, SmoothParams, compare, decimate, diagnose, self_intersections, smooth};
+use planish::mesh::{
+    CompareParams, DecimateParams, SmoothParams, compare, decimate, diagnose, self_intersections, smooth,
+};
 use planish::{DVec3, Silent};
 use std::time::Instant;
 

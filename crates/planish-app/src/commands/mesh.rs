@@ -128,7 +128,8 @@ fn failure(args: &Mesh, source: &Source, error: MeshingError) -> Failure {
 
 fn default_memory() -> u64 {
     let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    let total = text.lines().find_map(|l| l.strip_prefix("MemTotal:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
+    let total =
+        text.lines().find_map(|l| l.strip_prefix("MemTotal:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
     (total.map_or(MEMORY_GUESS, |kb| kb << 10) as f64 * MEMORY_SHARE) as u64
 }
 
@@ -172,7 +173,8 @@ fn figures(made: &Meshed, report: &mut Report) {
 
 fn table(args: &Mesh, made: &Meshed, report: &Report) -> Summary {
     let unit = report.input.units.as_str();
-    let flag = |key: &str, yes: &str, no: &str| if report.flag(key) == Some(true) { yes.into() } else { String::from(no) };
+    let flag =
+        |key: &str, yes: &str, no: &str| if report.flag(key) == Some(true) { yes.into() } else { String::from(no) };
     let mut table = Summary::default();
     let [x, y, z] = made.lattice.cells;
     table.row("input", format!("{}: {}", report.input.path, report.input.kind));

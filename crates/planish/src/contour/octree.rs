@@ -66,13 +66,7 @@ impl<'a> Octree<'a> {
     /// * `cells` - all cells that the surface passes
     /// * `sharp` - cosine below which two normals make a feature
     /// * `tolerance` - distance from a plane that is still flat, world units
-    pub fn new(
-        field: &'a Directed,
-        base: [u32; 3],
-        cells: Vec<Candidate>,
-        sharp: f64,
-        tolerance: f64,
-    ) -> Octree<'a> {
+    pub fn new(field: &'a Directed, base: [u32; 3], cells: Vec<Candidate>, sharp: f64, tolerance: f64) -> Octree<'a> {
         let mut octree = Octree { field, base, levels: Vec::new(), leaves: Vec::new() };
         // Places of all cells of the level, and those of them that are flat.
         let mut current: Vec<([u32; 3], Option<Block>)> = cells
@@ -94,7 +88,9 @@ impl<'a> Octree<'a> {
             let next: Vec<([u32; 3], Option<Block>)> = groups
                 .par_iter()
                 .map(|group| {
-                    let merged = octree.merged(group).filter(|b| octree.is_flat(&b.hits, sharp, tolerance));
+                    let merged = octree
+                        .merged(octree.levels.len() + 1, group)
+                        .filter(|b| octree.is_flat(&b.hits, sharp, tolerance));
                     (parent(group[0].0), merged)
                 })
                 .collect();
@@ -132,8 +128,19 @@ impl<'a> Octree<'a> {
         heights().fold(f64::NEG_INFINITY, f64::max) - heights().fold(f64::INFINITY, f64::min) <= tolerance
     }
 
-    /// Up to eight neighbours as one, if all are flat and each face carries one polyline at most.
-    fn merged(&self, group: &[([u32; 3], Option<Block>)]) -> Option<Block> {
+    /// Least and greatest corner of a block.
+    fn bounds(&self, level: usize, at: [u32; 3]) -> [DVec3; 2] {
+        let size = 1usize << level;
+        [0, 1].map(|d| {
+            // The last block may reach beyond the lattice: it still is a box.
+            let [i, j, k] = at.map(|x| (x as usize + d) * size);
+            self.field.lattice.node(i, j, k)
+        })
+    }
+
+    /// Up to eight neighbours as one block of `level`, if all are flat and each face carries one polyline at most.
+    fn merged(&self, level: usize, group: &[([u32; 3], Option<Block>)]) -> Option<Block> {
+        let [low, high] = self.bounds(level, group.first()?.0.map(|x| x / 2));
         let mut faces = [None; 6];
         let mut hits = Vec::new();
         for (_, child) in group {
@@ -154,7 +161,8 @@ impl<'a> Octree<'a> {
             let ends = [*path.first()?, *path.last()?];
             // Both ends on one edge: the segment would lie in two faces.
             let (a, b) = (self.position(ends[0]), self.position(ends[1]));
-            if ends[0] == ends[1] || (0..3).filter(|&k| a[k] == b[k]).count() > 1 {
+            let shared = |k: usize| a[k] == b[k] && (a[k] == low[k] || a[k] == high[k]);
+            if ends[0] == ends[1] || (0..3).filter(|&k| shared(k)).count() > 1 {
                 return None;
             }
             *face = Some(ends);
@@ -210,19 +218,15 @@ impl<'a> Octree<'a> {
         }
         let Some(names) = ring(&segments) else { return };
         let size = 1usize << level;
-        let node = |d: usize| {
-            let [i, j, k] = at.map(|x| x as usize * size + d * size);
-            // The last block may reach beyond the lattice: it still is a box.
-            DVec3::new(self.field.lattice.coordinate(0, i), self.field.lattice.coordinate(1, j), self.field.lattice.coordinate(2, k))
-        };
-        let (low, high) = (node(0), node(1));
+        let [low, high] = self.bounds(level, at);
         let l: Vec<Corner> = names
             .iter()
             .map(|&id| {
                 let p = self.position(id);
                 let mut faces = 0;
                 for axis in 0..3 {
-                    faces |= ((p[axis] == low[axis]) as u8) << (2 * axis) | ((p[axis] == high[axis]) as u8) << (2 * axis + 1);
+                    faces |= ((p[axis] == low[axis]) as u8) << (2 * axis)
+                        | ((p[axis] == high[axis]) as u8) << (2 * axis + 1);
                 }
                 Corner { id, p, n: self.normal(id), faces, edge: 0, face: 0 }
             })

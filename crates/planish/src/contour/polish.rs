@@ -15,7 +15,7 @@ use glam::DVec3;
 /// Parts of the way that are tried.
 const WAYS: [f64; 3] = [1.0, 0.6, 0.3];
 /// Rounds: a neighbour that moved may make room.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 8;
 
 struct Polish<'a> {
     mesh: &'a mut TriMesh,
