@@ -17,6 +17,8 @@
 //! # Ok::<(), pipeline::PipelineError>(())
 //! ```
 
+pub mod contour;
+pub mod field;
 pub mod geom;
 pub mod grid;
 pub mod linalg;

@@ -2,6 +2,7 @@
 
 mod aabb;
 mod bvh;
+pub mod predicates;
 pub mod random;
 pub mod tolerance;
 
