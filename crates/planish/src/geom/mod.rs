@@ -2,8 +2,10 @@
 
 mod aabb;
 mod bvh;
+mod kd_tree;
 pub mod random;
 pub mod tolerance;
 
 pub use aabb::Aabb;
 pub use bvh::{Bvh, RayHit, SurfaceHit};
+pub use kd_tree::{KdTree, nearest_distances};
