@@ -18,6 +18,8 @@
 //! ```
 
 pub mod cloud;
+pub mod contour;
+pub mod field;
 pub mod geom;
 pub mod grid;
 pub mod linalg;

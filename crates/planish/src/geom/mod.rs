@@ -3,6 +3,7 @@
 mod aabb;
 mod bvh;
 mod kd_tree;
+pub mod predicates;
 pub mod random;
 pub mod tolerance;
 

@@ -5,6 +5,7 @@ pub mod compare;
 mod demo;
 mod diagnose;
 mod face_point;
+mod intersect;
 mod features;
 pub mod path;
 mod repair;
@@ -13,15 +14,18 @@ mod sets;
 pub mod shapes;
 mod slivers;
 mod soup;
+mod tags;
 mod walk;
 
 pub use adjacency::{Adjacency, Fan, NONE, next, previous};
 pub use compare::{CompareError, CompareParams, Comparison, compare};
 pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
 pub use face_point::FacePoint;
+pub use intersect::self_intersections;
 pub use features::{boundary_loops, components, sharp_edges};
 pub use repair::{Repairs, repair, weld};
 pub use soup::check;
+pub use tags::{FEATURE, FeatureKind, FeatureTags};
 pub use walk::{CurvePlace, move_point_on_curve, move_point_on_surface};
 
 use crate::geom::Aabb;

@@ -1,0 +1,149 @@
+//! Feature test and feature vertex of one loop ([K01] §4.2 and §4.3).
+
+use glam::{DMat3, DVec3};
+
+/// What the normals of a loop tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// No feature.
+    Smooth,
+    /// A sharp edge.
+    Edge,
+    /// Three or more surfaces meet.
+    Corner,
+}
+
+/// Normals closer than this (cosine) are one sample: how often a plane is hit must not weigh in the solution.
+const SAME: f64 = 0.9999;
+/// Singular values below this fraction of the greatest do not count.
+const RANK: f64 = 1e-3;
+
+/// Classifies a loop by the opening angle of its normals ([K01] §4.2).
+/// * `sharp` - cosine below which two normals make a feature (theta_sharp)
+/// * `corner` - deviation from the plane of the most opposed two above which it is a corner (phi_corner)
+pub fn classify(normals: &[DVec3], sharp: f64, corner: f64) -> Shape {
+    let mut theta = sharp;
+    let mut pair = None;
+    for (i, a) in normals.iter().enumerate() {
+        for b in &normals[..i] {
+            let d = a.dot(*b);
+            if d < theta {
+                theta = d;
+                pair = Some((*a, *b));
+            }
+        }
+    }
+    let Some((a, b)) = pair else { return Shape::Smooth };
+    let across = a.cross(b).normalize_or_zero();
+    // Opposite normals span no plane; whatever else there is lies across them.
+    let phi = if across == DVec3::ZERO {
+        normals.iter().map(|n| n.cross(a).length()).fold(0.0, f64::max)
+    } else {
+        normals.iter().map(|n| n.dot(across).abs()).fold(0.0, f64::max)
+    };
+    if phi > corner { Shape::Corner } else { Shape::Edge }
+}
+
+/// The feature vertex: the point with the least squared distances from the tangent planes, nearest to `near` where they
+/// leave it free ([K01] §4.3, eq. 1). For an edge the smallest singular value counts as zero.
+/// * `planes` - points and unit normals
+pub fn solve(planes: &[(DVec3, DVec3)], near: DVec3, shape: Shape) -> DVec3 {
+    // Planes that are hit more than once are averaged first.
+    let mut groups: Vec<(DVec3, DVec3, f64)> = Vec::with_capacity(planes.len());
+    for &(p, n) in planes {
+        let d = n.dot(p - near);
+        match groups.iter_mut().find(|g| g.1.dot(n) > SAME) {
+            Some(g) => {
+                g.0.x += d;
+                g.2 += 1.0;
+            }
+            None => groups.push((DVec3::new(d, 0.0, 0.0), n, 1.0)),
+        }
+    }
+    let mut a = DMat3::ZERO;
+    let mut b = DVec3::ZERO;
+    for (sum, n, count) in &groups {
+        a += DMat3::from_cols(*n * n.x, *n * n.y, *n * n.z);
+        b += *n * (sum.x / count);
+    }
+    let (values, vectors) = eigen(a);
+    let rank = if shape == Shape::Edge { 2 } else { 3 };
+    // Squares of the singular values; the greatest first.
+    let limit = RANK * RANK * values[0];
+    let mut x = DVec3::ZERO;
+    for k in 0..rank {
+        if values[k] > limit {
+            x += vectors[k] * (vectors[k].dot(b) / values[k]);
+        }
+    }
+    near + x
+}
+
+/// Eigenvalues, descending, and unit eigenvectors of a symmetric matrix, by Jacobi rotations.
+pub fn eigen(mut a: DMat3) -> ([f64; 3], [DVec3; 3]) {
+    let mut v = DMat3::IDENTITY;
+    for _ in 0..16 {
+        let off = a.x_axis.y.powi(2) + a.x_axis.z.powi(2) + a.y_axis.z.powi(2);
+        let on = a.x_axis.x.powi(2) + a.y_axis.y.powi(2) + a.z_axis.z.powi(2);
+        if !(off > 1e-32 * on) {
+            break;
+        }
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            let apq = a.col(p)[q];
+            if apq == 0.0 {
+                continue;
+            }
+            let theta = (a.col(q)[q] - a.col(p)[p]) / (2.0 * apq);
+            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+            let c = 1.0 / (t * t + 1.0).sqrt();
+            let s = t * c;
+            let mut r = DMat3::IDENTITY;
+            r.col_mut(p)[p] = c;
+            r.col_mut(q)[q] = c;
+            r.col_mut(q)[p] = s;
+            r.col_mut(p)[q] = -s;
+            a = r.transpose() * a * r;
+            v *= r;
+        }
+    }
+    let mut order = [0, 1, 2];
+    let value = |k: usize| a.col(k)[k];
+    order.sort_by(|&i, &j| value(j).total_cmp(&value(i)).then(i.cmp(&j)));
+    (order.map(value), order.map(|k| v.col(k)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_planes_meet_in_their_corner_and_two_in_the_point_of_their_line_nearest_to_the_start() {
+        let corner = DVec3::new(0.3, -0.2, 0.9);
+        let normals = [DVec3::new(1.0, 0.1, 0.0), DVec3::new(-0.2, 1.0, 0.3), DVec3::new(0.0, 0.4, 1.0)];
+        let planes: Vec<_> =
+            normals.iter().map(|n| (corner + n.any_orthogonal_vector() * 0.7, n.normalize())).collect();
+        let found = solve(&planes, DVec3::ZERO, Shape::Corner);
+        assert!(found.distance(corner) < 1e-12, "{found}");
+        let along = normals[0].cross(normals[1]).normalize();
+        let found = solve(&planes[..2], DVec3::ZERO, Shape::Edge);
+        assert!(found.distance(corner - along * along.dot(corner)) < 1e-12, "{found}");
+    }
+
+    #[test]
+    fn eigenvectors_of_a_symmetric_matrix_are_right_to_1e_12() {
+        let a = DMat3::from_cols_array(&[4.0, 1.0, -2.0, 1.0, 3.0, 0.5, -2.0, 0.5, 1.0]);
+        let (values, vectors) = eigen(a);
+        for k in 0..3 {
+            assert!((a * vectors[k] - vectors[k] * values[k]).length() < 1e-12);
+        }
+        assert!(values[0] >= values[1] && values[1] >= values[2]);
+    }
+
+    #[test]
+    fn normals_within_25_degrees_are_smooth_two_planes_an_edge_and_three_a_corner() {
+        let turned = |deg: f64| DVec3::new(deg.to_radians().sin(), 0.0, deg.to_radians().cos());
+        assert_eq!(classify(&[turned(0.0), turned(12.0), turned(25.0)], 0.9, 0.7), Shape::Smooth);
+        assert_eq!(classify(&[turned(0.0), turned(30.0), turned(30.0)], 0.9, 0.7), Shape::Edge);
+        assert_eq!(classify(&[DVec3::X, DVec3::Y, DVec3::Z], 0.9, 0.7), Shape::Corner);
+    }
+}

@@ -1,0 +1,270 @@
+//! Directed fields to triangle meshes with exact edges and corners.
+//!
+//! [K01] Kobbelt, Botsch, Schwanecke, Seidel, *Feature Sensitive Surface Extraction from Volume Data*, §4.
+//! 1. loops of each cell ([`cell`](self))  - §4, one rule per face
+//! 2. feature test and vertex  - §4.2, §4.3, eq. 1      3. face points  - in place of the flips of §4, fig. 9
+//! 4. patches that are embedded by construction or by exact signs
+//!
+//! Departs from [K01]: the result is certified. Every vertex lies in its cell, cells meet in shared polylines, and a
+//! cell's patches are accepted only if they are embedded and disjoint; so the mesh is manifold, closed where the field
+//! is known, and free of self-intersections, in parallel and without looking at neighbours. Feature vertices that
+//! belong elsewhere (an edge that pokes through a cell without changing a corner) are moved there afterwards, each only
+//! if exact signs allow it ([`polish`](self)).
+
+mod caps;
+mod cell;
+mod face;
+mod feature;
+mod patch;
+mod polish;
+mod topology;
+mod walk;
+
+use crate::field::{Creases, Directed};
+use crate::mesh::{FeatureKind, FeatureTags, TriMesh};
+use crate::observe::Observer;
+use face::FacePoints;
+use glam::DVec3;
+use patch::{INNER, Patcher, Scratch, Sheet};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How to extract.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ContourParams {
+    /// Two normals in a cell make a feature if their cosine is below this (theta_sharp)
+    #[schemars(range(min = -1.0, max = 1.0), extend("unit" = "cosine"))]
+    pub sharp: f64,
+    /// A feature is a corner if a normal leaves the plane of the most opposed two by more than this (phi_corner)
+    #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "sine"))]
+    pub corner: f64,
+    /// No features: the standard algorithm
+    pub plain: bool,
+}
+
+impl Default for ContourParams {
+    fn default() -> Self {
+        ContourParams { sharp: 0.9, corner: 0.7, plain: false }
+    }
+}
+
+/// Why there is no mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ContourError {
+    /// The surface passes no cell.
+    #[error("the surface passes none of the {} x {} x {} cells; use a smaller voxel or check the input", cells[0], cells[1], cells[2])]
+    Nothing {
+        /// Cells along the axes.
+        cells: [usize; 3],
+    },
+    /// More vertices than can be named.
+    #[error("{vertices} vertices are more than a mesh can hold (2147483647); use a larger voxel")]
+    TooLarge {
+        /// Vertices of the mesh.
+        vertices: usize,
+    },
+    /// The observer wants no result any more.
+    #[error("extraction cancelled")]
+    Cancelled,
+}
+
+/// A mesh with its features.
+#[derive(Clone, Debug)]
+pub struct Extracted {
+    /// The mesh, with the attribute `feature`.
+    pub mesh: TriMesh,
+    /// Its feature vertices and edges.
+    pub tags: FeatureTags,
+    /// Figures.
+    pub counts: ContourCounts,
+}
+
+/// What happened in the cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ContourCounts {
+    /// Cells that the surface passes.
+    pub cells: usize,
+    /// Cells whose feature had to be given up.
+    pub fallbacks: usize,
+    /// Cells whose patches were pushed in from the boundary: coarse but embedded.
+    pub pushed: usize,
+    /// Feature vertices that belong outside their cell and could be moved there, and those that could not.
+    pub moved: usize,
+    /// Feature vertices that stayed in their cell though they belong elsewhere.
+    pub kept: usize,
+}
+
+/// Thresholds of one run.
+pub struct Thresholds {
+    /// Cosine below which two normals make a feature.
+    pub sharp: f64,
+    /// Sine above which a feature is a corner.
+    pub corner: f64,
+}
+
+/// Layers of cells that a task takes at once.
+const LAYERS: usize = 4;
+/// Normals that differ by less than so many times their noise are no evidence of a feature.
+const NOISE: f64 = 3.0;
+
+/// Extracts the surface of a directed field.
+/// * `creases` - corrects the features, where the source knows them better than its hits tell
+/// # Errors
+/// [`ContourError`] if there is no surface, it is too large, or if cancelled.
+/// Source: [K01] §4.
+pub fn extract(
+    field: &Directed,
+    creases: Option<&dyn Creases>,
+    params: &ContourParams,
+    observer: &dyn Observer,
+) -> Result<Extracted, ContourError> {
+    let limits = thresholds(field, params);
+    let hits = field.hit_count();
+    if hits as u64 >= INNER as u64 {
+        return Err(ContourError::TooLarge { vertices: hits });
+    }
+    let [nx, ny, _] = [0, 1, 2].map(|a| field.axes[a].len() as u32);
+    let base = [0, nx, nx + ny];
+    let layers = field.lattice.cells[2];
+    let chunks: Vec<(usize, usize)> =
+        (0..layers).step_by(LAYERS).map(|from| (from, (from + LAYERS).min(layers))).collect();
+    let creases = creases.filter(|_| !params.plain);
+
+    let parts: Option<Vec<face::Part>> = if params.plain {
+        Some(Vec::new())
+    } else {
+        chunks
+            .par_iter()
+            .map(|&(from, to)| {
+                (!observer.cancelled()).then(|| face::face_points(field, &limits, creases, base, from, to))
+            })
+            .collect()
+    };
+    let parts = parts.ok_or(ContourError::Cancelled)?;
+    observer.progress(0.3);
+    let (faces, mut wishes) = FacePoints::join(field, parts, hits as u32);
+
+    let patcher = Patcher { field, limits: &limits, faces: &faces, refine: creases, base };
+    let sheets: Option<Vec<Sheet>> = chunks
+        .par_iter()
+        .map(|&(from, to)| {
+            if observer.cancelled() {
+                return None;
+            }
+            let (mut sheet, mut scratch) = (Sheet::default(), Scratch::default());
+            walk::walk(field, from, to, |cell| patcher.patch(cell, &mut scratch, &mut sheet));
+            Some(sheet)
+        })
+        .collect();
+    let sheets = sheets.ok_or(ContourError::Cancelled)?;
+    observer.progress(0.8);
+
+    let outer = hits + faces.len();
+    let inner: usize = sheets.iter().map(|s| s.inner.len()).sum();
+    if (outer + inner) as u64 >= INNER as u64 {
+        return Err(ContourError::TooLarge { vertices: outer + inner });
+    }
+    if sheets.iter().all(|s| s.triangles.is_empty()) {
+        return Err(ContourError::Nothing { cells: field.lattice.cells });
+    }
+    let mut points = hit_positions(field);
+    points.extend(faces.positions());
+    let mut kinds = vec![FeatureKind::None; hits];
+    kinds.resize(outer, FeatureKind::Edge);
+    let mut counts = ContourCounts::default();
+    let mut triangles = Vec::with_capacity(sheets.iter().map(|s| s.triangles.len()).sum());
+    let mut edges = Vec::new();
+    for sheet in &sheets {
+        // Inner vertices get their numbers after all those before.
+        let first = points.len() as u32;
+        let name = |id: u32| if id >= INNER { id - INNER + first } else { id };
+        triangles.extend(sheet.triangles.iter().map(|t| t.map(name)));
+        edges.extend(sheet.edges.iter().map(|e| e.map(name)));
+        wishes.extend(sheet.wishes.iter().map(|(id, p)| (name(*id), *p)));
+        points.extend(sheet.inner.iter().map(|i| i.p));
+        kinds.extend(sheet.inner.iter().map(|i| i.kind));
+        counts.cells += sheet.cells.len();
+        counts.fallbacks += sheet.fallbacks;
+        counts.pushed += sheet.pushed;
+    }
+    let mut mesh = TriMesh::new(points, triangles);
+    let cells = sheets.iter().scan(0, |first, sheet| {
+        let own = *first;
+        *first += sheet.triangles.len() as u32;
+        Some(sheet.cells.iter().map(move |(at, t)| (*at, own + t)))
+    });
+    counts.moved = polish::polish(&mut mesh, field, base, cells.flatten().collect(), &wishes);
+    counts.kept = wishes.len() - counts.moved;
+    let mut extracted = Extracted { mesh, tags: tags(kinds, edges), counts };
+    drop_unused(&mut extracted);
+    extracted.tags.mark(&mut extracted.mesh);
+    observer.progress(1.0);
+    Ok(extracted)
+}
+
+fn thresholds(field: &Directed, params: &ContourParams) -> Thresholds {
+    if params.plain {
+        return Thresholds { sharp: -2.0, corner: 2.0 };
+    }
+    let noise = (NOISE * field.noise_deg).min(180.0).to_radians().cos();
+    Thresholds { sharp: params.sharp.min(noise), corner: params.corner }
+}
+
+fn tags(vertices: Vec<FeatureKind>, edges: Vec<[u32; 2]>) -> FeatureTags {
+    let mut edges: Vec<[u32; 2]> = edges.into_iter().map(|[a, b]| [a.min(b), a.max(b)]).collect();
+    edges.par_sort_unstable();
+    edges.dedup();
+    FeatureTags { vertices, edges }
+}
+
+/// Positions of all hits, axis after axis.
+fn hit_positions(field: &Directed) -> Vec<DVec3> {
+    let rows = field.lattice.rows();
+    (0..3)
+        .flat_map(|axis| {
+            let hits = &field.axes[axis];
+            let list: Vec<DVec3> = (0..rows)
+                .into_par_iter()
+                .with_min_len(256)
+                .flat_map_iter(|row| {
+                    let (a, b) = (hits.start[row] as usize, hits.start[row + 1] as usize);
+                    (a..b).map(move |n| field.position(axis, row, n))
+                })
+                .collect();
+            list
+        })
+        .collect()
+}
+
+/// Leaves out vertices that no triangle uses: hits at the rim of what is known.
+fn drop_unused(extracted: &mut Extracted) {
+    let mesh = &mut extracted.mesh;
+    let mut used = vec![false; mesh.points.len()];
+    for &v in mesh.triangles.iter().flatten() {
+        used[v as usize] = true;
+    }
+    if used.iter().all(|&u| u) {
+        return;
+    }
+    let mut name = vec![u32::MAX; used.len()];
+    let mut count = 0;
+    for v in 0..used.len() {
+        if used[v] {
+            name[v] = count;
+            mesh.points[count as usize] = mesh.points[v];
+            extracted.tags.vertices[count as usize] = extracted.tags.vertices[v];
+            count += 1;
+        }
+    }
+    mesh.points.truncate(count as usize);
+    extracted.tags.vertices.truncate(count as usize);
+    for t in &mut mesh.triangles {
+        *t = t.map(|v| name[v as usize]);
+    }
+    extracted.tags.edges.retain(|e| e.iter().all(|&v| used[v as usize]));
+    for e in &mut extracted.tags.edges {
+        *e = e.map(|v| name[v as usize]);
+    }
+}

@@ -1,0 +1,164 @@
+//! Where the sharp edges of a mesh pass the planes of a lattice: hits on faces, as the directed field has hits on edges.
+//!
+//! Two hits in a face and their tangents tell where a feature passes it to second order in the cell size, and not at all
+//! where it bends in between. A mesh knows its sharp edges: each is cut by the planes of nodes once, and the cuts are
+//! kept by plane and cell.
+
+use super::{Creases, Lattice};
+use crate::geom::Bvh;
+use crate::mesh::{Adjacency, NONE, TriMesh, next};
+use glam::DVec3;
+
+/// Sharp edges of one mesh on one lattice.
+pub struct MeshCreases {
+    lattice: Lattice,
+    /// Cuts with the planes of each axis, sorted by plane and cell.
+    cuts: [Vec<Cut>; 3],
+    /// Vertices where sharp edges meet, end or bend, sorted by cell.
+    corners: Vec<([i64; 3], DVec3)>,
+    /// The sharp edges as triangles without area.
+    lines: Option<Bvh>,
+}
+
+#[derive(Clone, Copy)]
+struct Cut {
+    /// Plane, then the cell in the plane: along the second and the first of the other two axes.
+    key: [i64; 3],
+    p: DVec3,
+    /// Normals of the two faces beside the edge.
+    normals: [DVec3; 2],
+}
+
+/// A sharp line that turns by more than this at a vertex has a corner there (cosine of 35 degrees).
+const BEND: f64 = 0.82;
+/// Normals of the hits and of the faces beside the edge agree if their cosine is above this: facets of curved surfaces
+/// turn within a cell.
+const AGREE: f64 = 0.75;
+/// The lines are followed within this distance of the guess, in cells.
+const REACH: f64 = 0.9;
+
+impl MeshCreases {
+    /// Collects the sharp edges of `mesh`: those between faces whose normals have a cosine below `sharp`, and those of
+    /// one face only.
+    /// * `turn` - -1 if the mesh is inside out
+    pub fn new(mesh: &TriMesh, turn: f64, lattice: &Lattice, sharp: f64) -> MeshCreases {
+        let adjacency = Adjacency::new(mesh);
+        let mut cuts: [Vec<Cut>; 3] = Default::default();
+        let mut edges: Vec<[u32; 2]> = Vec::new();
+        for h in 0..adjacency.opposite.len() as u32 {
+            let g = adjacency.opposite[h as usize];
+            if g == NONE || g < h {
+                continue;
+            }
+            let normals = [mesh.normal(h as usize / 3) * turn, mesh.normal(g as usize / 3) * turn];
+            if normals[0].dot(normals[1]) >= sharp || normals.contains(&DVec3::ZERO) {
+                continue;
+            }
+            let ends = [mesh.origin(h), mesh.origin(next(h))];
+            edges.push(ends);
+            cut(mesh, ends, normals, lattice, &mut cuts);
+        }
+        for list in &mut cuts {
+            list.sort_by(|a, b| {
+                a.key.cmp(&b.key).then_with(|| a.p.to_array().partial_cmp(&b.p.to_array()).unwrap_or(a.key.cmp(&b.key)))
+            });
+        }
+        let lines = (!edges.is_empty()).then(|| {
+            let points = edges.iter().flatten().map(|&v| mesh.points[v as usize]).collect();
+            let flat = (0..edges.len() as u32).map(|e| [2 * e, 2 * e + 1, 2 * e + 1]).collect();
+            Bvh::new(&TriMesh::new(points, flat))
+        });
+        let mut corners: Vec<([i64; 3], DVec3)> =
+            corners(mesh, &edges).into_iter().map(|p| (cell_of(lattice, p), p)).collect();
+        corners.sort_by_key(|c| c.0);
+        MeshCreases { lattice: *lattice, cuts, corners, lines }
+    }
+}
+
+fn cell_of(lattice: &Lattice, p: DVec3) -> [i64; 3] {
+    ((p - lattice.origin) / lattice.step).floor().to_array().map(|x| x as i64)
+}
+
+/// Cuts an edge with all planes between its ends.
+fn cut(mesh: &TriMesh, ends: [u32; 2], normals: [DVec3; 2], lattice: &Lattice, cuts: &mut [Vec<Cut>; 3]) {
+    let [a, b] = ends.map(|v| mesh.points[v as usize]);
+    for axis in 0..3 {
+        let (low, high) = (a[axis].min(b[axis]), a[axis].max(b[axis]));
+        let to_plane = |x: f64| (x - lattice.origin[axis]) / lattice.step[axis];
+        let (first, last) = (to_plane(low).ceil().max(0.0), to_plane(high).floor().min(lattice.cells[axis] as f64));
+        let mut plane = first;
+        while plane <= last {
+            let level = lattice.coordinate(axis, plane as usize);
+            let s = if high > low { ((level - a[axis]) / (b[axis] - a[axis])).clamp(0.0, 1.0) } else { 0.5 };
+            let mut p = a.lerp(b, s);
+            p[axis] = level;
+            cuts[axis].push(Cut { key: key(lattice, axis, plane as i64, p), p, normals });
+            plane += 1.0;
+        }
+    }
+}
+
+fn key(lattice: &Lattice, axis: usize, plane: i64, p: DVec3) -> [i64; 3] {
+    let cell = cell_of(lattice, p);
+    [plane, cell[(axis + 2) % 3], cell[(axis + 1) % 3]]
+}
+
+/// Vertices where other than two sharp edges meet, or two at an angle.
+fn corners(mesh: &TriMesh, edges: &[[u32; 2]]) -> Vec<DVec3> {
+    let mut ends: Vec<(u32, u32)> = edges.iter().flat_map(|&[a, b]| [(a, b), (b, a)]).collect();
+    ends.sort_unstable();
+    ends.chunk_by(|x, y| x.0 == y.0)
+        .filter(|run| {
+            let at = |v: u32| mesh.points[v as usize];
+            let p = at(run[0].0);
+            match run {
+                [(_, a), (_, b)] => (p - at(*a)).normalize_or_zero().dot((at(*b) - p).normalize_or_zero()) < BEND,
+                // An edge that fades out is no corner to be met.
+                [_] => false,
+                _ => true,
+            }
+        })
+        .map(|run| mesh.points[run[0].0 as usize])
+        .collect()
+}
+
+impl Creases for MeshCreases {
+    fn face_point(&self, axis: usize, guess: DVec3, a: (DVec3, DVec3), b: (DVec3, DVec3), size: f64) -> Option<DVec3> {
+        let plane = ((guess[axis] - self.lattice.origin[axis]) / self.lattice.step[axis]).round() as i64;
+        let [_, v, u] = key(&self.lattice, axis, plane, guess);
+        let cuts = &self.cuts[axis];
+        let mut best: Option<(f64, DVec3)> = None;
+        for dv in -1..=1 {
+            let first = cuts.partition_point(|c| c.key < [plane, v + dv, u - 1]);
+            for c in cuts[first..].iter().take_while(|c| c.key <= [plane, v + dv, u + 1]) {
+                let agree = |m: DVec3, n: DVec3| a.1.dot(m) > AGREE && b.1.dot(n) > AGREE;
+                if !agree(c.normals[0], c.normals[1]) && !agree(c.normals[1], c.normals[0]) {
+                    continue;
+                }
+                let d = c.p.distance(guess);
+                if d < REACH * size && best.is_none_or(|b| d < b.0) {
+                    best = Some((d, c.p));
+                }
+            }
+        }
+        best.map(|b| b.1)
+    }
+
+    fn inner_point(&self, guess: DVec3, through: &[DVec3], _corner: bool, low: DVec3, high: DVec3) -> Option<DVec3> {
+        let cell = cell_of(&self.lattice, (low + high) / 2.0);
+        let size = (high - low).max_element();
+        let first = self.corners.partition_point(|c| c.0 < cell);
+        let here = self.corners[first..].iter().take_while(|c| c.0 == cell).map(|c| c.1);
+        if let Some(p) = here.min_by(|p, q| p.distance_squared(guess).total_cmp(&q.distance_squared(guess))) {
+            return Some(p);
+        }
+        let near = if through.len() == 2 { (through[0] + through[1]) / 2.0 } else { guess };
+        let hit = self.lines.as_ref()?.closest(near);
+        (hit.distance < REACH * size).then_some(hit.position)
+    }
+
+    fn nearest(&self, p: DVec3, reach: f64) -> Option<DVec3> {
+        let hit = self.lines.as_ref()?.closest(p);
+        (hit.distance < reach).then_some(hit.position)
+    }
+}

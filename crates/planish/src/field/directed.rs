@@ -1,0 +1,328 @@
+//! The directed distance field: sides of the nodes of a lattice, and a hit on every edge whose ends differ.
+//!
+//! [K01] §3: the distance along an axis is exact where the distance to the surface in any direction is not. Only
+//! edges between an inside and an outside node matter (METHODS 2.1), so those are all that is kept, row by row: a
+//! row is the line of nodes `(., j, k)` along x and owns the edges that leave its nodes along +x, +y and +z. Sides
+//! are kept as the nodes where they change. Memory grows with the surface (plus one word per row and table).
+
+use super::{Lattice, Side};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Hits stay this fraction of an edge away from its ends: no triangle shrinks to a point, and what moves is far
+/// below any tolerance.
+pub const CLEARANCE: f64 = 1.0 / (1u64 << 28) as f64;
+
+/// Where the surface passes an edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Place on the edge, as the fraction from its lower node; `CLEARANCE..=1 - CLEARANCE`.
+    pub t: f64,
+    /// Unit normal of the surface there, outward.
+    pub normal: DVec3,
+}
+
+/// A hit with its place: what sources collect, in any order.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed {
+    /// Row of the edge's lower node.
+    pub row: u32,
+    /// Place of that node in its row.
+    pub at: u32,
+    /// The hit.
+    pub hit: Hit,
+}
+
+/// The hits on the edges of one direction, row after row.
+#[derive(Clone, Debug, Default)]
+pub struct Hits {
+    /// First hit of each row, and their number at the end.
+    pub start: Vec<u32>,
+    /// Place in its row of the lower node of each hit's edge, ascending in each row.
+    pub at: Vec<u32>,
+    /// The hits.
+    pub hits: Vec<Hit>,
+}
+
+/// Sides and hits on a lattice.
+#[derive(Clone, Debug)]
+pub struct Directed {
+    /// The lattice.
+    pub lattice: Lattice,
+    /// Hits on edges along x, y and z.
+    pub axes: [Hits; 3],
+    /// Where sides change along the rows.
+    pub sides: Sides,
+    /// Angle by which the normals are off, degrees ([`super::Field::noise_deg`]).
+    pub noise_deg: f64,
+    /// Values at the nodes where the source is a scalar grid, x fastest: what its interpolant does inside cells.
+    pub values: Option<std::sync::Arc<Vec<f32>>>,
+    /// Hits that had to be guessed because no source gave one between two sides.
+    pub mended: usize,
+}
+
+/// The sides of all nodes: for each row the nodes where a new side begins.
+#[derive(Clone, Debug, Default)]
+pub struct Sides {
+    /// First change of each row, and their number at the end. A row begins outside.
+    pub start: Vec<u32>,
+    /// `node << 2 | side` with the code of [`code`].
+    pub changes: Vec<u32>,
+    /// True if any node is unknown.
+    pub unknown: bool,
+}
+
+/// A side as two bits.
+pub fn code(side: Side) -> u32 {
+    match side {
+        Side::Outside => 0,
+        Side::Inside => 1,
+        Side::Unknown => 2,
+    }
+}
+
+impl Sides {
+    /// The sides of rows that are given one after the other as changes `(node, side code)`.
+    pub fn from_rows(rows: impl IntoIterator<Item = Vec<u32>>) -> Sides {
+        let mut sides = Sides { start: vec![0], ..Sides::default() };
+        for row in rows {
+            sides.changes.extend(row);
+            sides.start.push(sides.changes.len() as u32);
+        }
+        sides.unknown = sides.changes.iter().any(|c| c & 3 == 2);
+        sides
+    }
+
+    /// Bits of row `row`: inside, and known.
+    /// * `inside`, `known` - [`Lattice::words`] words each; bits past the last node are not defined
+    pub fn bits(&self, row: usize, inside: &mut [u64], known: &mut [u64]) {
+        inside.fill(0);
+        known.fill(!0);
+        let changes = &self.changes[self.start[row] as usize..self.start[row + 1] as usize];
+        for (n, &change) in changes.iter().enumerate() {
+            let from = (change >> 2) as usize;
+            let to = changes.get(n + 1).map_or(inside.len() * 64, |c| (c >> 2) as usize);
+            match change & 3 {
+                1 => fill(inside, from, to, true),
+                2 => fill(known, from, to, false),
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Sets bits `from..to`.
+fn fill(words: &mut [u64], from: usize, to: usize, value: bool) {
+    let to = to.min(words.len() * 64);
+    let mut at = from;
+    while at < to {
+        let (word, bit) = (at / 64, at % 64);
+        let count = (64 - bit).min(to - at);
+        let mask = if count == 64 { !0 } else { ((1u64 << count) - 1) << bit };
+        if value { words[word] |= mask } else { words[word] &= !mask }
+        at += count;
+    }
+}
+
+/// Changes of one row from its bits.
+pub fn changes_of(inside: &[u64], known: &[u64], nodes: usize) -> Vec<u32> {
+    let mut changes = Vec::new();
+    let mut last = 0;
+    for w in 0..inside.len() {
+        // Words in which nothing changes are most.
+        let uniform = match last {
+            0 => inside[w] == 0 && known[w] == !0,
+            1 => inside[w] == !0 && known[w] == !0,
+            _ => known[w] == 0,
+        };
+        if uniform {
+            continue;
+        }
+        for b in 0..64.min(nodes - 64 * w) {
+            let now = if known[w] >> b & 1 == 0 { 2 } else { (inside[w] >> b & 1) as u32 };
+            if now != last {
+                changes.push(((64 * w + b) as u32) << 2 | now);
+                last = now;
+            }
+        }
+    }
+    changes
+}
+
+impl Hits {
+    /// Hits sorted into rows.
+    pub fn sorted(rows: usize, mut placed: Vec<Placed>) -> Hits {
+        placed.par_sort_unstable_by_key(|p| (p.row, p.at));
+        let mut start = vec![0u32; rows + 1];
+        for p in &placed {
+            start[p.row as usize + 1] += 1;
+        }
+        for r in 0..rows {
+            start[r + 1] += start[r];
+        }
+        Hits { start, at: placed.iter().map(|p| p.at).collect(), hits: placed.iter().map(|p| p.hit).collect() }
+    }
+
+    /// The places and number of the first hit of a row.
+    pub fn row(&self, row: usize) -> (&[u32], usize) {
+        let (a, b) = (self.start[row] as usize, self.start[row + 1] as usize);
+        (&self.at[a..b], a)
+    }
+
+    /// The hit on the edge that leaves node `at` of `row`.
+    pub fn find(&self, row: usize, at: usize) -> Option<Hit> {
+        let (places, first) = self.row(row);
+        places.binary_search(&(at as u32)).ok().map(|n| self.hits[first + n])
+    }
+
+    /// Number of hits.
+    pub fn len(&self) -> usize {
+        self.at.len()
+    }
+
+    /// True if there is none.
+    pub fn is_empty(&self) -> bool {
+        self.at.is_empty()
+    }
+}
+
+/// A fraction kept clear of the ends of its edge.
+pub fn clear(t: f64) -> f64 {
+    // What is no number becomes the middle.
+    if t.is_nan() { 0.5 } else { t.clamp(CLEARANCE, 1.0 - CLEARANCE) }
+}
+
+impl Directed {
+    /// Number of hits on all axes.
+    pub fn hit_count(&self) -> usize {
+        self.axes.iter().map(Hits::len).sum()
+    }
+
+    /// Position of hit number `n` of `axis`, which lies in `row`.
+    pub fn position(&self, axis: usize, row: usize, n: usize) -> DVec3 {
+        let (j, k) = (row % self.lattice.nodes(1), row / self.lattice.nodes(1));
+        let mut p = self.lattice.node(self.axes[axis].at[n] as usize, j, k);
+        p[axis] += self.axes[axis].hits[n].t * self.lattice.step[axis];
+        p
+    }
+
+    /// Puts sides and hits together: hits on edges whose ends do not differ are left out, and where two ends differ
+    /// without a hit `missing(axis, [i, j, k])` is asked for one.
+    ///
+    /// * `axes` - hits in rows, at most one on an edge
+    ///
+    /// The result holds exactly one hit on each edge between inside and outside: what the extractor relies on.
+    pub fn assemble(
+        lattice: Lattice,
+        sides: Sides,
+        axes: [Hits; 3],
+        missing: &(dyn Fn(usize, [usize; 3]) -> Hit + Sync),
+    ) -> Directed {
+        let words = lattice.words();
+        let bits = |row: usize| {
+            let (mut inside, mut known) = (vec![0; words], vec![0; words]);
+            sides.bits(row, &mut inside, &mut known);
+            (inside, known)
+        };
+        let (ny, nz) = (lattice.nodes(1), lattice.nodes(2));
+        // Per plane: rows of the plane and the next, edges that change side, compared with the hits given.
+        let planes: Vec<[Plane; 3]> = (0..nz)
+            .into_par_iter()
+            .map(|k| {
+                let here: Vec<_> = (0..ny).map(|j| bits(lattice.row(j, k))).collect();
+                let above: Option<Vec<_>> = (k + 1 < nz).then(|| (0..ny).map(|j| bits(lattice.row(j, k + 1))).collect());
+                let mut out: [Plane; 3] = Default::default();
+                for j in 0..ny {
+                    let row = lattice.row(j, k);
+                    let (a, known_a) = &here[j];
+                    let shifted = shift(a);
+                    let known_shifted = shift(known_a);
+                    let mut crossing = vec![0u64; words];
+                    for w in 0..words {
+                        crossing[w] = (a[w] ^ shifted[w]) & known_a[w] & known_shifted[w];
+                    }
+                    mask_past(&mut crossing, lattice.cells[0]);
+                    out[0].take(&axes[0], row, &crossing, |i| missing(0, [i, j, k]));
+                    for (axis, other) in
+                        [(1, (j + 1 < ny).then(|| &here[j + 1])), (2, above.as_ref().map(|above| &above[j]))]
+                    {
+                        crossing.fill(0);
+                        if let Some((b, known_b)) = other {
+                            for w in 0..words {
+                                crossing[w] = (a[w] ^ b[w]) & known_a[w] & known_b[w];
+                            }
+                            mask_past(&mut crossing, lattice.nodes(0));
+                        }
+                        out[axis].take(&axes[axis], row, &crossing, |i| missing(axis, [i, j, k]));
+                    }
+                }
+                out
+            })
+            .collect();
+        drop(axes);
+        let mended = planes.iter().flatten().map(|p| p.mended).sum();
+        let axes = [0, 1, 2].map(|axis| {
+            let mut all = Hits { start: vec![0], ..Hits::default() };
+            for plane in &planes {
+                let part = &plane[axis];
+                for &count in &part.counts {
+                    all.start.push(all.start[all.start.len() - 1] + count);
+                }
+                all.at.extend(&part.at);
+                all.hits.extend(&part.hits);
+            }
+            all
+        });
+        Directed { lattice, axes, sides, noise_deg: 0.0, values: None, mended }
+    }
+}
+
+/// The hits of the rows of one plane.
+#[derive(Default)]
+struct Plane {
+    counts: Vec<u32>,
+    at: Vec<u32>,
+    hits: Vec<Hit>,
+    mended: usize,
+}
+
+impl Plane {
+    fn take(&mut self, given: &Hits, row: usize, crossing: &[u64], missing: impl Fn(usize) -> Hit) {
+        let before = self.at.len();
+        let (places, first) = given.row(row);
+        let mut n = 0;
+        for (w, &word) in crossing.iter().enumerate() {
+            let mut rest = word;
+            while rest != 0 {
+                let i = 64 * w + rest.trailing_zeros() as usize;
+                rest &= rest - 1;
+                while n < places.len() && (places[n] as usize) < i {
+                    n += 1;
+                }
+                let hit = if n < places.len() && places[n] as usize == i {
+                    given.hits[first + n]
+                } else {
+                    self.mended += 1;
+                    missing(i)
+                };
+                self.at.push(i as u32);
+                self.hits.push(hit);
+            }
+        }
+        self.counts.push((self.at.len() - before) as u32);
+    }
+}
+
+/// Bits moved down by one: bit i is that of node i + 1.
+pub fn shift(words: &[u64]) -> Vec<u64> {
+    (0..words.len()).map(|w| words[w] >> 1 | words.get(w + 1).map_or(0, |n| n << 63)).collect()
+}
+
+/// Clears bits from `count` on.
+pub fn mask_past(words: &mut [u64], count: usize) {
+    for (w, word) in words.iter_mut().enumerate() {
+        if 64 * (w + 1) > count {
+            *word &= if 64 * w >= count { 0 } else { (1u64 << (count - 64 * w)) - 1 };
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Self-intersections of a mesh, by exact signs.
+//!
+//! Triangles are sorted into the cells of a grid; pairs that share a cell and whose boxes meet are asked
+//! ([`triangles_meet`]). Triangles with common vertices count if they meet in more than those.
+
+use super::TriMesh;
+use crate::geom::predicates::triangles_meet;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// All pairs of triangles that meet in more than the vertices they share, ascending.
+///
+/// A triangle without area is a segment or a point, and counts as such. Vertices are told apart by their index: weld
+/// first where cracks shall not count.
+pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
+    let boxes: Vec<[DVec3; 2]> = (0..mesh.triangles.len())
+        .into_par_iter()
+        .map(|t| {
+            let [a, b, c] = mesh.corners(t);
+            [a.min(b).min(c), a.max(b).max(c)]
+        })
+        .collect();
+    let Some(size) = cell_size(&boxes) else { return Vec::new() };
+    let origin = boxes.iter().fold(DVec3::INFINITY, |m, b| m.min(b[0]));
+    let cell = |p: DVec3| ((p - origin) / size).floor().to_array().map(|x| x as i64);
+    let mut entries: Vec<([i64; 3], u32)> = boxes
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(t, b)| {
+            let (low, high) = (cell(b[0]), cell(b[1]));
+            (low[2]..=high[2]).flat_map(move |z| {
+                (low[1]..=high[1]).flat_map(move |y| (low[0]..=high[0]).map(move |x| ([x, y, z], t as u32)))
+            })
+        })
+        .collect();
+    entries.par_sort_unstable();
+    let runs: Vec<&[([i64; 3], u32)]> = entries.chunk_by(|a, b| a.0 == b.0).filter(|r| r.len() > 1).collect();
+    let mut found: Vec<[u32; 2]> = runs
+        .par_iter()
+        .flat_map_iter(|run| {
+            let boxes = &boxes;
+            run.iter().enumerate().flat_map(move |(n, &(at, s))| {
+                run[..n].iter().filter_map(move |&(_, t)| {
+                    let (a, b) = (&boxes[s as usize], &boxes[t as usize]);
+                    let (low, high) = (a[0].max(b[0]), a[1].min(b[1]));
+                    // Each pair once: in the cell that holds the least corner of what the boxes share.
+                    if low.cmpgt(high).any() || cell(low) != at {
+                        return None;
+                    }
+                    let corners = |t: u32| mesh.corners(t as usize);
+                    let names = |t: u32| mesh.triangles[t as usize];
+                    triangles_meet(corners(s), names(s), corners(t), names(t)).then(|| [s.min(t), s.max(t)])
+                })
+            })
+        })
+        .collect();
+    found.par_sort_unstable();
+    found
+}
+
+/// Cells hold a few triangles each.
+fn cell_size(boxes: &[[DVec3; 2]]) -> Option<f64> {
+    let mut sizes: Vec<f64> = boxes.iter().map(|b| (b[1] - b[0]).max_element()).filter(|s| s.is_finite()).collect();
+    if sizes.is_empty() {
+        return None;
+    }
+    let mean = sizes.iter().sum::<f64>() / sizes.len() as f64;
+    let middle = sizes.len() / 2;
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    let size = (2.0 * *median).max(mean);
+    Some(if size > 0.0 { size } else { 1.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    #[test]
+    fn sound_shapes_have_none_and_two_crossing_spheres_have_a_ring_of_them() {
+        let sphere = shapes::sphere(1.0, 3);
+        assert_eq!(self_intersections(&sphere), Vec::<[u32; 2]>::new());
+        assert_eq!(self_intersections(&shapes::torus(2.0, 0.7, 48, 24)), Vec::<[u32; 2]>::new());
+        let mut two = sphere.clone();
+        let n = two.points.len() as u32;
+        two.points.extend(sphere.points.iter().map(|p| *p + DVec3::new(0.7, 0.01, 0.02)));
+        two.triangles.extend(sphere.triangles.iter().map(|t| t.map(|v| v + n)));
+        let pairs = self_intersections(&two);
+        assert!(pairs.len() > 60, "{}", pairs.len());
+        let count = sphere.triangles.len() as u32;
+        assert!(pairs.iter().all(|[a, b]| *a < count && *b >= count));
+    }
+}

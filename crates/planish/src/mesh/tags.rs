@@ -1,0 +1,80 @@
+//! Which vertices and edges of a mesh are features.
+
+use super::{Attribute, TriMesh};
+use serde::{Deserialize, Serialize};
+
+/// What a vertex marks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum FeatureKind {
+    /// Nothing.
+    #[default]
+    None,
+    /// A place on a sharp edge.
+    Edge,
+    /// A corner, where sharp edges meet or end.
+    Corner,
+}
+
+/// Features of a mesh.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FeatureTags {
+    /// For each vertex what it marks.
+    pub vertices: Vec<FeatureKind>,
+    /// Sharp edges: two vertices each, the lesser first, ascending.
+    pub edges: Vec<[u32; 2]>,
+}
+
+/// Name of the attribute that holds the kinds: 0 none, 1 edge, 2 corner.
+pub const FEATURE: &str = "feature";
+
+impl FeatureTags {
+    /// Tags of a mesh of `vertices` vertices from its sharp edges, in any order; `corners` are corners whatever their
+    /// edges. Edges come out sorted, without repetition.
+    pub fn from_edges(vertices: usize, edges: impl IntoIterator<Item = [u32; 2]>) -> FeatureTags {
+        let mut edges: Vec<[u32; 2]> = edges.into_iter().map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        let mut kinds = vec![FeatureKind::None; vertices];
+        let mut count = vec![0u32; vertices];
+        for &v in edges.iter().flatten() {
+            count[v as usize] += 1;
+        }
+        for (kind, n) in kinds.iter_mut().zip(count) {
+            *kind = match n {
+                0 => FeatureKind::None,
+                2 => FeatureKind::Edge,
+                _ => FeatureKind::Corner,
+            };
+        }
+        FeatureTags { vertices: kinds, edges }
+    }
+
+    /// The kinds as an attribute of the mesh.
+    pub fn attribute(&self) -> Attribute {
+        let value = |k: &FeatureKind| match k {
+            FeatureKind::None => 0.0,
+            FeatureKind::Edge => 1.0,
+            FeatureKind::Corner => 2.0,
+        };
+        Attribute { name: FEATURE.into(), width: 1, values: self.vertices.iter().map(value).collect() }
+    }
+
+    /// Puts the kinds into the mesh, in place of others.
+    pub fn mark(&self, mesh: &mut TriMesh) {
+        mesh.attributes.retain(|a| a.name != FEATURE);
+        if !self.edges.is_empty() || self.vertices.iter().any(|&k| k != FeatureKind::None) {
+            mesh.attributes.push(self.attribute());
+        }
+    }
+
+    /// Tags of a mesh from its attribute and `edges`, if it has the attribute.
+    pub fn of(mesh: &TriMesh, edges: Vec<[u32; 2]>) -> Option<FeatureTags> {
+        let attribute = mesh.attributes.iter().find(|a| a.name == FEATURE && a.width == 1)?;
+        let kind = |v: &f32| match v.round() as i32 {
+            1 => FeatureKind::Edge,
+            2 => FeatureKind::Corner,
+            _ => FeatureKind::None,
+        };
+        Some(FeatureTags { vertices: attribute.values.iter().map(kind).collect(), edges })
+    }
+}
