@@ -56,46 +56,88 @@ fn main() {
         for &l in &levels {
             println!("== {name} {l} %: diag {diag} sigma {}", l / 100.0 * diag);
             let points = sample(&mesh, n, l / 100.0 * diag, 1);
-            let t = std::time::Instant::now();
-            let out = planish::cloud::probe(&points);
-            println!("   {:?}", t.elapsed());
-            measure(&mesh, &out.0, diag);
+            let samples = planish::cloud::probe(&points);
             let bvh = planish::geom::Bvh::new(&mesh);
-            let mut rows: Vec<(f64, f64, f64, f64, f64, u8)> = out.1.iter().map(|f| { let h = bvh.closest(f.0); (h.distance / diag * 100.0, f.1.dot(mesh.normal(h.place.face as usize)).abs().min(1.0).acos().to_degrees(), f.2 / diag * 100.0, f.3 / diag * 100.0, f.4 / diag * 100.0, f.5) }).collect();
-            rows.sort_by(|a, b| a.0.total_cmp(&b.0));
-            for q in [0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.98, 0.99, 1.0] { println!("   fit {q}: dist/normal/R/noise/err/class {:.4?}", rows[(q * (rows.len() - 1) as f64) as usize]); }
-            println!("   fits rms {:.4}", (rows.iter().map(|r| r.0 * r.0).sum::<f64>() / rows.len() as f64).sqrt());
+            let wrong = samples.samples.iter().filter(|f| f.normal.dot(mesh.normal(bvh.closest(f.center).place.face as usize)) < -0.3).count();
+            println!("   wrong {:.3} %", 100.0 * wrong as f64 / samples.samples.len() as f64);
+            {
+                let fc: Vec<DVec3> = (0..mesh.triangles.len()).map(|t| { let [a, b, c] = mesh.corners(t); (a + b + c) / 3.0 }).collect();
+                let ft = planish::geom::KdTree::new(&fc);
+                let mut table = std::collections::BTreeMap::new();
+                for f in &samples.samples {
+                    let mut best = 0.0f64; 
+                    let h = bvh.closest(f.center);
+                    best = best.max(f.normal.dot(mesh.normal(h.place.face as usize)));
+                    ft.within(f.center, 0.015 * diag, |i, _, _| best = best.max(f.normal.dot(mesh.normal(i as usize))));
+                    let a = best.clamp(-1.0, 1.0).acos().to_degrees();
+                    let e = table.entry((f.class, f.sheets.min(3))).or_insert([0usize; 5]);
+                    e[0] += 1; if a > 10.0 { e[1] += 1; } if a > 20.0 { e[2] += 1; } if a > 40.0 { e[3] += 1; }
+                    if h.distance > 0.004 * diag { e[4] += 1; }
+                }
+                for (k, v) in table { println!("   class/sheets {k:?}: n {} >10 {} >20 {} >40 {} far {}", v[0], v[1], v[2], v[3], v[4]); }
+            }
+            let t = std::time::Instant::now();
+            let field = planish::field::SampleField::new(&samples, false);
+            let step = (samples.spacing * 1.6).max(samples.noise * 1.0);
+            let lattice = planish::field::Lattice::around(&planish::field::Field::bounds(&field), planish::field::Spacing::Voxel(step)).unwrap();
+            let directed = planish::field::sample(&field, &lattice, &planish::Silent).unwrap();
+            let t1 = t.elapsed();
+            let out = planish::contour::extract(&directed, None, &Default::default(), &planish::Silent).unwrap();
+            println!("   sample {t1:?} all {:?}  cells {:?} step {step:.5} tris {} fallbacks {}", t.elapsed(), lattice.cells, out.mesh.triangles.len(), out.counts.fallbacks);
+            let dir = std::env::var("OUTDIR").unwrap_or("/tmp".into());
+            write_stl(&out.mesh, &format!("{dir}/{name}_{l}.stl"));
+            measure(&mesh, &out.mesh, diag);
         }
     }
 }
 
-fn measure(mesh: &TriMesh, out: &[(DVec3, DVec3, u8)], diag: f64) {
-    let bvh = planish::geom::Bvh::new(mesh);
-    let adj = planish::mesh::Adjacency::new(mesh);
-    let sharp = planish::mesh::sharp_edges(mesh, &adj, 40.0);
+fn write_stl(m: &TriMesh, path: &str) {
+    use planish::render::*;
+    let cam = Camera::around(&m.points, DVec3::new(1.0, -0.6, 0.7), DVec3::Y, 1.0);
+    let look = Look { crease_deg: 0.0, hollows: 0.5, ..Default::default() };
+    let img = render(m, &look, &cam, 900, 900).unwrap();
+    let mut b = format!("P6\n900 900\n255\n").into_bytes();
+    for p in img.rgba.chunks(4) { b.extend(&p[..3]); }
+    std::fs::write(path.replace(".stl", ".ppm"), b).unwrap();
+}
+
+fn measure(truth: &TriMesh, got: &TriMesh, diag: f64) {
+    use rayon::prelude::*;
+    let adj = planish::mesh::Adjacency::new(truth);
+    let sharp = planish::mesh::sharp_edges(truth, &adj, 40.0);
     let mut edge_points = Vec::new();
-    for (e, _) in sharp.iter().enumerate().filter(|s| *s.1) {
-        let h = e;
-        let t = mesh.triangles[h / 3];
-        let (a, b) = (mesh.points[t[h % 3] as usize], mesh.points[t[(h % 3 + 1) % 3] as usize]);
+    for (h, _) in sharp.iter().enumerate().filter(|s| *s.1) {
+        let t = truth.triangles[h / 3];
+        let (a, b) = (truth.points[t[h % 3] as usize], truth.points[t[(h % 3 + 1) % 3] as usize]);
         let n = ((b - a).length() / (diag * 0.002)).ceil() as usize;
         for k in 0..=n { edge_points.push(a + (b - a) * (k as f64 / n as f64)); }
     }
     let tree = planish::geom::KdTree::new(&edge_points);
-    use rayon::prelude::*;
-    let rows: Vec<(f64, f64, bool, u8)> = out.par_iter().map(|(p, n, s)| {
-        let h = bvh.closest(*p);
-        let m = mesh.normal(h.place.face as usize);
-        let mut f = Vec::new();
-        tree.nearest_within(h.position, 1, diag * 0.01, &mut f);
-        (h.distance / diag * 100.0, n.dot(m).abs().min(1.0).acos().to_degrees(), !f.is_empty(), *s)
-    }).collect();
-    let stat = |f: &dyn Fn(&&(f64, f64, bool, u8)) -> bool| {
-        let v: Vec<_> = rows.iter().filter(f).collect();
-        let n = v.len().max(1) as f64;
-        (v.len(), (v.iter().map(|r| r.0 * r.0).sum::<f64>() / n).sqrt(), v.iter().map(|r| r.1).sum::<f64>() / n, v.iter().map(|r| r.0).fold(0.0, f64::max))
+    let run = |from: &TriMesh, to: &TriMesh| -> Vec<(f64, f64, bool)> {
+        let bvh = planish::geom::Bvh::new(to);
+        let mut sums = Vec::new(); let mut total = 0.0;
+        for t in 0..from.triangles.len() { total += from.area(t); sums.push(total); }
+        (0..60000u64).into_par_iter().map(|i| {
+            let r: [f64; 3] = std::array::from_fn(|k| random::unit(77, 3 * i + k as u64));
+            let t = sums.partition_point(|&s| s <= r[0] * total).min(sums.len() - 1);
+            let [a, b, c] = from.corners(t);
+            let q = r[1].sqrt();
+            let p = a * (1.0 - q) + b * (q * (1.0 - r[2])) + c * (q * r[2]);
+            let h = bvh.closest(p);
+            let mut f = Vec::new();
+            tree.nearest_within(p, 1, diag * 0.01, &mut f);
+            (h.distance / diag * 100.0, from.normal(t).dot(to.normal(h.place.face as usize)).clamp(-1.0, 1.0).acos().to_degrees(), !f.is_empty())
+        }).collect()
     };
-    for (name, r) in [("all", stat(&|_| true)), ("zone", stat(&|r| r.2)), ("rest", stat(&|r| !r.2)), ("multi", stat(&|r| r.3 > 1)), ("single in zone", stat(&|r| r.2 && r.3 == 1))] {
-        println!("   {name:15} n {:6} rms {:.4} normal {:.2} max {:.3}", r.0, r.1, r.2, r.3);
-    }
+    let ab = run(truth, got);
+    let ba = run(got, truth);
+    let all: Vec<_> = ab.iter().chain(&ba).collect();
+    let stat = |v: &[&(f64, f64, bool)]| { let n = v.len().max(1) as f64; ((v.iter().map(|r| r.0 * r.0).sum::<f64>() / n).sqrt(), v.iter().map(|r| r.0).sum::<f64>() / n, v.iter().map(|r| r.1).sum::<f64>() / n, v.iter().map(|r| r.0).fold(0.0, f64::max)) };
+    let zone: Vec<_> = all.iter().filter(|r| r.2).copied().collect();
+    let rest: Vec<_> = all.iter().filter(|r| !r.2).copied().collect();
+    let d = planish::mesh::diagnose(got);
+    println!("   all  rms {:.4} mean {:.4} normal {:.2} max {:.3}", stat(&all).0, stat(&all).1, stat(&all).2, stat(&all).3);
+    println!("   t->g rms {:.4} max {:.3}  g->t rms {:.4} max {:.3}", stat(&ab.iter().collect::<Vec<_>>()).0, stat(&ab.iter().collect::<Vec<_>>()).3, stat(&ba.iter().collect::<Vec<_>>()).0, stat(&ba.iter().collect::<Vec<_>>()).3);
+    println!("   zone rms {:.4} mean {:.4} normal {:.2};  rest rms {:.4} normal {:.2}", stat(&zone).0, stat(&zone).1, stat(&zone).2, stat(&rest).0, stat(&rest).2);
+    println!("   {d:?}");
 }

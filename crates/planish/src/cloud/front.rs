@@ -17,6 +17,7 @@ use super::sites::{Sites, in_pieces};
 use crate::geom::KdTree;
 use crate::observe::Observer;
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// Quantiles of irregularity that part the classes.
 const CLASSES: [f64; 5] = [0.4, 0.6, 0.75, 0.85, 0.94];
@@ -27,9 +28,15 @@ const ROUGHNESS: f64 = 1.0;
 /// Residuals above this many noise levels are explained by no sheet.
 const LIMIT: f64 = 3.0;
 /// What a carried-on sheet must explain, in squared noise levels: the freedom of its choice.
-const PRICE: f64 = 3.0;
+const PRICE: f64 = 10.0;
 /// The same for a fit of its own: six parameters, each worth two.
-const OWN_PRICE: f64 = 12.0;
+const OWN_PRICE: f64 = 16.0;
+/// Cosine of 20 degrees: sheets that meet flatter are one, with a bend.
+const TURNED: f64 = 0.94;
+/// Noise levels between two sheets that can be told apart.
+const APART: f64 = 2.5;
+/// Points that must be nearest to a sheet.
+const NEEDED: usize = 3;
 /// Most sheets at one site: a corner of four faces.
 const MOST: usize = 4;
 /// Sheets of fitted neighbours that are asked.
@@ -38,6 +45,12 @@ const ASKED: usize = 16;
 const FARTHEST: f64 = 3.0;
 /// A sheet is kept by a site if it owns this share of the points of the site.
 const SHARE: f64 = 0.12;
+/// Fits that guide others have an expected error below this share of the noise.
+const SURE: f64 = 0.35;
+/// A carried-on sheet begins with the ball that it has, at most this many times that of the site.
+const CARRIED: f64 = 3.0;
+/// Density of points that belong to no sheet, as that of a sheet three noise levels away.
+const STRAY: f64 = 0.011;
 /// Ratio of one ball to the next when a sheet grows, and how often it grows at most.
 const WIDEN: f64 = 1.35;
 const STEPS: usize = 4;
@@ -98,7 +111,29 @@ pub(super) fn grow(points: &[DVec3], tree: &KdTree, sites: &Sites, observer: &dy
         })?;
         closed.extend(fitted.into_iter().flatten());
     }
-    Some(closed)
+    Some(supported(points, closed))
+}
+
+/// Drops sheets that hardly any point is nearest to.
+fn supported(points: &[DVec3], fits: Vec<Fit>) -> Vec<Fit> {
+    let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
+    let tree = KdTree::new(&centers);
+    let best: Vec<u32> = points
+        .par_iter()
+        .map_init(Vec::new, |near, &p| {
+            tree.nearest(p, 10, near);
+            near.iter()
+                .map(|n| {
+                    let f = &fits[n.1 as usize];
+                    ((f.quadric.distance(p).0 / f.noise.max(1e-300)).powi(2) + 9.0 * n.0 / (f.radius * f.radius), n.1)
+                })
+                .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+                .map_or(u32::MAX, |b| b.1)
+        })
+        .collect();
+    let mut count = vec![0usize; fits.len()];
+    best.iter().filter(|&&b| b != u32::MAX).for_each(|&b| count[b as usize] += 1);
+    fits.into_iter().zip(count).filter(|(_, c)| *c >= NEEDED).map(|(f, _)| f).collect()
 }
 
 fn fit_site(
@@ -115,16 +150,18 @@ fn fit_site(
     let survey = &sites.survey[site];
     let p = survey.quadric.center;
     let noise = sites.prior[site].noise.min(survey.noise).max(1e-300);
-    let starts = if class == 0 {
-        vec![(survey.quadric, p)]
+    let (starts, rivals) = if class == 0 {
+        (vec![Start { sheet: survey.quadric, at: p, radius: survey.radius }], Vec::new())
     } else {
         choose(points, tree, owned, survey.radius, survey.quadric, noise, closed, closed_tree)
     };
     let sheets = starts.len() as u8;
     starts
         .into_iter()
-        .filter_map(|(start, at)| {
-            let (s, radius, error) = widen(tree, at, survey.radius, &start, noise)?;
+        .filter_map(|Start { sheet: start, at, radius }| {
+            let others: Vec<Quadric> =
+                rivals.iter().filter(|r| differ(r, &start, at, noise)).copied().collect();
+            let (s, radius, error) = widen(tree, at, radius, &start, &others, noise)?;
             let (center, normal) = s.quadric.project(at);
             Some(Fit {
                 quadric: s.quadric.normalized_at(center),
@@ -152,14 +189,18 @@ fn choose(
     noise: f64,
     closed: &[Fit],
     closed_tree: &KdTree,
-) -> Vec<(Quadric, DVec3)> {
+) -> (Vec<Start>, Vec<Quadric>) {
     let p = own.center;
     let mut near = Vec::new();
     closed_tree.within(p, FARTHEST * radius, |i, _, d2| near.push((d2, i)));
     near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut asked: Vec<Quadric> = Vec::new();
+    let mut radii: Vec<f64> = Vec::new();
     for &(_, i) in &near {
         let f = &closed[i as usize];
+        if f.error > SURE * noise {
+            continue;
+        }
         let (d, n) = f.quadric.distance(p);
         // Two that say the same here are one: same offset within the noise, same direction within 8 degrees.
         let known = asked.iter().any(|a| {
@@ -169,6 +210,7 @@ fn choose(
         });
         if !known && d.abs() < radius {
             asked.push(f.quadric);
+            radii.push(f.radius);
             if asked.len() == ASKED {
                 break;
             }
@@ -179,28 +221,28 @@ fn choose(
     let cost = |q: &Quadric| -> Vec<f64> {
         ball.iter().map(|&x| (q.distance(x).0 / noise).powi(2).min(LIMIT * LIMIT)).collect()
     };
-    let own_cost = cost(&own).iter().sum::<f64>() + OWN_PRICE;
+    asked.push(own);
+    radii.push(radius);
     let costs: Vec<Vec<f64>> = asked.iter().map(cost).collect();
+    let price = |i: usize| if i + 1 == asked.len() { OWN_PRICE } else { PRICE };
     let mut least = vec![LIMIT * LIMIT; ball.len()];
-    let mut total = least.iter().sum::<f64>();
     let mut chosen: Vec<usize> = Vec::new();
     while chosen.len() < MOST {
-        let sum = |c: &Vec<f64>| c.iter().zip(&least).map(|(a, b)| a.min(*b)).sum::<f64>() + PRICE;
-        let Some((next, i)) = costs.iter().enumerate().map(|(i, c)| (sum(c), i)).min_by(|a, b| a.0.total_cmp(&b.0))
-        else {
-            break;
-        };
+        let total: f64 = least.iter().sum();
+        let best = (0..asked.len())
+            .filter(|&i| chosen.iter().all(|&c| differ(&asked[i], &asked[c], p, noise)))
+            .map(|i| (costs[i].iter().zip(&least).map(|(a, b)| a.min(*b)).sum::<f64>() + price(i), i))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((next, i)) = best else { break };
         if next >= total {
             break;
         }
-        total = next + PRICE * chosen.len() as f64 * 0.0;
         chosen.push(i);
         least.iter_mut().zip(&costs[i]).for_each(|(l, c)| *l = l.min(*c));
-        total -= PRICE;
     }
-    let total = least.iter().sum::<f64>() + PRICE * chosen.len() as f64;
-    if chosen.is_empty() || own_cost <= total {
-        return vec![(own, p)];
+    let alone = Start { sheet: own, at: p, radius };
+    if chosen.is_empty() {
+        return (vec![alone], Vec::new());
     }
     // Who owns the points of the site.
     let mut own_points = vec![(0usize, DVec3::ZERO); chosen.len()];
@@ -218,17 +260,43 @@ fn choose(
         }
     }
     let enough = SHARE * owned.len() as f64;
-    let kept: Vec<(Quadric, DVec3)> = chosen
+    let kept: Vec<Start> = chosen
         .iter()
         .zip(&own_points)
         .filter(|(_, o)| o.0 > 0 && o.0 as f64 >= enough)
-        .map(|(&c, o)| (asked[c], o.1 / o.0 as f64))
+        .map(|(&c, o)| Start {
+            sheet: asked[c],
+            at: o.1 / o.0 as f64,
+            radius: if c + 1 == asked.len() { radius } else { radii[c].min(CARRIED * radius).max(radius) },
+        })
         .collect();
-    if kept.is_empty() { vec![(own, p)] } else { kept }
+    asked.pop();
+    if kept.is_empty() { (vec![alone], Vec::new()) } else { (kept, asked) }
+}
+
+/// Where a sheet begins to grow.
+struct Start {
+    sheet: Quadric,
+    at: DVec3,
+    radius: f64,
+}
+
+/// Two sheets are two if they meet at an angle or lie apart.
+fn differ(a: &Quadric, b: &Quadric, p: DVec3, noise: f64) -> bool {
+    let ((d, n), (e, m)) = (a.distance(p), b.distance(p));
+    let turn = n.dot(m);
+    turn.abs() < TURNED || (d - e * turn.signum()).abs() > APART * noise
 }
 
 /// Fits a sheet from a first guess and widens its ball while its own points show no bias: sheet, radius, expected error.
-fn widen(tree: &KdTree, p: DVec3, radius: f64, start: &Quadric, noise: f64) -> Option<(Sheet, f64, f64)> {
+fn widen(
+    tree: &KdTree,
+    p: DVec3,
+    radius: f64,
+    start: &Quadric,
+    others: &[Quadric],
+    noise: f64,
+) -> Option<(Sheet, f64, f64)> {
     let mut best: Option<(Sheet, f64, f64)> = None;
     let mut guess = *start;
     let mut ball = Vec::new();
@@ -237,7 +305,16 @@ fn widen(tree: &KdTree, p: DVec3, radius: f64, start: &Quadric, noise: f64) -> O
         ball.clear();
         tree.within(p, r, |_, q, _| {
             let y = (q - p) / r;
-            ball.push(Weighted { y, weight: kernel(y.length_squared()) });
+            let mut weight = kernel(y.length_squared());
+            if !others.is_empty() {
+                // The chance that the point belongs to this sheet and to none of the others.
+                let chance = |s: &Quadric| (-0.5 * (s.distance(q).0 / noise).powi(2)).exp();
+                let own = chance(&guess);
+                weight *= own / (own + others.iter().map(chance).sum::<f64>() + STRAY);
+            }
+            if weight > 1e-3 {
+                ball.push(Weighted { y, weight });
+            }
         });
         let Some(found) = sheet(p, r, &ball, Some(&guess), noise / r, Some(2)) else {
             if best.is_none() && step < STEPS {

@@ -10,7 +10,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Distance between sites over the radius of the fits: the blend then meets about eight fits everywhere.
-const APART: f64 = 0.5;
+const APART: f64 = 0.42;
+/// Sites stand no closer than for this share of the usual radius: creases have narrow balls, not finer shapes.
+const USUAL: f64 = 0.8;
 /// One point in this many is surveyed to learn the radii.
 const SCOUT: usize = 24;
 /// A fit may be this much wider than the scouts around saw.
@@ -27,6 +29,8 @@ pub(super) struct Sites {
     pub survey: Vec<Survey>,
     /// The region there.
     pub prior: Vec<Prior>,
+    /// Distance that it keeps other sites away.
+    pub gap: Vec<f64>,
     /// Owning site of each point; `u32::MAX` where no site is.
     pub owner: Vec<u32>,
 }
@@ -88,11 +92,12 @@ pub(super) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
     })?;
     let (point, both): (Vec<u32>, Vec<(Survey, Prior)>) =
         chosen.into_iter().zip(surveys).filter_map(|(p, s)| Some((p, s?))).unzip();
+    let gap = point.iter().map(|&i| APART * regions[i as usize].0).collect();
     let (survey, prior) = both.into_iter().unzip();
     let places: Vec<DVec3> = point.iter().map(|&i| points[i as usize]).collect();
     let site_tree = KdTree::new(&places);
     let owner = points.par_iter().map(|&p| site_tree.closest(p).unwrap_or(u32::MAX)).collect();
-    let mut sites = Sites { point, survey, prior, owner };
+    let mut sites = Sites { point, survey, prior, gap, owner };
     sites.even(&places, &site_tree);
     Some(sites)
 }
@@ -117,7 +122,7 @@ fn regions(points: &[DVec3], tree: &KdTree, known: &[Survey]) -> Vec<(f64, f64, 
                 let middle = radii[radii.len() / 2];
                 // A scout in a crease sees next to nothing; sites there stand as for half of the usual radius.
                 let prior = Prior { noise: noises[noises.len() / 2], radius: middle };
-                (least.max(0.5 * middle), REACH * most, prior)
+                (least.max(USUAL * middle), REACH * most, prior)
             },
         )
         .collect()

@@ -21,6 +21,7 @@ pub mod directed;
 mod lattice;
 mod mesh_field;
 pub mod sample;
+mod sample_field;
 mod winding;
 
 pub use creases::MeshCreases;
@@ -28,6 +29,7 @@ pub use directed::Directed;
 pub use lattice::{Lattice, LatticeError, Spacing};
 pub use mesh_field::MeshField;
 pub use sample::sample;
+pub use sample_field::SampleField;
 pub use winding::Winding;
 
 use crate::geom::Aabb;
