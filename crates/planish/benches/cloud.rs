@@ -77,7 +77,7 @@ fn main() {
                 for (k, v) in table { println!("   class/sheets {k:?}: n {} >10 {} >20 {} >40 {} far {}", v[0], v[1], v[2], v[3], v[4]); }
             }
             let t = std::time::Instant::now();
-            let field = planish::field::SampleField::new(&samples, false);
+            let field = planish::field::SampleField::new(&samples, true);
             let step = (samples.spacing * 1.6).max(samples.noise * 1.0);
             let lattice = planish::field::Lattice::around(&planish::field::Field::bounds(&field), planish::field::Spacing::Voxel(step)).unwrap();
             let directed = planish::field::sample(&field, &lattice, &planish::Silent).unwrap();

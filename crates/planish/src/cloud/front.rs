@@ -37,6 +37,10 @@ const TURNED: f64 = 0.94;
 const APART: f64 = 2.5;
 /// Points that must be nearest to a sheet.
 const NEEDED: usize = 3;
+/// Neighbours asked whether they carry a sheet on, how many must, and how far off they may be over their distance.
+const AROUND: usize = 16;
+const COMPANY: usize = 4;
+const OFFSET: f64 = 0.12;
 /// Most sheets at one site: a corner of four faces.
 const MOST: usize = 4;
 /// Sheets of fitted neighbours that are asked.
@@ -53,7 +57,7 @@ const CARRIED: f64 = 3.0;
 const STRAY: f64 = 0.011;
 /// Ratio of one ball to the next when a sheet grows, and how often it grows at most.
 const WIDEN: f64 = 1.35;
-const STEPS: usize = 4;
+const STEPS: usize = 3;
 
 /// A fitted sample of the surface: not oriented yet.
 #[derive(Clone, Copy, Debug)]
@@ -73,6 +77,8 @@ pub(super) struct Fit {
     pub site: u32,
     /// Number of sheets of that site.
     pub sheets: u8,
+    /// Points that it explains better than its neighbours do.
+    pub owned: u32,
 }
 
 /// Fits all sites. `None` if cancelled.
@@ -133,7 +139,35 @@ fn supported(points: &[DVec3], fits: Vec<Fit>) -> Vec<Fit> {
         .collect();
     let mut count = vec![0usize; fits.len()];
     best.iter().filter(|&&b| b != u32::MAX).for_each(|&b| count[b as usize] += 1);
-    fits.into_iter().zip(count).filter(|(_, c)| *c >= NEEDED).map(|(f, _)| f).collect()
+    let fits: Vec<Fit> =
+        fits.into_iter().zip(count).filter(|(_, c)| *c >= NEEDED).map(|(f, c)| Fit { owned: c as u32, ..f }).collect();
+    accompanied(fits)
+}
+
+/// Drops sheets that hardly any neighbour carries on: a fit across a crease stands alone, a face does not.
+fn accompanied(fits: Vec<Fit>) -> Vec<Fit> {
+    let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
+    let tree = KdTree::new(&centers);
+    let company: Vec<usize> = (0..fits.len())
+        .into_par_iter()
+        .map_init(Vec::new, |near, i| {
+            let f = &fits[i];
+            tree.nearest(f.center, AROUND + 1, near);
+            near.iter()
+                .filter(|n| n.1 as usize != i)
+                .filter(|n| {
+                    let g = &fits[n.1 as usize];
+                    let ((d, m), (e, k)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
+                    let slack = OFFSET * n.0.sqrt() + 2.0 * (f.error + g.error);
+                    m.dot(g.normal).abs() > TURNED
+                        && k.dot(f.normal).abs() > TURNED
+                        && d.abs() < slack
+                        && e.abs() < slack
+                })
+                .count()
+        })
+        .collect();
+    fits.into_iter().zip(company).filter(|(_, c)| *c >= COMPANY).map(|(f, _)| f).collect()
 }
 
 fn fit_site(
@@ -174,6 +208,7 @@ fn fit_site(
                 class,
                 site: site as u32,
                 sheets,
+                owned: 0,
             })
         })
         .collect()
@@ -316,7 +351,7 @@ fn widen(
                 ball.push(Weighted { y, weight });
             }
         });
-        let Some(found) = sheet(p, r, &ball, Some(&guess), noise / r, Some(2)) else {
+        let Some(found) = sheet(p, r, &ball, Some(&guess), noise / r, Some(if step == 0 { 2 } else { 1 })) else {
             if best.is_none() && step < STEPS {
                 continue;
             }

@@ -209,15 +209,8 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
     let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
     let fit_tree = KdTree::new(&centers);
     let votes = link::votes(&fits, &fit_tree);
-    let mut owned = vec![0.0; sites.point.len()];
-    sites.owner.iter().filter(|&&o| o != u32::MAX).for_each(|&o| owned[o as usize] += 1.0);
-    let areas: Vec<f64> = fits
-        .iter()
-        .map(|f| {
-            let s = &sites.survey[f.site as usize];
-            owned[f.site as usize] * s.spacing * s.spacing / f.sheets as f64
-        })
-        .collect();
+    let areas: Vec<f64> =
+        fits.iter().map(|f| f.owned as f64 * sites.survey[f.site as usize].spacing.powi(2)).collect();
     let normals = (!params.ignore_normals).then(|| given_normals(cloud, &ids, &fits, &sites)).flatten();
     let toward = toward_scanner(cloud, &ids, &fits, &sites);
     let hints = Hints { toward: toward.as_deref(), normals: normals.as_deref(), areas: &areas };

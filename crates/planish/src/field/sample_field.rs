@@ -23,6 +23,10 @@ const SAME: f64 = 0.82;
 const LEVEL: f64 = 0.3;
 /// The pseudo-distance changes by at most this much per length near the surface.
 const STEEP: f64 = 1.5;
+/// From this share of the support on a point is beside the data.
+const BESIDE: f64 = 0.5;
+/// The winding number decides where it is this far from one half.
+const CERTAIN: f64 = 0.3;
 /// Most sheets at one point; weaker ones are left out.
 const SHEETS: usize = 5;
 /// A sheet with less than this share of the weight of the strongest is left out: noise of a single fit.
@@ -103,6 +107,19 @@ impl SampleField {
         }
         let sheets = self.part(seen);
         let (value, normal) = self.join(seen, sheets);
+        // Away from the data the samples together know better than a fit carried on beyond its points.
+        let off = near.first().map_or(f64::INFINITY, |n| n.0.sqrt());
+        let own = &self.samples[seen[0].id as usize];
+        if off > BESIDE * own.support
+            && let Some(dipoles) = &self.closing
+        {
+            let winding = dipoles.number(p, 0.0);
+            let outside = winding < 0.5;
+            if outside != (value >= 0.0) && (winding - 0.5).abs() > CERTAIN {
+                let size = value.abs().max(0.05 * own.support);
+                return (if outside { size } else { -size }, normal);
+            }
+        }
         (value, normal)
     }
 
