@@ -3,7 +3,10 @@
 use crate::failure::Failure;
 use crate::options::{StageOptions, StageParams};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use planish::contour::ContourParams;
+use planish::field;
 use planish::grid::GridParams;
+use planish::mesh::{DecimateParams, SmoothParams};
 use planish::model::Units;
 use planish::network::LayoutParams;
 use planish::pipeline::PipelineParams;
@@ -38,6 +41,12 @@ pub enum Command {
     Demo(Demo),
     /// Everything: mesh in; surfaces, displacement maps and a report out
     Run(Run),
+    /// Mesh, solid script, milling job or volume -> a closed mesh with sharp edges
+    Mesh(Mesh),
+    /// Take noise off a mesh; sharp edges stay
+    Smooth(Smooth),
+    /// Make a mesh of fewer triangles; sharp edges stay
+    Decimate(Decimate),
     /// Mesh -> a network of four-sided patches to start from
     Layout(Layout),
     /// Mesh and network -> grids, surfaces, seams and relief in one model file
@@ -147,6 +156,60 @@ pub struct Run {
     pub common: Common,
     #[command(flatten)]
     pub stages: AllStages,
+}
+
+/// `planish mesh`
+#[derive(Args, Debug)]
+pub struct Mesh {
+    /// A mesh (PLY, OBJ, STL, GLB, glTF), also one with holes and intersections; a script of solids or a milling job
+    /// (.toml); or a volume (.nrrd, .npy)
+    pub input: PathBuf,
+    /// The mesh: .ply (with feature tags), .obj, .stl or .glb
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Edge of a cell, in units of the input; for .npy the distance between samples
+    #[arg(long, value_name = "H", value_parser = positive, conflicts_with = "resolution")]
+    pub voxel: Option<f64>,
+    /// Cells along the longest side [default: 129]
+    #[arg(long, value_name = "N")]
+    pub resolution: Option<NonZeroUsize>,
+    /// Memory that may be used, GB [default: three quarters of the machine's]
+    #[arg(long, value_name = "GB", value_parser = positive)]
+    pub memory: Option<f64>,
+    #[command(flatten)]
+    pub common: Common,
+    #[command(flatten)]
+    pub contour: StageOptions<ContourParams>,
+    #[command(flatten)]
+    pub volume: StageOptions<field::GridParams>,
+}
+
+/// `planish smooth`
+#[derive(Args, Debug)]
+pub struct Smooth {
+    /// The mesh: PLY (feature tags are respected), OBJ, STL, GLB or glTF
+    pub mesh: PathBuf,
+    /// The smoothed mesh: .ply, .obj, .stl or .glb
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub common: Common,
+    #[command(flatten)]
+    pub smooth: StageOptions<SmoothParams>,
+}
+
+/// `planish decimate`
+#[derive(Args, Debug)]
+pub struct Decimate {
+    /// The mesh: PLY (feature tags are respected), OBJ, STL, GLB or glTF
+    pub mesh: PathBuf,
+    /// The decimated mesh: .ply, .obj, .stl or .glb
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub common: Common,
+    #[command(flatten)]
+    pub decimate: StageOptions<DecimateParams>,
 }
 
 /// `planish layout`
@@ -279,6 +342,26 @@ impl AllStages {
     pub fn demanded_tolerance(&self) -> Option<f64> {
         self.fit.given("resolution", "tolerance")
     }
+}
+
+impl StageParams for ContourParams {
+    const STAGE: &'static str = "contour";
+    const HEADING: &'static str = "Extraction";
+}
+
+impl StageParams for field::GridParams {
+    const STAGE: &'static str = "volume";
+    const HEADING: &'static str = "Volumes: how their numbers are read";
+}
+
+impl StageParams for SmoothParams {
+    const STAGE: &'static str = "smooth";
+    const HEADING: &'static str = "Smoothing";
+}
+
+impl StageParams for DecimateParams {
+    const STAGE: &'static str = "decimate";
+    const HEADING: &'static str = "Decimation: one target";
 }
 
 impl StageParams for LayoutParams {

@@ -1,7 +1,7 @@
 //! Inputs: meshes, models and networks from files, with what the user is told when they cannot be used.
 
 use crate::failure::Failure;
-use planish::mesh::TriMesh;
+use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{Model, Units};
 use planish::network::Network;
 use planish_io::report::Input;
@@ -25,6 +25,16 @@ pub fn mesh(path: &Path) -> Result<TriMesh, Failure> {
         );
     }
     planish_io::read_mesh(path).map_err(|e| Failure::input(path, e))
+}
+
+/// Reads a mesh with its feature tags, if it has any.
+/// # Errors
+/// If the file is no usable mesh.
+pub fn tagged_mesh(path: &Path) -> Result<(TriMesh, Option<FeatureTags>), Failure> {
+    if is_model(path) {
+        return mesh(path).map(|m| (m, None));
+    }
+    planish_io::read_tagged_mesh(path).map_err(|e| Failure::input(path, e))
 }
 
 /// Reads a model.

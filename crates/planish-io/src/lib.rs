@@ -8,6 +8,7 @@ pub mod atomic;
 mod error;
 mod export;
 mod gltf;
+mod grid_file;
 mod mesh_file;
 mod network_file;
 mod obj;
@@ -17,6 +18,7 @@ mod polygon;
 pub mod project;
 mod relief_files;
 pub mod report;
+pub mod script;
 mod step;
 mod stl;
 mod text;
@@ -24,7 +26,10 @@ mod weld;
 
 pub use error::{ReadError, WriteError};
 pub use export::{ExportKind, export, export_kind, export_mesh};
-pub use mesh_file::{MeshFormat, Up, WriteOptions, read_mesh, write_mesh};
+pub use grid_file::{is_grid, read_grid};
+pub use mesh_file::{
+    MeshFormat, Up, WriteOptions, read_mesh, read_tagged_mesh, write_mesh, write_tagged_mesh,
+};
 pub use network_file::{NetworkFileError, read_network, write_network};
 pub use place::Place;
 pub use project::{ProjectError, read_model, write_model};

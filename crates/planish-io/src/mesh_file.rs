@@ -2,7 +2,7 @@
 
 use crate::{Place, ReadError, WriteError, atomic, gltf, obj, ply, stl};
 use planish::Units;
-use planish::mesh::TriMesh;
+use planish::mesh::{FeatureTags, TriMesh};
 use std::fs::File;
 use std::io::{BufWriter, Read};
 use std::path::Path;
@@ -117,7 +117,23 @@ impl WriteOptions {
 /// # Errors
 /// Everything that [`ReadError`] lists. No file makes it panic or take much more memory than its own size.
 pub fn read_mesh(path: impl AsRef<Path>) -> Result<TriMesh, ReadError> {
-    let path = path.as_ref();
+    read_with_edges(path.as_ref()).map(|(mesh, _)| mesh)
+}
+
+/// Reads a mesh with its feature tags: those of a PLY with the vertex property `feature` and an element `edge`.
+/// # Errors
+/// As [`read_mesh`].
+pub fn read_tagged_mesh(path: impl AsRef<Path>) -> Result<(TriMesh, Option<FeatureTags>), ReadError> {
+    let (mesh, mut edges) = read_with_edges(path.as_ref())?;
+    edges.iter_mut().for_each(|e| e.sort_unstable());
+    edges.retain(|[a, b]| a != b);
+    edges.sort_unstable();
+    edges.dedup();
+    let tags = FeatureTags::of(&mesh, edges);
+    Ok((mesh, tags))
+}
+
+fn read_with_edges(path: &Path) -> Result<(TriMesh, Vec<[u32; 2]>), ReadError> {
     let bytes = content(path)?;
     let Some(format) = MeshFormat::of(path) else {
         return Err(ReadError::UnknownExtension { extension: extension(path), known: known(&MeshFormat::ALL) });
@@ -126,12 +142,13 @@ pub fn read_mesh(path: impl AsRef<Path>) -> Result<TriMesh, ReadError> {
         return Err(ReadError::Empty);
     }
     check(format, MeshFormat::marked(&bytes))?;
-    match format {
-        MeshFormat::Ply => ply::read(&bytes),
+    let mesh = match format {
+        MeshFormat::Ply => return ply::read(&bytes),
         MeshFormat::Obj => obj::read(&bytes),
         MeshFormat::Stl => stl::read(&bytes),
         MeshFormat::Gltf | MeshFormat::Glb => gltf::read(&bytes, path.parent().unwrap_or(Path::new(""))),
-    }
+    };
+    Ok((mesh?, Vec::new()))
 }
 
 /// Writes a mesh: `.ply`, `.obj`, `.stl` or `.glb`. The file appears whole or not at all.
@@ -142,7 +159,30 @@ pub fn read_mesh(path: impl AsRef<Path>) -> Result<TriMesh, ReadError> {
 /// [`WriteError::UnknownExtension`], [`WriteError::Nothing`] for a mesh without triangles, [`WriteError::Value`]
 /// for coordinates that are not finite or that `f32` cannot hold where the format needs it.
 pub fn write_mesh(path: impl AsRef<Path>, mesh: &TriMesh, options: &WriteOptions) -> Result<(), WriteError> {
-    let path = path.as_ref();
+    write_with_edges(path.as_ref(), mesh, &[], options)
+}
+
+/// Writes a mesh with its feature tags: in PLY as the vertex property `feature` (0 none, 1 edge, 2 corner) and an element
+/// `edge`; the other formats have no place for them.
+/// # Errors
+/// As [`write_mesh`].
+pub fn write_tagged_mesh(
+    path: impl AsRef<Path>,
+    mesh: &TriMesh,
+    tags: &FeatureTags,
+    options: &WriteOptions,
+) -> Result<(), WriteError> {
+    let mut marked = mesh.clone();
+    tags.mark(&mut marked);
+    write_with_edges(path.as_ref(), &marked, &tags.edges, options)
+}
+
+fn write_with_edges(
+    path: &Path,
+    mesh: &TriMesh,
+    edges: &[[u32; 2]],
+    options: &WriteOptions,
+) -> Result<(), WriteError> {
     let written = [MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Stl, MeshFormat::Glb];
     let Some(format) = MeshFormat::of(path).filter(|f| written.contains(f)) else {
         return Err(WriteError::UnknownExtension { extension: extension(path), known: known(&written) });
@@ -167,7 +207,7 @@ pub fn write_mesh(path: impl AsRef<Path>, mesh: &TriMesh, options: &WriteOptions
     }
     let generator = options.generator();
     atomic::write(path, |out: &mut BufWriter<File>| match format {
-        MeshFormat::Ply => ply::write(out, mesh, &generator),
+        MeshFormat::Ply => ply::write(out, mesh, edges, &generator),
         MeshFormat::Obj => obj::write(out, mesh, &generator),
         MeshFormat::Stl => stl::write(out, mesh, &generator),
         _ => gltf::write(out, mesh, options),

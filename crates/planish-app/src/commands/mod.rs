@@ -1,12 +1,15 @@
 //! One file per command, and what they share.
 
 mod compare;
+mod decimate;
 mod demo;
 mod export;
 mod fit;
 mod info;
 mod layout;
+mod mesh;
 mod run;
+mod smooth;
 
 use crate::args::{Cli, Command, Common};
 use crate::failure::{Failure, Status};
@@ -27,6 +30,9 @@ pub fn run(cli: Cli) -> Result<Status, Failure> {
     match cli.command {
         Command::Demo(args) => demo::demo(&Session::new(&args.common)?, &args),
         Command::Run(args) => run::run(&Session::new(&args.common)?, &args),
+        Command::Mesh(args) => mesh::mesh(&Session::new(&args.common)?, &args),
+        Command::Smooth(args) => smooth::smooth(&Session::new(&args.common)?, &args),
+        Command::Decimate(args) => decimate::decimate(&Session::new(&args.common)?, &args),
         Command::Layout(args) => layout::layout(&Session::new(&args.common)?, &args),
         Command::Fit(args) => fit::fit(&Session::new(&args.common)?, &args),
         Command::Export(args) => export::export(&Session::new(&args.common)?, &args),

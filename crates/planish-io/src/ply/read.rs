@@ -10,7 +10,9 @@ use planish::mesh::{Attribute, TriMesh};
 /// Reads a mesh. `nx ny nz` become `"normal"`; `red green blue [alpha]` become `"color"`, whole numbers scaled
 /// to 0..1; `name_0 .. name_k` become one attribute of width `k + 1`; every other number per vertex becomes an
 /// attribute of its own. Elements other than `vertex`, `face` and `tristrips` and lists per vertex are skipped.
-pub(crate) fn read(bytes: &[u8]) -> Result<TriMesh, ReadError> {
+///
+/// The second result are the edges of an element `edge` with `vertex1` and `vertex2`.
+pub(crate) fn read(bytes: &[u8]) -> Result<(TriMesh, Vec<[u32; 2]>), ReadError> {
     let head = header(bytes)?;
     let Some(vertex) = head.elements.iter().find(|e| e.name == "vertex") else {
         return Err(ReadError::Header {
@@ -22,6 +24,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<TriMesh, ReadError> {
     let layout = Layout::of(vertex, &head)?;
     let mut mesh = TriMesh::default();
     let mut polygons = Polygons::default();
+    let mut edges = Vec::new();
     let mut body = Body::new(bytes, head.encoding, head.body, head.body_line);
     let mut seen = false;
     for element in &head.elements {
@@ -47,6 +50,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<TriMesh, ReadError> {
             "face" | "tristrips" => {
                 faces(element, &mut body, &mut polygons, vertex.count as usize, bytes.len())?;
             }
+            "edge" if edges.is_empty() => edges = read_edges(element, &mut body, vertex.count, bytes.len())?,
             _ => skip(element, &mut body, bytes.len())?,
         }
     }
@@ -57,7 +61,43 @@ pub(crate) fn read(bytes: &[u8]) -> Result<TriMesh, ReadError> {
         return Err(ReadError::Syntax { what, place: Place::Line(lines.number()) });
     }
     mesh.triangles = polygons.triangulate(&mesh.points, Place::Face)?;
-    checked(mesh, polygons.count())
+    Ok((checked(mesh, polygons.count())?, edges))
+}
+
+/// The two ends of each edge; none if the element is another thing of that name.
+fn read_edges(element: &Element, body: &mut Body, vertices: u64, total: usize) -> Result<Vec<[u32; 2]>, ReadError> {
+    let whole = |name: &str| {
+        let is = |p: &super::header::Property| p.name == name && matches!(p.kind, Kind::One(s) if !s.is_real());
+        element.properties.iter().position(is)
+    };
+    let (Some(first), Some(second)) = (whole("vertex1"), whole("vertex2")) else {
+        skip(element, body, total)?;
+        return Ok(Vec::new());
+    };
+    let mut edges = Vec::new();
+    for e in 0..element.count {
+        body.begin(&element.name)?;
+        let mut ends = [0u32; 2];
+        for (p, property) in element.properties.iter().enumerate() {
+            match property.kind {
+                Kind::One(scalar) if p == first || p == second => {
+                    let index = body.whole(scalar)?;
+                    if !(0..vertices as i64).contains(&index) {
+                        let place = Place::Item("edge", e as usize);
+                        return Err(ReadError::Index { index, vertices: vertices as usize, place });
+                    }
+                    ends[(p == second) as usize] = index as u32;
+                }
+                Kind::One(scalar) => body.skip(1, scalar)?,
+                Kind::List { count, item } => {
+                    let n = body.count(count, item, total)?;
+                    body.skip(n, item)?;
+                }
+            }
+        }
+        edges.push(ends);
+    }
+    Ok(edges)
 }
 
 /// Where the numbers of a vertex go.

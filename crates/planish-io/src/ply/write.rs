@@ -10,7 +10,13 @@ use std::io::Write;
 /// that reading gives the same mesh. `"normal"` is written as `nx ny nz`, `"color"` as `uchar` red, green, blue
 /// (and alpha) where steps of 1/255 hold it exactly and as `float` otherwise, other attributes as `float`s
 /// named `name` (width 1) or `name_0 .. name_k`.
-pub(crate) fn write<W: Write>(out: &mut W, mesh: &TriMesh, generator: &str) -> Result<(), WriteError> {
+/// * `edges` - feature edges, written as an element `edge` if there are any; the attribute `"feature"` is `uchar`
+pub(crate) fn write<W: Write>(
+    out: &mut W,
+    mesh: &TriMesh,
+    edges: &[[u32; 2]],
+    generator: &str,
+) -> Result<(), WriteError> {
     let exact = mesh.points.iter().all(|p| p.to_array().iter().all(|&x| x as f32 as f64 == x));
     let coordinate = if exact { "float" } else { "double" };
     writeln!(out, "ply\nformat binary_little_endian 1.0\ncomment {generator}\nelement vertex {}", mesh.points.len())?;
@@ -31,7 +37,11 @@ pub(crate) fn write<W: Write>(out: &mut W, mesh: &TriMesh, generator: &str) -> R
         }
         columns.push(column);
     }
-    writeln!(out, "element face {}\nproperty list uchar int vertex_indices\nend_header", mesh.triangles.len())?;
+    writeln!(out, "element face {}\nproperty list uchar int vertex_indices", mesh.triangles.len())?;
+    if !edges.is_empty() {
+        writeln!(out, "element edge {}\nproperty int vertex1\nproperty int vertex2", edges.len())?;
+    }
+    writeln!(out, "end_header")?;
     for (v, p) in mesh.points.iter().enumerate() {
         for x in p.to_array() {
             if exact {
@@ -43,7 +53,7 @@ pub(crate) fn write<W: Write>(out: &mut W, mesh: &TriMesh, generator: &str) -> R
         for (attribute, column) in mesh.attributes.iter().zip(&columns) {
             for &x in &attribute.values[v * attribute.width..(v + 1) * attribute.width] {
                 if column.bytes {
-                    out.write_all(&[(x * 255.0).round() as u8])?;
+                    out.write_all(&[(x * column.scale).round() as u8])?;
                 } else {
                     out.write_all(&x.to_le_bytes())?;
                 }
@@ -57,6 +67,9 @@ pub(crate) fn write<W: Write>(out: &mut W, mesh: &TriMesh, generator: &str) -> R
         }
         out.write_all(&record)?;
     }
+    for v in edges.iter().flatten() {
+        out.write_all(&v.to_le_bytes())?;
+    }
     Ok(())
 }
 
@@ -64,6 +77,8 @@ pub(crate) fn write<W: Write>(out: &mut W, mesh: &TriMesh, generator: &str) -> R
 struct Column {
     names: Vec<String>,
     bytes: bool,
+    /// What a byte is of a whole.
+    scale: f32,
 }
 
 impl Column {
@@ -84,6 +99,9 @@ impl Column {
         };
         let steps = |&x: &f32| ((x * 255.0).round() / 255.0) == x && (0.0..=1.0).contains(&x);
         let bytes = members.len() >= 3 && attribute.name == "color" && attribute.values.iter().all(steps);
-        Column { names, bytes }
+        let whole = attribute.name == planish::mesh::FEATURE
+            && attribute.width == 1
+            && attribute.values.iter().all(|&x| x == x.round() && (0.0..=255.0).contains(&x));
+        Column { names, bytes: bytes || whole, scale: if whole { 1.0 } else { 255.0 } }
     }
 }

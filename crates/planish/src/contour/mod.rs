@@ -13,16 +13,23 @@
 
 mod caps;
 mod cell;
+#[cfg(test)]
+mod certificate;
 mod face;
 mod feature;
 mod patch;
 mod polish;
+mod refine;
+mod sources;
 mod topology;
 mod walk;
 
 use crate::field::{Creases, Directed};
 use crate::mesh::{FeatureKind, FeatureTags, TriMesh};
 use crate::observe::Observer;
+pub use refine::FieldCreases;
+pub use sources::{Meshed, MeshingError, Sampling, from_field, from_grid, from_mesh, from_part};
+
 use face::FacePoints;
 use glam::DVec3;
 use patch::{INNER, Patcher, Scratch, Sheet};

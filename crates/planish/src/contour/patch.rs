@@ -232,7 +232,7 @@ impl Patcher<'_> {
             }
         }
         if let Some(refine) = self.refine {
-            p = refine.inner_point(p, &points, shape == Shape::Corner, low, high).unwrap_or(p);
+            p = refine.inner_point(p, &points, shape == Shape::Corner, low, high, &scratch.planes).unwrap_or(p);
         }
         let kind = if shape == Shape::Corner { FeatureKind::Corner } else { FeatureKind::Edge };
         let (clamped, moved) = inside(p, low, high);

@@ -144,7 +144,15 @@ impl Creases for MeshCreases {
         best.map(|b| b.1)
     }
 
-    fn inner_point(&self, guess: DVec3, through: &[DVec3], _corner: bool, low: DVec3, high: DVec3) -> Option<DVec3> {
+    fn inner_point(
+        &self,
+        guess: DVec3,
+        through: &[DVec3],
+        _corner: bool,
+        low: DVec3,
+        high: DVec3,
+        _hits: &[(DVec3, DVec3)],
+    ) -> Option<DVec3> {
         let cell = cell_of(&self.lattice, (low + high) / 2.0);
         let size = (high - low).max_element();
         let first = self.corners.partition_point(|c| c.0 < cell);

@@ -17,19 +17,30 @@
 //! where the surface then stays open.
 
 mod creases;
+pub mod csg;
 pub mod directed;
+mod grid_field;
 mod lattice;
 mod mesh_field;
+mod part;
+mod polygon;
 pub mod sample;
 mod sample_field;
+mod solid;
+mod sweep;
 mod winding;
 
 pub use creases::MeshCreases;
 pub use directed::Directed;
+pub use grid_field::{Body, GradientRule, GridParams, ScalarGrid, sample_grid};
 pub use lattice::{Lattice, LatticeError, Spacing};
 pub use mesh_field::MeshField;
+pub use part::{MeshBody, Part};
+pub use polygon::{Polygon, PolygonError};
 pub use sample::sample;
 pub use sample_field::SampleField;
+pub use solid::Solid;
+pub use sweep::{Milling, Move, Tool};
 pub use winding::Winding;
 
 use crate::geom::Aabb;
@@ -45,6 +56,12 @@ pub enum FieldError {
     /// The lattice is no lattice, or too large.
     #[error("{0}")]
     Lattice(#[from] LatticeError),
+    /// A scalar grid contradicts itself.
+    #[error("{what}; write the volume again from its source")]
+    Grid {
+        /// What is wrong.
+        what: String,
+    },
     /// The observer wants no result any more.
     #[error("sampling cancelled")]
     Cancelled,
@@ -142,8 +159,17 @@ pub trait Creases: Sync {
     ) -> Option<DVec3>;
 
     /// A place of the feature inside the cell from `low` to `high`, near `guess`; `through` are the points at which it
-    /// passes the cell's faces, `corner` whether several features seem to meet here.
-    fn inner_point(&self, guess: DVec3, through: &[DVec3], corner: bool, low: DVec3, high: DVec3) -> Option<DVec3>;
+    /// passes the cell's faces, `corner` whether several features seem to meet here, `hits` the
+    /// positions and normals around.
+    fn inner_point(
+        &self,
+        guess: DVec3,
+        through: &[DVec3],
+        corner: bool,
+        low: DVec3,
+        high: DVec3,
+        hits: &[(DVec3, DVec3)],
+    ) -> Option<DVec3>;
 
     /// The place of a feature nearest to `p`, within `reach`: where a vertex goes that had to stay in its cell.
     fn nearest(&self, p: DVec3, reach: f64) -> Option<DVec3>;

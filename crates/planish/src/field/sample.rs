@@ -194,7 +194,7 @@ const ROOT: f64 = 1e-13;
 /// Where `f` passes zero between 0 and 1, by interpolation kept within a shrinking bracket (Oliveira and Takahashi
 /// 2020, *An Enhancement of the Bisection Method Average Performance Preserving Minmax Optimality*): never more steps
 /// than bisection plus one.
-fn root(f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
+pub fn root(f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
     let sign = if f0 < f1 { 1.0 } else { -1.0 };
     let (mut a, mut b, mut fa, mut fb) = (0.0, 1.0, sign * f0, sign * f1);
     if fa.is_nan() || fb.is_nan() {

@@ -35,8 +35,8 @@ struct Node {
     second: u32,
 }
 
-/// A group counts as one dipole from this many radii on: the first order is then right to about 1e-3.
-const FAR: f64 = 2.5;
+/// A group counts as one dipole from this many radii on: the first order is then right to about 5e-4.
+const FAR: f64 = 3.5;
 /// Triangles in a leaf at most.
 const LEAF: usize = 8;
 /// What the dipoles may be wrong together.
@@ -194,14 +194,14 @@ mod tests {
         let w = Winding::new(&cube);
         let mut skipped = 0;
         for n in 0..2000u64 {
-            let r = |k| crate::geom::random::unit(3, 4 * n + k);
+            let r = |k: u64| crate::geom::random::unit(3, 4 * n + k);
             let c = (DVec3::new(r(0), r(1), r(2)) - 0.5) * 3.0;
             let aabb = Aabb { min: c - 0.2 * r(3), max: c + 0.2 * r(3) };
             if !w.crosses(&aabb) {
                 skipped += 1;
                 let side = w.side(aabb.center());
-                for m in 0..20 {
-                    let q = |k| crate::geom::random::unit(n, 3 * m + k);
+                for m in 0..20u64 {
+                    let q = |k: u64| crate::geom::random::unit(n, 3 * m + k);
                     let p = aabb.min + (aabb.max - aabb.min) * DVec3::new(q(0), q(1), q(2));
                     assert_eq!(w.side(p), side, "{p}");
                 }

@@ -2,6 +2,7 @@
 
 mod adjacency;
 pub mod compare;
+pub mod decimate;
 mod demo;
 mod diagnose;
 mod face_point;
@@ -13,17 +14,20 @@ mod rings;
 mod sets;
 pub mod shapes;
 mod slivers;
+pub mod smooth;
 mod soup;
 mod tags;
 mod walk;
 
 pub use adjacency::{Adjacency, Fan, NONE, next, previous};
 pub use compare::{CompareError, CompareParams, Comparison, compare};
+pub use decimate::{DecimateError, DecimateParams, DecimateTarget, Decimated, decimate};
 pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
 pub use face_point::FacePoint;
 pub use intersect::self_intersections;
 pub use features::{boundary_loops, components, sharp_edges};
 pub use repair::{Repairs, repair, weld};
+pub use smooth::{SmoothError, SmoothParams, Smoothed, smooth};
 pub use soup::check;
 pub use tags::{FEATURE, FeatureKind, FeatureTags};
 pub use walk::{CurvePlace, move_point_on_curve, move_point_on_surface};

@@ -1,0 +1,62 @@
+//! `planish decimate`: fewer triangles, features kept.
+
+use super::{Session, commit_report};
+use crate::args::Decimate;
+use crate::failure::{Failure, Status};
+use crate::files;
+use crate::products::Staged;
+use crate::progress;
+use crate::summary::Summary;
+use planish::mesh::{decimate as decimate_mesh, diagnose};
+use planish::pipeline::{Figure, Warning};
+use planish_io::WriteOptions;
+use planish_io::report::{Report, count, number};
+
+pub fn decimate(session: &Session, args: &Decimate) -> Result<Status, Failure> {
+    files::check_extension(&args.output, &["ply", "obj", "stl", "glb"])?;
+    let staged = Staged::file(&args.output)?;
+    let own_report = session.stage_report()?;
+    let params = args.decimate.params(None)?;
+    let ((mesh, tags), read) = session.step("read", || files::tagged_mesh(&args.mesh))?;
+    let (made, record) = session.bars.step("decimate", |o| decimate_mesh(&mesh, tags.as_ref(), &params, o));
+    if progress::interrupted() {
+        return Err(Failure::interrupted());
+    }
+    let made = made.map_err(|e| {
+        Failure::input(&args.mesh, super::with_hint(&e.to_string())).hint("look for faults with `planish info`")
+    })?;
+    let options = WriteOptions { units: session.units(), ..WriteOptions::default() };
+    planish_io::write_tagged_mesh(staged.file_path(), &made.mesh, &made.tags, &options)
+        .map_err(|e| Failure::usage(&args.output, e))?;
+    let mut report = Report::new("decimate", files::mesh_facts(&args.mesh, &mesh, session.units()));
+    report.stages = vec![read, record];
+    let facts = diagnose(&made.mesh);
+    report.quality.insert("mesh.triangles".into(), Figure::Count(facts.triangles as u64));
+    report.quality.insert("mesh.watertight".into(), Figure::Flag(facts.watertight));
+    report.quality.insert("mesh.manifold".into(), Figure::Flag(facts.manifold));
+    report.quality.insert("mesh.feature_edges".into(), Figure::Count(made.tags.edges.len() as u64));
+    report.quality.insert("mesh.self_intersections".into(), Figure::Count(made.self_intersections as u64));
+    if let Some(distance) = made.distance {
+        report.quality.insert("mesh.distance_max".into(), Figure::Number(distance));
+    }
+    if made.self_intersections > 0 {
+        let text = format!("{} pairs of triangles meet, as in the input.", made.self_intersections);
+        report.warnings.push(Warning::new("self_intersections", text, ""));
+    }
+    staged.commit()?;
+    commit_report(own_report, &report)?;
+    if !session.common.quiet {
+        session.tell_warnings(&report);
+        let unit = report.input.units.as_str();
+        let mut table = Summary::default();
+        table.row("input", format!("{}: {} triangles", report.input.path, count(mesh.triangles.len() as u64)));
+        table.row("triangles", count(facts.triangles as u64));
+        table.row("feature edges", count(made.tags.edges.len() as u64));
+        if let Some(distance) = made.distance {
+            table.row("distance", format!("at most {} {unit} from the input", number(distance)));
+        }
+        table.row("mesh", args.output.display().to_string());
+        table.print();
+    }
+    Ok(Status::Done)
+}

@@ -1,0 +1,193 @@
+//! `planish mesh`: a mesh with sharp edges from a mesh, a solid script, a milling job or a volume.
+
+use super::{Session, commit_report};
+use crate::args::Mesh;
+use crate::failure::{Failure, Status};
+use crate::files;
+use crate::products::Staged;
+use crate::progress;
+use crate::summary::Summary;
+use planish::contour::{self, Meshed, MeshingError, Sampling};
+use planish::field::{Part, Spacing};
+use planish::mesh::{TriMesh, diagnose};
+use planish::model::Units;
+use planish::pipeline::{Figure, Warning};
+use planish_io::WriteOptions;
+use planish_io::report::{Input, Report, count, number};
+use planish_io::script::Script;
+
+/// Cells along the longest side unless the user says.
+const RESOLUTION: usize = 129;
+/// Share of the machine's memory that may be used unless the user says.
+const MEMORY_SHARE: f64 = 0.75;
+/// What a machine has if nobody knows.
+const MEMORY_GUESS: u64 = 8 << 30;
+
+/// What is to be meshed.
+enum Source {
+    Mesh(TriMesh),
+    Script(Script),
+    Grid(Box<planish::field::ScalarGrid>),
+}
+
+pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
+    files::check_extension(&args.output, &["ply", "obj", "stl", "glb"])?;
+    let staged = Staged::file(&args.output)?;
+    let own_report = session.stage_report()?;
+    let params = args.contour.params(None)?;
+    let grid_params = args.volume.params(None)?;
+    let ((source, input, units), read) = session.step("read", || read(session, args))?;
+    let spacing = match (args.voxel, args.resolution) {
+        (Some(h), _) => Spacing::Voxel(h),
+        (None, n) => Spacing::Resolution(n.map_or(RESOLUTION, |n| n.get())),
+    };
+    let memory = args.memory.map_or_else(default_memory, |gb| (gb * (1u64 << 30) as f64) as u64);
+    let sampling = Sampling { spacing, memory };
+    let (made, record) = session.bars.step("mesh", |o| match &source {
+        Source::Mesh(mesh) => contour::from_mesh(mesh, sampling, &params, o),
+        Source::Script(Script::Part(part)) => contour::from_part(part, sampling, &params, o),
+        Source::Script(Script::Job(milling)) => contour::from_field(milling, sampling, &params, o),
+        Source::Grid(grid) => contour::from_grid(grid, &grid_params, memory, &params, o),
+    });
+    if progress::interrupted() {
+        return Err(Failure::interrupted());
+    }
+    let made = made.map_err(|e| failure(args, &source, e))?;
+    let (mesh, tags) = (&made.extracted.mesh, &made.extracted.tags);
+    let options = WriteOptions { units, ..WriteOptions::default() };
+    let (_, write) = session.step("write", || {
+        planish_io::write_tagged_mesh(staged.file_path(), mesh, tags, &options)
+            .map_err(|e| Failure::usage(&args.output, e))
+    })?;
+    let mut report = Report::new("mesh", input);
+    report.stages = vec![read, record, write];
+    figures(&made, &mut report);
+    staged.commit()?;
+    commit_report(own_report, &report)?;
+    if !session.common.quiet {
+        session.tell_warnings(&report);
+        table(args, &made, &report).print();
+    }
+    Ok(Status::Done)
+}
+
+/// Reads whatever the input is, by its extension.
+fn read(session: &Session, args: &Mesh) -> Result<(Source, Input, Units), Failure> {
+    let path = &args.input;
+    let chosen = session.common.units.map(Units::from);
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        let file = planish_io::script::read_script(path).map_err(|e| Failure::input(path, e))?;
+        let units = chosen.or(file.units).unwrap_or_default();
+        let (kind, what, bounds) = match &file.script {
+            Script::Part(part) => ("solid script", "solids", planish::field::Field::bounds(part)),
+            Script::Job(job) => ("milling job", "moves", planish::field::Field::bounds(job)),
+        };
+        if !(bounds.min.is_finite() && bounds.max.is_finite()) {
+            return Err(Failure::input(path, "the solid has no end along some axis")
+                .hint("intersect planes with something of finite size"));
+        }
+        let input = Input {
+            path: path.display().to_string(),
+            kind: kind.into(),
+            counts: [(what.to_owned(), file.count as u64)].into(),
+            units: units.symbol().into(),
+            diagonal: bounds.diagonal(),
+        };
+        return Ok((Source::Script(file.script), input, units));
+    }
+    if planish_io::is_grid(path) {
+        let mut grid = planish_io::read_grid(path).map_err(|e| Failure::input(path, e))?;
+        // NumPy arrays carry no size of a voxel.
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
+            grid.spacing *= args.voxel.unwrap_or(1.0);
+        }
+        let units = session.units();
+        let size = grid.spacing * glam::DVec3::from_array(grid.size.map(|n| n as f64 - 1.0));
+        let input = Input {
+            path: path.display().to_string(),
+            kind: "volume".into(),
+            counts: [("samples".to_owned(), grid.values.len() as u64)].into(),
+            units: units.symbol().into(),
+            diagonal: size.length(),
+        };
+        return Ok((Source::Grid(Box::new(grid)), input, units));
+    }
+    let mesh = files::mesh(path)?;
+    let input = files::mesh_facts(path, &mesh, session.units());
+    Ok((Source::Mesh(mesh), input, session.units()))
+}
+
+fn failure(args: &Mesh, source: &Source, error: MeshingError) -> Failure {
+    let hint = match source {
+        Source::Mesh(_) => "look for faults with `planish info`",
+        Source::Script(Script::Part(Part::Solid(_))) => "use a smaller voxel, or look for solids that take all away",
+        _ => "check the input",
+    };
+    Failure::input(&args.input, super::with_hint(&error.to_string())).hint(hint)
+}
+
+fn default_memory() -> u64 {
+    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let total = text.lines().find_map(|l| l.strip_prefix("MemTotal:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
+    (total.map_or(MEMORY_GUESS, |kb| kb << 10) as f64 * MEMORY_SHARE) as u64
+}
+
+fn figures(made: &Meshed, report: &mut Report) {
+    let facts = diagnose(&made.extracted.mesh);
+    let counts = made.extracted.counts;
+    let whole = [
+        ("mesh.triangles", facts.triangles),
+        ("mesh.vertices", facts.vertices),
+        ("mesh.components", facts.components),
+        ("mesh.feature_edges", made.extracted.tags.edges.len()),
+        ("mesh.cells", counts.cells),
+        ("mesh.fallback_cells", counts.fallbacks),
+        ("mesh.pushed_cells", counts.pushed),
+        ("mesh.clamped_features", counts.kept),
+        ("mesh.mended_hits", made.mended),
+    ];
+    report.quality.extend(whole.map(|(key, n)| (key.to_owned(), Figure::Count(n as u64))));
+    report.quality.insert("mesh.watertight".into(), Figure::Flag(facts.watertight));
+    report.quality.insert("mesh.manifold".into(), Figure::Flag(facts.manifold));
+    report.quality.insert("mesh.voxel".into(), Figure::Number(made.lattice.step.x));
+    report.quality.insert("mesh.area".into(), Figure::Number(facts.area));
+    if let Some(volume) = facts.volume {
+        report.quality.insert("mesh.volume".into(), Figure::Number(volume));
+    }
+    if let Some(genus) = facts.genus {
+        report.quality.insert("mesh.genus".into(), Figure::Number(genus as f64));
+    }
+    if counts.fallbacks > 0 {
+        let text = format!("{} cells have no sharp vertex although their normals ask for one.", counts.fallbacks);
+        report.warnings.push(Warning::new("fallback_cells", text, ""));
+    }
+    if counts.kept > 0 {
+        let text = format!(
+            "{} feature vertices had to stay in their cells: details are finer than the voxel there.",
+            counts.kept
+        );
+        report.warnings.push(Warning::new("clamped_features", text, ""));
+    }
+}
+
+fn table(args: &Mesh, made: &Meshed, report: &Report) -> Summary {
+    let unit = report.input.units.as_str();
+    let flag = |key: &str, yes: &str, no: &str| if report.flag(key) == Some(true) { yes.into() } else { String::from(no) };
+    let mut table = Summary::default();
+    let [x, y, z] = made.lattice.cells;
+    table.row("input", format!("{}: {}", report.input.path, report.input.kind));
+    table.row("voxel", format!("{} {unit} ({x} x {y} x {z} cells)", number(made.lattice.step.x)));
+    table.row("triangles", count(made.extracted.mesh.triangles.len() as u64));
+    table.row("feature edges", count(made.extracted.tags.edges.len() as u64));
+    table.row(
+        "surface",
+        format!(
+            "{}, {}",
+            flag("mesh.watertight", "watertight", "open"),
+            flag("mesh.manifold", "manifold", "not manifold")
+        ),
+    );
+    table.row("fallback cells", count(made.extracted.counts.fallbacks as u64));
+    table.row("mesh", args.output.display().to_string());
+    table
+}

@@ -1,0 +1,55 @@
+//! `planish smooth`: noise off a mesh, features kept.
+
+use super::{Session, commit_report};
+use crate::args::Smooth;
+use crate::failure::{Failure, Status};
+use crate::files;
+use crate::products::Staged;
+use crate::progress;
+use crate::summary::Summary;
+use planish::mesh::smooth as smooth_mesh;
+use planish::pipeline::{Figure, Warning};
+use planish_io::WriteOptions;
+use planish_io::report::{Report, count, number};
+
+pub fn smooth(session: &Session, args: &Smooth) -> Result<Status, Failure> {
+    files::check_extension(&args.output, &["ply", "obj", "stl", "glb"])?;
+    let staged = Staged::file(&args.output)?;
+    let own_report = session.stage_report()?;
+    let params = args.smooth.params(None)?;
+    let ((mesh, tags), read) = session.step("read", || files::tagged_mesh(&args.mesh))?;
+    let (made, record) = session.bars.step("smooth", |o| smooth_mesh(&mesh, tags.as_ref(), &params, o));
+    if progress::interrupted() {
+        return Err(Failure::interrupted());
+    }
+    let made = made.map_err(|e| {
+        Failure::input(&args.mesh, super::with_hint(&e.to_string())).hint("look for faults with `planish info`")
+    })?;
+    let options = WriteOptions { units: session.units(), ..WriteOptions::default() };
+    let tags = tags.unwrap_or_default();
+    planish_io::write_tagged_mesh(staged.file_path(), &made.mesh, &tags, &options)
+        .map_err(|e| Failure::usage(&args.output, e))?;
+    let mut report = Report::new("smooth", files::mesh_facts(&args.mesh, &mesh, session.units()));
+    report.stages = vec![read, record];
+    report.quality.insert("mesh.triangles".into(), Figure::Count(made.mesh.triangles.len() as u64));
+    report.quality.insert("mesh.noise".into(), Figure::Number(made.noise));
+    report.quality.insert("mesh.kept_vertices".into(), Figure::Count(made.kept as u64));
+    report.quality.insert("mesh.feature_edges".into(), Figure::Count(tags.edges.len() as u64));
+    if made.kept > 0 {
+        let text = format!("{} vertices stayed where they were: triangles would have turned or met.", made.kept);
+        report.warnings.push(Warning::new("kept_vertices", text, ""));
+    }
+    staged.commit()?;
+    commit_report(own_report, &report)?;
+    if !session.common.quiet {
+        session.tell_warnings(&report);
+        let unit = report.input.units.as_str();
+        let mut table = Summary::default();
+        table.row("input", format!("{}: {} triangles", report.input.path, count(mesh.triangles.len() as u64)));
+        table.row("noise", format!("{} {unit}", number(made.noise)));
+        table.row("feature edges", count(tags.edges.len() as u64));
+        table.row("mesh", args.output.display().to_string());
+        table.print();
+    }
+    Ok(Status::Done)
+}

@@ -1,0 +1,154 @@
+//! From each kind of source to its mesh in one call: lattice, memory, field, extraction.
+
+use super::{ContourError, ContourParams, Extracted, FieldCreases, extract};
+use crate::field::{
+    Directed, Field, FieldError, GridParams, Lattice, LatticeError, MeshField, Part, ScalarGrid, Spacing, sample,
+    sample_grid,
+};
+use crate::mesh::TriMesh;
+use crate::observe::Observer;
+
+/// Where the lattice lies and how much memory it may take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sampling {
+    /// Size of the cells.
+    pub spacing: Spacing,
+    /// Bytes that may be used.
+    pub memory: u64,
+}
+
+/// Why a source gives no mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MeshingError {
+    /// The field cannot be made.
+    #[error("{0}")]
+    Field(#[from] FieldError),
+    /// The surface cannot be extracted.
+    #[error("{0}")]
+    Contour(#[from] ContourError),
+}
+
+impl From<LatticeError> for MeshingError {
+    fn from(error: LatticeError) -> MeshingError {
+        MeshingError::Field(error.into())
+    }
+}
+
+impl MeshingError {
+    /// True if the observer wanted no result any more.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, MeshingError::Field(FieldError::Cancelled) | MeshingError::Contour(ContourError::Cancelled))
+    }
+}
+
+/// A mesh and the lattice it was extracted on.
+#[derive(Clone, Debug)]
+pub struct Meshed {
+    /// The mesh with its features.
+    pub extracted: Extracted,
+    /// The lattice.
+    pub lattice: Lattice,
+    /// Hits that had to be guessed.
+    pub mended: usize,
+}
+
+/// Two halves of the work as parts of one.
+struct Half<'a> {
+    observer: &'a dyn Observer,
+    from: f64,
+}
+
+impl Observer for Half<'_> {
+    fn progress(&self, fraction: f64) {
+        self.observer.progress(self.from + 0.5 * fraction);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.observer.cancelled()
+    }
+}
+
+/// Remeshes a triangle mesh, sound or not ([K01] §5.3).
+/// # Errors
+/// [`MeshingError`].
+pub fn from_mesh(
+    mesh: &TriMesh,
+    sampling: Sampling,
+    params: &ContourParams,
+    observer: &dyn Observer,
+) -> Result<Meshed, MeshingError> {
+    let field = MeshField::new(mesh)?;
+    let lattice = Lattice::around(&field.bounds(), sampling.spacing)?;
+    let area = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
+    lattice.check_memory(Some(area), sampling.memory)?;
+    let directed = field.sample(&lattice, &Half { observer, from: 0.0 })?;
+    let creases = field.creases(&lattice, params.sharp);
+    let extracted = extract(&directed, Some(&creases), params, &Half { observer, from: 0.5 })?;
+    Ok(meshed(extracted, &directed))
+}
+
+/// Meshes a tree of solids and meshes.
+/// # Errors
+/// [`MeshingError`].
+pub fn from_part(
+    part: &Part,
+    sampling: Sampling,
+    params: &ContourParams,
+    observer: &dyn Observer,
+) -> Result<Meshed, MeshingError> {
+    if let Some(mesh) = part.as_mesh() {
+        return from_mesh(mesh, sampling, params, observer);
+    }
+    let lattice = lattice_of(part, sampling)?;
+    let directed = part.sample(&lattice, &Half { observer, from: 0.0 })?;
+    let creases = FieldCreases::new(part, params.sharp, params.corner);
+    let extracted = extract(&directed, Some(&creases), params, &Half { observer, from: 0.5 })?;
+    Ok(meshed(extracted, &directed))
+}
+
+/// Meshes any point-wise field.
+/// # Errors
+/// [`MeshingError`].
+pub fn from_field(
+    field: &dyn Field,
+    sampling: Sampling,
+    params: &ContourParams,
+    observer: &dyn Observer,
+) -> Result<Meshed, MeshingError> {
+    let lattice = lattice_of(field, sampling)?;
+    let directed = sample(field, &lattice, &Half { observer, from: 0.0 })?;
+    let creases = FieldCreases::new(field, params.sharp, params.corner);
+    // Noisy gradients would lead the search for features astray.
+    let exact = field.noise_deg() == 0.0;
+    let creases: Option<&dyn crate::field::Creases> = if exact { Some(&creases) } else { None };
+    let extracted = extract(&directed, creases, params, &Half { observer, from: 0.5 })?;
+    Ok(meshed(extracted, &directed))
+}
+
+/// Meshes a scalar grid on its own lattice.
+/// # Errors
+/// [`MeshingError`].
+pub fn from_grid(
+    grid: &ScalarGrid,
+    grid_params: &GridParams,
+    memory: u64,
+    params: &ContourParams,
+    observer: &dyn Observer,
+) -> Result<Meshed, MeshingError> {
+    let cells = grid.size.map(|n| n.saturating_sub(1));
+    let own = Lattice { origin: grid.origin, step: grid.spacing, cells };
+    own.check_memory(None, memory)?;
+    let directed = sample_grid(grid, grid_params, &Half { observer, from: 0.0 })?;
+    let extracted = extract(&directed, None, params, &Half { observer, from: 0.5 })?;
+    Ok(meshed(extracted, &directed))
+}
+
+fn lattice_of(field: &dyn Field, sampling: Sampling) -> Result<Lattice, MeshingError> {
+    let lattice = Lattice::around(&field.bounds(), sampling.spacing)?;
+    lattice.check_memory(None, sampling.memory)?;
+    Ok(lattice)
+}
+
+fn meshed(extracted: Extracted, directed: &Directed) -> Meshed {
+    Meshed { extracted, lattice: directed.lattice, mended: directed.mended }
+}

@@ -1,0 +1,248 @@
+//! Fewer triangles: edges collapsed in the order of their quadric error, features kept.
+//!
+//! Garland and Heckbert 1997, *Surface Simplification Using Quadric Error Metrics* (area-weighted planes, the best place
+//! of the merged vertex); features as in Kobbelt et al. 2001, §5.3: a vertex on a feature line collapses along the line
+//! only, a corner stays.
+//!
+//! Refuses what would change the topology (link condition), turn a triangle, or leave a sliver; and as that does not
+//! yet rule out that two sheets touch, the result is checked by exact signs, and made again with the neighbourhood of
+//! what meets locked.
+
+mod collapse;
+
+use super::{FeatureTags, MeshError, TriMesh, check, self_intersections};
+use crate::geom::Bvh;
+use crate::observe::Observer;
+use collapse::Collapse;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// When to stop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DecimateTarget {
+    /// Keep this share of the triangles
+    Ratio(#[schemars(range(min = 0.0, max = 1.0), extend("unit" = "share"))] f64),
+    /// Keep this many triangles
+    Triangles(#[schemars(range(min = 4))] usize),
+    /// Go as far as no place of the input is farther from the result than this
+    Tolerance(#[schemars(range(min = 0.0), extend("unit" = "input units"))] f64),
+}
+
+/// How to decimate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct DecimateParams {
+    /// When to stop
+    pub target: DecimateTarget,
+    /// Edges whose triangles differ by more than this count as features where the mesh has no tags
+    #[schemars(range(min = 0.0, max = 180.0), extend("unit" = "degrees"))]
+    pub feature_angle_deg: f64,
+}
+
+impl Default for DecimateParams {
+    fn default() -> Self {
+        DecimateParams { target: DecimateTarget::Ratio(0.1), feature_angle_deg: 40.0 }
+    }
+}
+
+/// Why a mesh cannot be decimated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DecimateError {
+    /// The mesh is damaged.
+    #[error("{0}")]
+    Mesh(#[from] MeshError),
+    /// The mesh is not manifold.
+    #[error("{edges} edges have more than two triangles or run the same way; repair the mesh first")]
+    NotManifold {
+        /// Edges that are not sound.
+        edges: usize,
+    },
+    /// A target that is none.
+    #[error("a {what} of {value} is no target; give {range}")]
+    Target {
+        /// Which target.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is possible.
+        range: &'static str,
+    },
+    /// The observer wants no result any more.
+    #[error("decimation cancelled")]
+    Cancelled,
+}
+
+/// A decimated mesh.
+#[derive(Clone, Debug)]
+pub struct Decimated {
+    /// The mesh; attributes are carried along.
+    pub mesh: TriMesh,
+    /// Its features.
+    pub tags: FeatureTags,
+    /// Pairs of triangles that meet: those of the input that could not be resolved; 0 for a sound input.
+    pub self_intersections: usize,
+    /// Greatest distance from a vertex of the input to the result, world units; measured for a tolerance only.
+    pub distance: Option<f64>,
+}
+
+/// Rounds in which the neighbourhood of what meets is locked.
+const ROUNDS: usize = 6;
+/// Factor by which the inner tolerance shrinks while the result is too far.
+const TIGHTEN: f64 = 0.6;
+
+/// Decimates a manifold mesh.
+/// * `tags` - its features; found by the angle of the parameters if there are none
+/// # Errors
+/// [`DecimateError`] for meshes that are no manifold, targets that are none, or if cancelled.
+pub fn decimate(
+    mesh: &TriMesh,
+    tags: Option<&FeatureTags>,
+    params: &DecimateParams,
+    observer: &dyn Observer,
+) -> Result<Decimated, DecimateError> {
+    check(mesh)?;
+    if mesh.triangles.is_empty() {
+        return Err(MeshError::Empty.into());
+    }
+    let wrong = |what, value, range| Err(DecimateError::Target { what, value, range });
+    let (count, mut tolerance) = match params.target {
+        DecimateTarget::Ratio(r) if r > 0.0 && r <= 1.0 => ((mesh.triangles.len() as f64 * r) as usize, f64::INFINITY),
+        DecimateTarget::Ratio(r) => return wrong("ratio", r, "a number above 0 and at most 1"),
+        DecimateTarget::Triangles(n) if n >= 4 => (n, f64::INFINITY),
+        DecimateTarget::Triangles(n) => return wrong("number of triangles", n as f64, "at least 4"),
+        DecimateTarget::Tolerance(t) if t > 0.0 && t.is_finite() => (0, t),
+        DecimateTarget::Tolerance(t) => return wrong("tolerance", t, "a length above 0"),
+    };
+    let found;
+    let tags = match tags {
+        Some(tags) if tags.vertices.len() == mesh.points.len() => tags,
+        _ => {
+            found = sharp_tags(mesh, params.feature_angle_deg);
+            &found
+        }
+    };
+    let allowed = match params.target {
+        DecimateTarget::Tolerance(t) => Some(t),
+        _ => None,
+    };
+    let mut locked = vec![false; mesh.points.len()];
+    let mut before = None;
+    for round in 0..=ROUNDS {
+        let mut collapse = Collapse::new(mesh, tags, &locked)?;
+        collapse.run(count, tolerance, observer)?;
+        let (result, result_tags, source) = collapse.finish();
+        let distance = allowed.map(|_| farthest(mesh, &result));
+        if let (Some(t), Some(d)) = (allowed, distance)
+            && d > t
+            && round < ROUNDS
+        {
+            tolerance *= TIGHTEN;
+            continue;
+        }
+        let meeting = self_intersections(&result);
+        if !meeting.is_empty() && round < ROUNDS {
+            // What the input has already is not ours to mend.
+            let own = *before.get_or_insert_with(|| self_intersections(mesh).len());
+            if meeting.len() > own {
+                lock(mesh, &result, &source, &meeting, &mut locked);
+                continue;
+            }
+        }
+        observer.progress(1.0);
+        let mut result = result;
+        result_tags.mark(&mut result);
+        return Ok(Decimated { mesh: result, tags: result_tags, self_intersections: meeting.len(), distance });
+    }
+    unreachable!("the last round returns")
+}
+
+/// Features by the angle between neighbours.
+fn sharp_tags(mesh: &TriMesh, angle_deg: f64) -> FeatureTags {
+    let adjacency = super::Adjacency::new(mesh);
+    let sharp = super::sharp_edges(mesh, &adjacency, angle_deg);
+    let edges = (0..sharp.len() as u32)
+        .filter(|&h| sharp[h as usize])
+        .map(|h| [mesh.origin(h), mesh.origin(super::next(h))]);
+    FeatureTags::from_edges(mesh.points.len(), edges)
+}
+
+/// Greatest distance from a vertex of `from` to `to`.
+fn farthest(from: &TriMesh, to: &TriMesh) -> f64 {
+    let bvh = Bvh::new(to);
+    let mut used = vec![false; from.points.len()];
+    from.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+    from.points
+        .par_iter()
+        .enumerate()
+        .filter(|(v, _)| used[*v])
+        .map(|(_, &p)| bvh.closest(p).distance)
+        .reduce(|| 0.0, f64::max)
+}
+
+/// Locks the vertices of the input around the corners of triangles that meet.
+fn lock(mesh: &TriMesh, result: &TriMesh, source: &[u32], meeting: &[[u32; 2]], locked: &mut [bool]) {
+    let mut ring = vec![false; locked.len()];
+    for &v in meeting.iter().flatten().flat_map(|&t| &result.triangles[t as usize]) {
+        ring[source[v as usize] as usize] = true;
+    }
+    // Everything that was merged nearby is within a few rings.
+    for _ in 0..3 {
+        let before = ring.clone();
+        for t in mesh.triangles.iter().filter(|t| t.iter().any(|&v| before[v as usize])) {
+            t.iter().for_each(|&v| ring[v as usize] = true);
+        }
+    }
+    locked.iter_mut().zip(ring).for_each(|(l, r)| *l |= r);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Silent;
+    use crate::mesh::{diagnose, shapes};
+
+    fn to(target: DecimateTarget) -> DecimateParams {
+        DecimateParams { target, ..Default::default() }
+    }
+
+    #[test]
+    fn cube_of_4800_triangles_becomes_one_of_12_with_its_8_corners() {
+        let cube = shapes::cuboid(glam::DVec3::new(1.0, 2.0, 3.0), 20);
+        let found = decimate(&cube, None, &to(DecimateTarget::Triangles(12)), &Silent).unwrap();
+        assert_eq!(found.mesh.triangles.len(), 12);
+        let d = diagnose(&found.mesh);
+        assert!(d.watertight && d.manifold && (d.volume.unwrap() - 6.0).abs() < 1e-9);
+        assert_eq!(found.tags.edges.len(), 12);
+    }
+
+    #[test]
+    fn sphere_to_a_tenth_stays_within_half_a_percent_closed_and_free_of_self_intersections() {
+        let sphere = shapes::sphere(1.0, 5);
+        let found = decimate(&sphere, None, &to(DecimateTarget::Ratio(0.1)), &Silent).unwrap();
+        let d = diagnose(&found.mesh);
+        assert!(d.watertight && d.manifold && d.genus == Some(0) && d.flipped_faces == 0);
+        assert!((found.mesh.triangles.len() as i64 - 2048).abs() <= 1, "{}", found.mesh.triangles.len());
+        assert!(farthest(&sphere, &found.mesh) < 0.005);
+        assert_eq!(found.self_intersections, 0);
+    }
+
+    #[test]
+    fn a_tolerance_is_kept_and_the_rim_of_an_open_mesh_stays() {
+        let disk = shapes::annulus(1.0, 2.0, 96);
+        let found = decimate(&disk, None, &to(DecimateTarget::Tolerance(0.01)), &Silent).unwrap();
+        assert!(found.distance.unwrap() <= 0.01);
+        let (a, b) = (diagnose(&disk), diagnose(&found.mesh));
+        assert_eq!(b.boundary_loops, a.boundary_loops);
+        assert!((a.area - b.area).abs() < 0.01 * a.area && b.triangles * 3 < a.triangles);
+    }
+
+    #[test]
+    fn targets_that_are_none_are_refused() {
+        let cube = shapes::cuboid(glam::DVec3::ONE, 2);
+        for target in [DecimateTarget::Ratio(0.0), DecimateTarget::Triangles(1), DecimateTarget::Tolerance(f64::NAN)] {
+            assert!(matches!(decimate(&cube, None, &to(target), &Silent), Err(DecimateError::Target { .. })));
+        }
+    }
+}

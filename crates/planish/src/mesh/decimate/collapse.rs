@@ -1,0 +1,491 @@
+//! The collapsing itself, on half-edges.
+
+use super::DecimateError;
+use crate::mesh::{Adjacency, Attribute, FeatureKind, FeatureTags, NONE, TriMesh, next, previous};
+use crate::observe::Observer;
+use glam::{DMat3, DVec3};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// A sum of squared distances from planes, by area, relative to the middle of the mesh.
+#[derive(Clone, Copy, Default)]
+struct Quadric {
+    a: [f64; 6],
+    b: DVec3,
+    c: f64,
+    weight: f64,
+}
+
+impl Quadric {
+    fn plane(n: DVec3, p: DVec3, weight: f64) -> Quadric {
+        let d = -n.dot(p);
+        let w = n * weight;
+        Quadric { a: [w.x * n.x, w.x * n.y, w.x * n.z, w.y * n.y, w.y * n.z, w.z * n.z], b: w * d, c: weight * d * d, weight }
+    }
+
+    fn plus(mut self, o: &Quadric) -> Quadric {
+        for k in 0..6 {
+            self.a[k] += o.a[k];
+        }
+        self.b += o.b;
+        self.c += o.c;
+        self.weight += o.weight;
+        self
+    }
+
+    fn times(&self, p: DVec3) -> DVec3 {
+        let a = &self.a;
+        DVec3::new(
+            a[0] * p.x + a[1] * p.y + a[2] * p.z,
+            a[1] * p.x + a[3] * p.y + a[4] * p.z,
+            a[2] * p.x + a[4] * p.y + a[5] * p.z,
+        )
+    }
+
+    fn at(&self, p: DVec3) -> f64 {
+        (p.dot(self.times(p)) + 2.0 * self.b.dot(p) + self.c).max(0.0)
+    }
+
+    /// The best place, drawn to `near` where the planes leave it free.
+    fn best(&self, near: DVec3) -> DVec3 {
+        let a = &self.a;
+        let pull = PULL * (a[0] + a[3] + a[5]);
+        let m = DMat3::from_cols(
+            DVec3::new(a[0] + pull, a[1], a[2]),
+            DVec3::new(a[1], a[3] + pull, a[4]),
+            DVec3::new(a[2], a[4], a[5] + pull),
+        );
+        let x = near - m.inverse() * (self.times(near) + self.b);
+        if x.is_finite() { x } else { near }
+    }
+}
+
+/// Pull towards the edge, relative to the quadric: keeps places on flat and straight parts evenly spread.
+const PULL: f64 = 1e-4;
+/// Weight of the planes that hold a feature line in place, relative to those of the surface.
+const LINE: f64 = 4.0;
+/// A triangle may turn so far (cosine), and its height shrink to this share of its longest edge.
+const TURN: f64 = 0.2;
+const SLIVER: f64 = 0.01;
+/// Collapses between two looks at the observer.
+const LOOK: usize = 1 << 12;
+
+/// State of a mesh that is being decimated.
+pub struct Collapse<'a> {
+    mesh: &'a TriMesh,
+    center: DVec3,
+    points: Vec<DVec3>,
+    attributes: Vec<Attribute>,
+    triangles: Vec<[u32; 3]>,
+    alive: Vec<bool>,
+    count: usize,
+    opposite: Vec<u32>,
+    outgoing: Vec<u32>,
+    /// For each half-edge whether it is a feature (or on the boundary).
+    feature: Vec<bool>,
+    kind: Vec<Kind>,
+    quadrics: Vec<Quadric>,
+    stamp: Vec<u32>,
+    heap: BinaryHeap<Reverse<(u64, u32, u32)>>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Free,
+    Line,
+    Fixed,
+}
+
+impl<'a> Collapse<'a> {
+    /// Prepares a mesh; vertices that are `locked` stay.
+    pub fn new(mesh: &'a TriMesh, tags: &FeatureTags, locked: &[bool]) -> Result<Collapse<'a>, DecimateError> {
+        let adjacency = Adjacency::new(mesh);
+        let unsound = unsound_edges(mesh, &adjacency);
+        if unsound > 0 {
+            return Err(DecimateError::NotManifold { edges: unsound });
+        }
+        let center = mesh.bounds().center();
+        let points: Vec<DVec3> = mesh.points.iter().map(|p| *p - center).collect();
+        let half_edges = adjacency.opposite.len();
+        let mut feature = vec![false; half_edges];
+        let mut lines = vec![0u32; points.len()];
+        for h in 0..half_edges as u32 {
+            let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
+            let open = adjacency.opposite[h as usize] == NONE;
+            if open || tags.edges.binary_search(&[a.min(b), a.max(b)]).is_ok() {
+                feature[h as usize] = true;
+                if open || a < b {
+                    lines[a as usize] += 1;
+                    lines[b as usize] += 1;
+                }
+            }
+        }
+        let kind = (0..points.len())
+            .map(|v| match (lines[v], tags.vertices[v]) {
+                _ if locked[v] => Kind::Fixed,
+                (_, FeatureKind::Corner) => Kind::Fixed,
+                (0, FeatureKind::None) => Kind::Free,
+                (2, _) => Kind::Line,
+                _ => Kind::Fixed,
+            })
+            .collect();
+        let mut quadrics = vec![Quadric::default(); points.len()];
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(|v| points[v as usize]);
+            let n = (b - a).cross(c - a);
+            let area = n.length();
+            if area > 0.0 {
+                let q = Quadric::plane(n / area, a, area / 6.0);
+                t.iter().for_each(|&v| quadrics[v as usize] = quadrics[v as usize].plus(&q));
+            }
+        }
+        for h in (0..half_edges as u32).filter(|&h| feature[h as usize]) {
+            // Planes through the edge, upright on its triangle.
+            let ends = [mesh.origin(h), mesh.origin(next(h))];
+            let [a, b] = ends.map(|v| points[v as usize]);
+            let n = mesh.area_vector(h as usize / 3).cross(b - a).normalize_or_zero();
+            let q = Quadric { weight: 0.0, ..Quadric::plane(n, a, LINE * (b - a).length_squared() / 6.0) };
+            ends.iter().for_each(|&v| quadrics[v as usize] = quadrics[v as usize].plus(&q));
+        }
+        let mut collapse = Collapse {
+            mesh,
+            center,
+            attributes: mesh.attributes.clone(),
+            triangles: mesh.triangles.clone(),
+            alive: vec![true; mesh.triangles.len()],
+            count: mesh.triangles.len(),
+            opposite: adjacency.opposite,
+            outgoing: adjacency.outgoing,
+            feature,
+            kind,
+            quadrics,
+            stamp: vec![0; points.len()],
+            heap: BinaryHeap::new(),
+            points,
+        };
+        collapse.queue();
+        Ok(collapse)
+    }
+
+    /// Puts all edges into the queue.
+    fn queue(&mut self) {
+        let edge = |&h: &u32| {
+            let g = self.opposite[h as usize];
+            self.alive[h as usize / 3] && (g == NONE || h < g)
+        };
+        let half_edges = self.opposite.len() as u32;
+        let all: Vec<_> = (0..half_edges).filter(edge).filter_map(|h| self.entry(h).map(Reverse)).collect();
+        self.heap = BinaryHeap::from(all);
+    }
+
+    /// Collapses until `count` triangles are left or the next collapse is farther than `tolerance`.
+    pub fn run(&mut self, count: usize, tolerance: f64, observer: &dyn Observer) -> Result<(), DecimateError> {
+        let start = self.count;
+        let mut steps = 0;
+        let mut before = self.count;
+        while self.count > count {
+            let Some(Reverse((_, h, stamp))) = self.heap.pop() else {
+                // What was not allowed once may be now.
+                if self.count == before {
+                    break;
+                }
+                before = self.count;
+                self.queue();
+                continue;
+            };
+            if !self.alive[h as usize / 3] {
+                continue;
+            }
+            let (a, b) = self.ends(h);
+            if self.stamp[a as usize].wrapping_add(self.stamp[b as usize]) != stamp {
+                continue;
+            }
+            let Some((p, cost)) = self.place(h) else { continue };
+            let weight = self.quadrics[a as usize].weight + self.quadrics[b as usize].weight;
+            if cost > tolerance * tolerance * weight {
+                continue;
+            }
+            if self.allowed(h, p) {
+                self.collapse(h, p);
+            }
+            steps += 1;
+            if steps % LOOK == 0 {
+                if observer.cancelled() {
+                    return Err(DecimateError::Cancelled);
+                }
+                observer.progress((start - self.count) as f64 / (start - count.min(start - 1)) as f64);
+            }
+        }
+        Ok(())
+    }
+
+    /// The mesh, its tags, and for each vertex the one of the input that it comes from.
+    pub fn finish(self) -> (TriMesh, FeatureTags, Vec<u32>) {
+        let mut name = vec![u32::MAX; self.points.len()];
+        let mut source = Vec::new();
+        let mut triangles = Vec::with_capacity(self.count);
+        for (_, triangle) in self.triangles.iter().enumerate().filter(|(t, _)| self.alive[*t]) {
+            triangles.push(triangle.map(|v| {
+                if name[v as usize] == u32::MAX {
+                    name[v as usize] = source.len() as u32;
+                    source.push(v);
+                }
+                name[v as usize]
+            }));
+        }
+        let points = source
+            .iter()
+            .map(|&v| {
+                // Vertices that never moved keep their bits.
+                if self.stamp[v as usize] == 0 { self.mesh.points[v as usize] } else { self.points[v as usize] + self.center }
+            })
+            .collect();
+        let mut edges = Vec::new();
+        for h in (0..self.feature.len() as u32).filter(|&h| self.alive[h as usize / 3] && self.feature[h as usize]) {
+            if self.opposite[h as usize] != NONE {
+                let (a, b) = self.ends(h);
+                edges.push([name[a as usize], name[b as usize]]);
+            }
+        }
+        let tags = FeatureTags::from_edges(source.len(), edges);
+        let mut mesh = TriMesh::new(points, triangles);
+        mesh.attributes = self
+            .attributes
+            .iter()
+            .filter(|a| a.name != crate::mesh::FEATURE)
+            .map(|a| Attribute {
+                name: a.name.clone(),
+                width: a.width,
+                values: source
+                    .iter()
+                    .flat_map(|&v| a.values[v as usize * a.width..(v as usize + 1) * a.width].iter().copied())
+                    .collect(),
+            })
+            .collect();
+        (mesh, tags, source)
+    }
+
+    fn ends(&self, h: u32) -> (u32, u32) {
+        (self.from(h), self.from(next(h)))
+    }
+
+    fn from(&self, h: u32) -> u32 {
+        self.triangles[h as usize / 3][h as usize % 3]
+    }
+
+    /// The entry of an edge in the queue.
+    fn entry(&self, h: u32) -> Option<(u64, u32, u32)> {
+        let (_, cost) = self.place(h)?;
+        let (a, b) = self.ends(h);
+        // Costs are not negative: their bits are in order.
+        Some((cost.to_bits(), h, self.stamp[a as usize].wrapping_add(self.stamp[b as usize])))
+    }
+
+    /// Where the two ends of an edge would meet, and the error there; `None` if they must not.
+    fn place(&self, h: u32) -> Option<(DVec3, f64)> {
+        let (a, b) = self.ends(h);
+        let (ka, kb) = (self.kind[a as usize], self.kind[b as usize]);
+        let (pa, pb) = (self.points[a as usize], self.points[b as usize]);
+        let q = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
+        let line = self.feature[h as usize];
+        let p = match (ka, kb) {
+            (Kind::Fixed, Kind::Fixed) => return None,
+            (Kind::Free, Kind::Free) => {
+                let middle = (pa + pb) / 2.0;
+                let p = q.best(middle);
+                // Nearly parallel planes meet far away.
+                if p.distance_squared(middle) > 4.0 * pa.distance_squared(pb) { middle } else { p }
+            }
+            (Kind::Free, _) => pb,
+            (_, Kind::Free) => pa,
+            _ if !line => return None,
+            (Kind::Fixed, _) => pa,
+            (_, Kind::Fixed) => pb,
+            (Kind::Line, Kind::Line) => {
+                // On the edge itself.
+                let d = pb - pa;
+                let slope = d.dot(q.times(pa) + q.b);
+                let bend = d.dot(q.times(d));
+                let s = if bend > 0.0 { (-slope / bend).clamp(0.0, 1.0) } else { 0.5 };
+                pa + d * s
+            }
+        };
+        Some((p, q.at(p)))
+    }
+
+    /// Half-edges that leave `v`.
+    fn fan(&self, v: u32) -> impl Iterator<Item = u32> + '_ {
+        let first = self.outgoing[v as usize];
+        let mut h = first;
+        std::iter::from_fn(move || {
+            if h == NONE {
+                return None;
+            }
+            let here = h;
+            let turned = self.opposite[previous(h) as usize];
+            h = if turned == first { NONE } else { turned };
+            Some(here)
+        })
+    }
+
+    /// Neighbours of `v`.
+    fn neighbours(&self, v: u32, out: &mut Vec<u32>) {
+        out.clear();
+        for h in self.fan(v) {
+            out.push(self.from(next(h)));
+            if self.opposite[previous(h) as usize] == NONE {
+                out.push(self.from(previous(h)));
+            }
+        }
+    }
+
+    fn allowed(&self, h: u32, p: DVec3) -> bool {
+        let (a, b) = self.ends(h);
+        let g = self.opposite[h as usize];
+        let sides = [Some(h), (g != NONE).then_some(g)];
+        let apex: Vec<u32> = sides.into_iter().flatten().map(|h| self.from(previous(h))).collect();
+        let on_rim = |v: u32| self.fan(v).any(|h| self.opposite[h as usize] == NONE || self.opposite[previous(h) as usize] == NONE);
+        // Two places of the rim that are joined across the mesh must stay apart.
+        if g != NONE && on_rim(a) && on_rim(b) {
+            return false;
+        }
+        // Common neighbours are the two apices and no others.
+        let (mut na, mut nb) = (Vec::with_capacity(16), Vec::with_capacity(16));
+        self.neighbours(a, &mut na);
+        self.neighbours(b, &mut nb);
+        if na.iter().filter(|v| nb.contains(v)).count() != apex.len() {
+            return false;
+        }
+        // A tetrahedron has nothing to lose.
+        if g != NONE && na.len() == 3 && nb.len() == 3 {
+            return false;
+        }
+        for side in sides.into_iter().flatten() {
+            let (x, y) = (next(side), previous(side));
+            // Two feature lines, or two rims, would fall together.
+            if self.feature[x as usize] && self.feature[y as usize] {
+                return false;
+            }
+            if self.opposite[x as usize] == NONE && self.opposite[y as usize] == NONE {
+                return false;
+            }
+        }
+        for (v, other) in [(a, b), (b, a)] {
+            for h in self.fan(v) {
+                let (x, y) = (self.from(next(h)), self.from(previous(h)));
+                if x == other || y == other {
+                    continue;
+                }
+                let (px, py) = (self.points[x as usize], self.points[y as usize]);
+                let pv = self.points[v as usize];
+                let (old, new) = ((px - pv).cross(py - pv), (px - p).cross(py - p));
+                let (lo, ln) = (old.length(), new.length());
+                if old.dot(new) < TURN * lo * ln || ln == 0.0 {
+                    return false;
+                }
+                let longest = (px - p).length_squared().max((py - p).length_squared()).max((px - py).length_squared());
+                let before = (px - pv).length_squared().max((py - pv).length_squared()).max((px - py).length_squared());
+                // Slivers may stay, but not arise.
+                if ln < SLIVER * longest && ln / longest < lo / before {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// Merges the start of `h` into its end, at `p`.
+    fn collapse(&mut self, h: u32, p: DVec3) {
+        let (a, b) = self.ends(h);
+        let (pa, pb) = (self.points[a as usize], self.points[b as usize]);
+        let d = pb - pa;
+        let s = ((p - pa).dot(d) / d.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0) as f32;
+        for attribute in &mut self.attributes {
+            for k in 0..attribute.width {
+                let (x, y) = (a as usize * attribute.width + k, b as usize * attribute.width + k);
+                attribute.values[y] = attribute.values[x] * (1.0 - s) + attribute.values[y] * s;
+            }
+        }
+        if self.kind[a as usize] == Kind::Fixed || self.kind[b as usize] == Kind::Free {
+            self.kind[b as usize] = self.kind[a as usize];
+        }
+        self.points[b as usize] = p;
+        self.quadrics[b as usize] = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
+        let g = self.opposite[h as usize];
+        let fan: Vec<u32> = self.fan(a).collect();
+        for f in fan {
+            self.triangles[f as usize / 3][f as usize % 3] = b;
+        }
+        let mut rest = NONE;
+        for side in [h, g] {
+            if side == NONE {
+                continue;
+            }
+            let (x, y) = (next(side), previous(side));
+            let (ox, oy) = (self.opposite[x as usize], self.opposite[y as usize]);
+            let feature = self.feature[x as usize] || self.feature[y as usize];
+            let apex = self.from(y);
+            if ox != NONE {
+                self.opposite[ox as usize] = oy;
+                self.feature[ox as usize] = feature || oy == NONE;
+            }
+            if oy != NONE {
+                self.opposite[oy as usize] = ox;
+                self.feature[oy as usize] = feature || ox == NONE;
+            }
+            self.alive[side as usize / 3] = false;
+            self.count -= 1;
+            // A half-edge of a living triangle that leaves the apex, and one that leaves b.
+            let (leaves_apex, leaves_b) = if ox != NONE { (ox, next(ox)) } else { (next(oy), oy) };
+            let pick = |one: u32, v: u32, this: &Self| if this.from(one) == v { one } else { this.leaving(one, v) };
+            self.outgoing[apex as usize] = self.settled(pick(leaves_apex, apex, self));
+            rest = pick(leaves_b, b, self);
+        }
+        self.outgoing[b as usize] = self.settled(rest);
+        self.stamp[b as usize] += 1;
+        self.outgoing[a as usize] = NONE;
+        let fan: Vec<u32> = self.fan(b).collect();
+        for f in fan {
+            let edges = [Some(f), (self.opposite[previous(f) as usize] == NONE).then(|| previous(f))];
+            for e in edges.into_iter().flatten() {
+                if let Some(entry) = self.entry(e) {
+                    self.heap.push(Reverse(entry));
+                }
+            }
+        }
+    }
+
+    /// The half-edge of the triangle of `h` that leaves `v`.
+    fn leaving(&self, h: u32, v: u32) -> u32 {
+        let first = h - h % 3;
+        (first..first + 3).find(|&h| self.from(h) == v).unwrap_or(h)
+    }
+
+    /// Turns back around the start of `h` to the rim, so that a fan sees all triangles.
+    fn settled(&self, h: u32) -> u32 {
+        let mut at = h;
+        loop {
+            let g = self.opposite[at as usize];
+            if g == NONE {
+                return at;
+            }
+            at = next(g);
+            if at == h {
+                return h;
+            }
+        }
+    }
+}
+
+/// Edges with more than two triangles, or two that run the same way: adjacency takes them for boundaries.
+fn unsound_edges(mesh: &TriMesh, adjacency: &Adjacency) -> usize {
+    let mut open: Vec<[u32; 2]> = (0..adjacency.opposite.len() as u32)
+        .filter(|&h| adjacency.opposite[h as usize] == NONE)
+        .map(|h| {
+            let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
+            [a.min(b), a.max(b)]
+        })
+        .collect();
+    open.sort_unstable();
+    open.chunk_by(|a, b| a == b).filter(|run| run.len() > 1).count()
+}

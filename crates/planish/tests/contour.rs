@@ -1,0 +1,350 @@
+//! Extraction: exact cases, convergence, the certificate on made and measured meshes.
+
+mod common;
+#[path = "common/zone.rs"]
+mod zone;
+
+use planish::contour::{self, ContourParams, Meshed, Sampling};
+use planish::field::{Milling, Move, Part, Solid, Spacing, Tool};
+use planish::geom::{Aabb, random};
+use planish::mesh::{Diagnosis, FeatureKind, TriMesh, diagnose, self_intersections};
+use planish::{DVec3, Silent};
+
+fn at(n: usize) -> Sampling {
+    Sampling { spacing: Spacing::Resolution(n), memory: 4 << 30 }
+}
+
+fn of_solid(solid: &Solid, n: usize) -> Meshed {
+    contour::from_part(&Part::Solid(solid.clone()), at(n), &ContourParams::default(), &Silent).unwrap()
+}
+
+fn of_mesh(mesh: &TriMesh, n: usize) -> Meshed {
+    contour::from_mesh(mesh, at(n), &ContourParams::default(), &Silent).unwrap()
+}
+
+/// Closed, manifold, oriented, and no two triangles meet.
+fn certified(name: &str, mesh: &TriMesh) -> Diagnosis {
+    let d = diagnose(mesh);
+    assert!(d.watertight && d.manifold && d.flipped_faces == 0, "{name}: {d:?}");
+    assert_eq!(self_intersections(mesh).len(), 0, "{name}");
+    d
+}
+
+fn box_of(size: DVec3) -> Solid {
+    Solid::Cuboid { size, round: 0.0 }
+}
+
+#[test]
+fn boxes_straight_and_turned_have_their_8_corners_to_1e_9_of_the_size_and_12_straight_edges() {
+    let size = DVec3::new(2.0, 1.5, 1.0);
+    let straight = box_of(size);
+    for (name, turned, solid) in [
+        ("straight", glam::DQuat::IDENTITY, straight.clone()),
+        (
+            "turned",
+            glam::DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -1.5).normalize(), 0.7),
+            straight.turned(DVec3::new(1.0, 2.0, -1.5), 0.7f64.to_degrees()),
+        ),
+    ] {
+        let made = of_solid(&solid, 40);
+        let mesh = &made.extracted.mesh;
+        let tags = &made.extracted.tags;
+        certified(name, mesh);
+        let corners: Vec<DVec3> = (0..mesh.points.len())
+            .filter(|&v| tags.vertices[v] == FeatureKind::Corner)
+            .map(|v| turned.inverse() * mesh.points[v])
+            .collect();
+        assert_eq!(corners.len(), 8, "{name}");
+        for c in corners {
+            let off = (c.abs() - size / 2.0).abs().max_element();
+            assert!(off < 1e-9 * 2.0, "{name}: corner off by {off}");
+        }
+        for &[a, b] in &tags.edges {
+            for v in [a, b] {
+                let q = ((turned.inverse() * mesh.points[v as usize]).abs() - size / 2.0).abs();
+                let on = [q.x, q.y, q.z].iter().filter(|x| **x < 1e-7).count();
+                assert!(on >= 2, "{name}: a feature vertex lies off the edges: {q}");
+            }
+        }
+        let length: f64 = tags.edges.iter().map(|e| mesh.points[e[0] as usize].distance(mesh.points[e[1] as usize])).sum();
+        assert!((length - 4.0 * (2.0 + 1.5 + 1.0)).abs() < 1e-6, "{name}: {length}");
+    }
+}
+
+#[test]
+fn sphere_converges_with_second_order_and_its_normals_with_first() {
+    let sphere = Solid::Sphere { radius: 1.0 };
+    let errors: Vec<[f64; 2]> = [16, 32, 64]
+        .map(|n| {
+            let mesh = of_solid(&sphere, n).extracted.mesh;
+            certified("sphere", &mesh);
+            let mut off = [0.0f64; 2];
+            for t in 0..mesh.triangles.len() {
+                let [a, b, c] = mesh.corners(t);
+                let m = (a + b + c) / 3.0;
+                off[0] = off[0].max((m.length() - 1.0).abs());
+                // Slivers have any normal; their area counts.
+                off[1] += mesh.area_vector(t).cross(m.normalize()).length();
+            }
+            off
+        })
+        .to_vec();
+    for k in 0..2 {
+        for (power, order) in [(0, 1.7), (1, 0.85)] {
+            let rate = (errors[k][power] / errors[k + 1][power]).log2();
+            assert!(rate > order, "{power}: rate {rate} of {errors:?}");
+        }
+    }
+}
+
+#[test]
+fn rim_of_a_cylinder_converges_to_the_circle_and_is_tagged_all_around() {
+    let cylinder = Solid::Cylinder { radius: 1.0, height: 1.3 }.turned(DVec3::new(1.0, 0.3, 0.2), 33.0);
+    let turn = glam::DQuat::from_axis_angle(DVec3::new(1.0, 0.3, 0.2).normalize(), 33f64.to_radians());
+    for n in [24, 48] {
+        let made = of_solid(&cylinder, n);
+        let (mesh, tags) = (&made.extracted.mesh, &made.extracted.tags);
+        certified("cylinder", mesh);
+        let mut length = 0.0;
+        for e in &tags.edges {
+            let [a, b] = e.map(|v| mesh.points[v as usize]);
+            length += a.distance(b);
+            let q = turn.inverse() * a;
+            assert!((q.truncate().length() - 1.0).abs() < 2e-3 && (q.z.abs() - 0.65).abs() < 2e-3, "{q}");
+        }
+        let wanted = 4.0 * std::f64::consts::PI;
+        assert!((length / wanted - 1.0).abs() < 0.03, "{n}: {length} of {wanted}");
+    }
+}
+
+#[test]
+fn creases_from_15_to_150_degrees_are_found_with_99_5_percent_precision_and_recall() {
+    for angle in [15.0f64, 30.0, 60.0, 90.0, 120.0, 150.0] {
+        // Two half spaces in a ball: one crease along y, and the circle where they meet the ball.
+        let half = (angle / 2.0).to_radians();
+        let plane = |s: f64| Solid::Plane { normal: DVec3::new(s * half.sin(), 0.0, half.cos()), offset: 0.1 };
+        let body = Solid::Intersection(vec![plane(1.0), plane(-1.0), box_of(DVec3::new(1.6, 1.7, 1.9))])
+            .turned(DVec3::new(0.3, 1.0, 0.5), 25.0);
+        let params = ContourParams { sharp: 12f64.to_radians().cos(), ..Default::default() };
+        let made = contour::from_part(&Part::Solid(body), at(48), &params, &Silent).unwrap();
+        let (mesh, tags) = (&made.extracted.mesh, &made.extracted.tags);
+        certified("crease", mesh);
+        let turn = glam::DQuat::from_axis_angle(DVec3::new(0.3, 1.0, 0.5).normalize(), 25f64.to_radians());
+        let crest = 0.1 / half.cos();
+        let on_crease = |p: DVec3| {
+            let q = turn.inverse() * p;
+            q.x.hypot(q.z - crest) < 1e-6 && q.y.abs() < 0.85 + 1e-6
+        };
+        // Recall: the crease's length; precision: no tagged vertex inside a face.
+        let length: f64 = tags
+            .edges
+            .iter()
+            .map(|e| e.map(|v| mesh.points[v as usize]))
+            .filter(|e| e.iter().all(|&p| on_crease(p)))
+            .map(|[a, b]| a.distance(b))
+            .sum();
+        assert!(length > 0.995 * 1.7 && length < 1.005 * 1.7, "{angle} degrees: {length} of 1.7");
+        let flat = |p: DVec3| {
+            let q = turn.inverse() * p;
+            let walls = [(q.x.abs() - 0.8).abs(), (q.y.abs() - 0.85).abs(), (q.z.abs() - 0.95).abs()];
+            let roofs = [1.0, -1.0].map(|s| (s * half.sin() * q.x + half.cos() * q.z - 0.1).abs());
+            walls.iter().chain(&roofs).filter(|d| **d < 1e-5).count() < 2
+        };
+        let tagged: Vec<usize> = (0..mesh.points.len()).filter(|&v| tags.vertices[v] != FeatureKind::None).collect();
+        let off = tagged.iter().filter(|&&v| flat(mesh.points[v])).count();
+        assert!(off * 200 <= tagged.len(), "{angle} degrees: {off} of {} tagged vertices lie in a face", tagged.len());
+    }
+}
+
+#[test]
+fn corners_where_3_to_6_faces_meet_are_hit_within_2_hundredths_of_a_cell() {
+    for valence in 3..=6 {
+        let mut planes: Vec<Solid> = (0..valence)
+            .map(|k| {
+                let a = std::f64::consts::TAU * (k as f64 + 0.3) / valence as f64;
+                let normal = DVec3::new(a.cos(), a.sin(), 0.8).normalize();
+                Solid::Plane { normal, offset: normal.dot(DVec3::new(0.01, 0.02, 0.9)) }
+            })
+            .collect();
+        planes.push(box_of(DVec3::splat(1.8)));
+        let made = of_solid(&Solid::Intersection(planes), 40);
+        certified("pyramid", &made.extracted.mesh);
+        let tip = DVec3::new(0.01, 0.02, 0.9);
+        let (v, d) = made
+            .extracted
+            .mesh
+            .points
+            .iter()
+            .enumerate()
+            .map(|(v, p)| (v, p.distance(tip)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .unwrap();
+        assert!(d < 0.02 * made.lattice.step.x, "valence {valence}: off by {d}");
+        assert_eq!(made.extracted.tags.vertices[v], FeatureKind::Corner);
+    }
+}
+
+#[test]
+fn closed_meshes_come_back_certified_with_their_genus_and_volume() {
+    for (name, mesh, genus) in common::closed_meshes() {
+        for n in [24, 65] {
+            let made = of_mesh(&mesh, n);
+            let d = certified(name, &made.extracted.mesh);
+            assert_eq!(d.genus, Some(genus), "{name} at {n}");
+            let (a, b) = (d.volume.unwrap(), diagnose(&mesh).volume.unwrap());
+            assert!((a / b - 1.0).abs() < 0.02, "{name} at {n}: {a} {b}");
+            assert_eq!(made.mended, 0, "{name}: the three axes agree");
+        }
+    }
+}
+
+#[test]
+fn lattices_through_the_vertices_of_a_cube_are_decided_without_a_gap() {
+    // Every face, edge and corner of the cube lies on planes of nodes.
+    let mesh = planish::mesh::shapes::cuboid(DVec3::splat(8.0), 4);
+    let lattice =
+        planish::field::Lattice { origin: mesh.bounds().min - 2.0, step: DVec3::ONE, cells: [12; 3] };
+    let field = planish::field::MeshField::new(&mesh).unwrap();
+    let directed = field.sample(&lattice, &Silent).unwrap();
+    assert_eq!(directed.mended, 0);
+    let found = contour::extract(&directed, None, &ContourParams::default(), &Silent).unwrap();
+    let d = certified("cube on nodes", &found.mesh);
+    assert!((d.volume.unwrap() / 512.0 - 1.0).abs() < 1e-6, "{:?}", d.volume);
+}
+
+#[test]
+fn meshes_with_holes_and_intersections_are_closed() {
+    let mut open = planish::mesh::shapes::sphere(1.0, 4);
+    open.triangles.retain(|t| !t.iter().all(|&v| open.points[v as usize].z > 0.9));
+    let d = certified("open sphere", &of_mesh(&open, 40).extracted.mesh);
+    assert_eq!(d.genus, Some(0));
+    assert!((d.volume.unwrap() / 4.18 - 1.0).abs() < 0.05, "{:?}", d.volume);
+    let mut two = planish::mesh::shapes::sphere(1.0, 4);
+    let n = two.points.len() as u32;
+    two.points.extend_from_within(..);
+    two.points[n as usize..].iter_mut().for_each(|p| p.x += 0.9);
+    two.triangles.extend_from_within(..);
+    let half = two.triangles.len() / 2;
+    two.triangles[half..].iter_mut().for_each(|t| *t = t.map(|v| v + n));
+    let d = certified("two spheres", &of_mesh(&two, 40).extracted.mesh);
+    assert_eq!((d.genus, d.components), (Some(0), 1));
+}
+
+#[test]
+fn measured_meshes_are_certified_at_65_cells() {
+    for name in ["fandisk", "joint", "casting", "rocker_arm", "sharp_sphere", "goathead", "armadillo", "thin_sheet"] {
+        let Some(mesh) = common::data_mesh(&format!("{name}.ply")) else { continue };
+        let made = of_mesh(&mesh, 65);
+        let d = certified(name, &made.extracted.mesh);
+        assert_eq!(made.mended, 0, "{name}");
+        if ["fandisk", "joint", "rocker_arm"].contains(&name) {
+            assert_eq!(d.genus, diagnose(&mesh).genus, "{name}");
+        }
+        if name == "fandisk" {
+            let zone = zone::measure(&mesh, &made.extracted.mesh, made.lattice.step.x);
+            assert!(zone.normal_deg < 0.5 && zone.edge_rms < 0.01 && zone.rms < 0.01, "{zone:?}");
+        }
+    }
+}
+
+/// A random tree of solids in a cube.
+fn random_tree(seed: u64) -> Solid {
+    let r = |k: u64| random::unit(seed, k);
+    let leaf = |k: u64| {
+        let size = DVec3::new(r(k), r(k + 1), r(k + 2)) * 0.7 + 0.3;
+        let solid = match (r(k + 3) * 5.0) as u32 {
+            0 => Solid::Sphere { radius: size.x / 1.5 },
+            1 => box_of(size * 1.2),
+            2 => Solid::Cylinder { radius: size.x / 2.0, height: size.y * 1.5 },
+            3 => Solid::Cone { bottom: size.x / 1.5, top: size.y / 4.0, height: size.z },
+            _ => Solid::Torus { major: 0.5, minor: size.x / 5.0 },
+        };
+        let axis = DVec3::new(r(k + 4) - 0.5, r(k + 5) - 0.5, r(k + 6) - 0.4);
+        solid.turned(axis, 360.0 * r(k + 7)).moved(DVec3::new(r(k + 8), r(k + 9), r(k + 10)) - 0.5)
+    };
+    let mut tree = leaf(0);
+    for n in 1..2 + (r(900) * 5.0) as u64 {
+        let next = leaf(20 * n);
+        tree = match (r(20 * n + 15) * 3.0) as u32 {
+            0 => tree.union(next),
+            1 => tree.difference(next),
+            _ => tree.union(next.offset(0.05)),
+        };
+    }
+    tree
+}
+
+#[test]
+fn five_hundred_random_trees_of_solids_are_certified() {
+    for seed in 0..500 {
+        let tree = Part::Solid(random_tree(seed));
+        let n = 14 + (seed % 20) as usize;
+        match contour::from_part(&tree, at(n), &ContourParams::default(), &Silent) {
+            Ok(made) => {
+                certified(&format!("tree {seed}"), &made.extracted.mesh);
+            }
+            Err(e) => assert!(e.to_string().contains("passes none"), "{seed}: {e}"),
+        }
+    }
+}
+
+#[test]
+fn meshes_are_bitwise_equal_on_1_2_and_5_threads() {
+    let tree = Part::Solid(random_tree(7));
+    let mesh = planish::mesh::shapes::demo(1, 8_000);
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let a = contour::from_part(&tree, at(40), &ContourParams::default(), &Silent).unwrap().extracted;
+            let b = of_mesh(&mesh, 50).extracted;
+            (a.mesh, a.tags, b.mesh, b.tags)
+        })
+    };
+    let one = run(1);
+    assert!(one == run(2) && one == run(5));
+}
+
+#[test]
+fn a_milled_slot_has_the_volume_of_its_formula_and_its_sharp_rim() {
+    let stock = Aabb { min: DVec3::new(-2.0, -1.0, -1.0), max: DVec3::new(2.0, 1.0, 0.0) };
+    let (r, depth, run) = (0.3, 0.4, 2.0);
+    let path = [DVec3::new(-1.0, 0.0, 1.0), DVec3::new(-1.0, 0.0, -depth), DVec3::new(1.0, 0.0, -depth)];
+    let slot = |tool: Tool, n: usize| {
+        let moves = path.windows(2).map(|w| Move { from: w[0], to: w[1], tool: 0 }).collect();
+        let milling = Milling::new(stock, vec![tool], moves);
+        contour::from_field(&milling, at(n), &ContourParams::default(), &Silent).unwrap()
+    };
+    let pi = std::f64::consts::PI;
+    let flat = (run * 2.0 * r + pi * r * r) * depth;
+    let ball = (run * 2.0 * r + pi * r * r) * (depth - r) + run * pi * r * r / 2.0 + 2.0 / 3.0 * pi * r * r * r;
+    for (tool, removed) in [(Tool::Flat { radius: r }, flat), (Tool::Ball { radius: r }, ball)] {
+        let made = slot(tool, 120);
+        let d = certified("slot", &made.extracted.mesh);
+        let left = 8.0 - d.volume.unwrap();
+        assert!((left / removed - 1.0).abs() < 0.003, "{tool:?}: {left} of {removed}");
+        // The rim: two straight sides and two half circles, all in the top plane.
+        let mesh = &made.extracted.mesh;
+        let rim: f64 = made
+            .extracted
+            .tags
+            .edges
+            .iter()
+            .map(|e| e.map(|v| mesh.points[v as usize]))
+            .filter(|e| e.iter().all(|p| p.z.abs() < 1e-6 && p.x.abs() < 1.5 && p.y.abs() < 0.5))
+            .map(|[a, b]| a.distance(b))
+            .sum();
+        let wanted = 2.0 * run + 2.0 * pi * r;
+        assert!((rim / wanted - 1.0).abs() < 0.01, "{tool:?}: {rim} of {wanted}");
+    }
+}
+
+#[test]
+fn too_little_memory_and_no_surface_are_told() {
+    let sphere = Part::Solid(Solid::Sphere { radius: 1.0 });
+    let small = Sampling { spacing: Spacing::Resolution(500), memory: 1 << 20 };
+    let told = contour::from_part(&sphere, small, &ContourParams::default(), &Silent).unwrap_err().to_string();
+    assert!(told.contains("MB") && told.contains("larger voxel"), "{told}");
+    let nothing = Part::Solid(Solid::Sphere { radius: 1.0 }.difference(Solid::Sphere { radius: 1.0 }));
+    let told = contour::from_part(&nothing, at(20), &ContourParams::default(), &Silent).unwrap_err().to_string();
+    assert!(told.contains("passes none"), "{told}");
+}
