@@ -215,7 +215,7 @@ fn write_with_edges(
 }
 
 /// The whole file, if it is one.
-fn content(path: &Path) -> Result<Vec<u8>, ReadError> {
+pub(crate) fn content(path: &Path) -> Result<Vec<u8>, ReadError> {
     let mut file = File::open(path)?;
     let metadata = file.metadata()?;
     if metadata.is_dir() {

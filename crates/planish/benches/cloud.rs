@@ -56,7 +56,9 @@ fn main() {
         for &l in &levels {
             println!("== {name} {l} %: diag {diag} sigma {}", l / 100.0 * diag);
             let points = sample(&mesh, n, l / 100.0 * diag, 1);
-            let samples = planish::cloud::probe(&points);
+            let t = std::time::Instant::now();
+            let samples = planish::cloud::clean(&planish::cloud::Cloud::new(points.clone()), &Default::default(), &planish::Silent).unwrap();
+            println!("   clean {:?} samples {} noise {:.5} spacing {:.5} segs {}", t.elapsed(), samples.samples.len(), samples.noise, samples.spacing, samples.closed.len());
             let bvh = planish::geom::Bvh::new(&mesh);
             let wrong = samples.samples.iter().filter(|f| f.normal.dot(mesh.normal(bvh.closest(f.center).place.face as usize)) < -0.3).count();
             println!("   wrong {:.3} %", 100.0 * wrong as f64 / samples.samples.len() as f64);

@@ -15,11 +15,13 @@ mod front;
 mod link;
 mod moments;
 mod orient;
+mod project;
 mod quadric;
 mod sites;
 mod survey;
 
 pub use dipoles::Dipoles;
+pub use project::{Cleaned, ProjectParams, project};
 pub use quadric::Quadric;
 
 use crate::geom::{Aabb, KdTree};
@@ -27,7 +29,6 @@ use crate::mesh::Attribute;
 use crate::observe::Observer;
 use glam::DVec3;
 use orient::Hints;
-use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -334,13 +335,4 @@ fn toward_scanner(cloud: &Cloud, ids: &[u32], fits: &[front::Fit], sites: &sites
             })
             .collect(),
     )
-}
-
-/// probe
-pub fn probe(points: &[DVec3]) -> Samples {
-    let t = std::time::Instant::now();
-    let s = clean(&Cloud::new(points.to_vec()), &CleanParams::default(), &crate::Silent).unwrap();
-    let _ = points.par_iter().count();
-    eprintln!("clean {:?} samples {} multi {} noise {:.5} spacing {:.5} segs {} conf {:.4}", t.elapsed(), s.samples.len(), s.samples.iter().filter(|s| s.sheets > 1).count(), s.noise, s.spacing, s.closed.len(), s.samples.iter().map(|s| s.confidence).sum::<f64>() / s.samples.len() as f64);
-    s
 }
