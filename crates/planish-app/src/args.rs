@@ -3,9 +3,9 @@
 use crate::failure::Failure;
 use crate::options::{StageOptions, StageParams};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use planish::cloud::{CleanParams, ProjectParams};
 use planish::contour::ContourParams;
 use planish::field;
-use planish::cloud::{CleanParams, ProjectParams};
 use planish::grid::GridParams;
 use planish::mesh::{DecimateParams, SmoothParams};
 use planish::model::Units;

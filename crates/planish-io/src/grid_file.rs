@@ -36,7 +36,9 @@ pub fn read_grid(path: impl AsRef<Path>) -> Result<ScalarGrid, ReadError> {
 
 /// True for the name of a volume.
 pub fn is_grid(path: &Path) -> bool {
-    path.extension().and_then(|e| e.to_str()).is_some_and(|e| ["nrrd", "npy"].contains(&e.to_ascii_lowercase().as_str()))
+    path.extension()
+        .and_then(|e| e.to_str())
+        .is_some_and(|e| ["nrrd", "npy"].contains(&e.to_ascii_lowercase().as_str()))
 }
 
 /// A number type of a volume.
@@ -123,7 +125,11 @@ fn nrrd(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
     let mut line = 0;
     let data = loop {
         let Some(end) = bytes[at..].iter().position(|&b| b == b'\n') else {
-            return Err(header_fault("the header has no end (an empty line)", line + 1, "copy or write the file again"));
+            return Err(header_fault(
+                "the header has no end (an empty line)",
+                line + 1,
+                "copy or write the file again",
+            ));
         };
         let text = bytes[at..at + end].trim_ascii();
         at += end + 1;
@@ -140,7 +146,11 @@ fn nrrd(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
             if text.contains(":=") {
                 continue;
             }
-            return Err(header_fault(format!("\"{}\" is no field", shown(text.as_bytes())), line, "fields are `name: value`"));
+            return Err(header_fault(
+                format!("\"{}\" is no field", shown(text.as_bytes())),
+                line,
+                "fields are `name: value`",
+            ));
         };
         let value = value.trim();
         let three = |what: &str| -> Result<[f64; 3], ReadError> {
@@ -289,7 +299,8 @@ fn npy(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
         header[at..].split_once(':').map(|(_, rest)| rest.trim_start().to_owned())
     };
     let quoted = |text: &str| text.split('\'').nth(1).map(str::to_owned);
-    let descr = entry("descr").as_deref().and_then(quoted).ok_or_else(|| fault("the header has no \"descr\"".into()))?;
+    let descr =
+        entry("descr").as_deref().and_then(quoted).ok_or_else(|| fault("the header has no \"descr\"".into()))?;
     let (order, word) = descr.split_at(descr.len().min(1));
     let kind = match word {
         "i1" => Scalar::I8,
@@ -353,7 +364,10 @@ mod tests {
     fn nrrd_raw_and_gzip_give_the_same_numbers_with_spacing_and_origin() {
         let raw = [format!("{HEAD}encoding: raw\n\n").into_bytes(), body()].concat();
         let grid = saved("a.nrrd", &raw).unwrap();
-        assert_eq!((grid.size, grid.spacing, grid.origin), ([2, 3, 4], DVec3::new(0.5, 1.0, 2.0), DVec3::new(1.0, 2.0, 3.0)));
+        assert_eq!(
+            (grid.size, grid.spacing, grid.origin),
+            ([2, 3, 4], DVec3::new(0.5, 1.0, 2.0), DVec3::new(1.0, 2.0, 3.0))
+        );
         assert_eq!(grid.values[5], 5.0);
         let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
         packed.write_all(&body()).unwrap();

@@ -28,9 +28,7 @@ mod weld;
 pub use error::{ReadError, WriteError};
 pub use export::{ExportKind, export, export_kind, export_mesh};
 pub use grid_file::{is_grid, read_grid};
-pub use mesh_file::{
-    MeshFormat, Up, WriteOptions, read_mesh, read_tagged_mesh, write_mesh, write_tagged_mesh,
-};
+pub use mesh_file::{MeshFormat, Up, WriteOptions, read_mesh, read_tagged_mesh, write_mesh, write_tagged_mesh};
 pub use network_file::{NetworkFileError, read_network, write_network};
 pub use place::Place;
 pub use project::{ProjectError, read_model, write_model};

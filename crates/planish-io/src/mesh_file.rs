@@ -177,12 +177,7 @@ pub fn write_tagged_mesh(
     write_with_edges(path.as_ref(), &marked, &tags.edges, options)
 }
 
-fn write_with_edges(
-    path: &Path,
-    mesh: &TriMesh,
-    edges: &[[u32; 2]],
-    options: &WriteOptions,
-) -> Result<(), WriteError> {
+fn write_with_edges(path: &Path, mesh: &TriMesh, edges: &[[u32; 2]], options: &WriteOptions) -> Result<(), WriteError> {
     let written = [MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Stl, MeshFormat::Glb];
     let Some(format) = MeshFormat::of(path).filter(|f| written.contains(f)) else {
         return Err(WriteError::UnknownExtension { extension: extension(path), known: known(&written) });

@@ -17,14 +17,13 @@ fn column(name: &str, width: usize, values: Vec<f32>) -> Attribute {
 /// Points with large coordinates, colour and intensity.
 fn scan(count: usize) -> Cloud {
     let points = (0..count)
-        .map(|i| DVec3::new(515_380.25 + 0.001 * i as f64, 4_918_360.5 - 0.002 * i as f64, 2_330.0 + (i % 7) as f64 * 0.01))
+        .map(|i| {
+            DVec3::new(515_380.25 + 0.001 * i as f64, 4_918_360.5 - 0.002 * i as f64, 2_330.0 + (i % 7) as f64 * 0.01)
+        })
         .collect();
     let color = (0..3 * count).map(|k| (k % 256) as f32 / 255.0).collect();
     let intensity = (0..count).map(|k| (k % 100) as f32 / 100.0).collect();
-    Cloud {
-        attributes: vec![column("color", 3, color), column("intensity", 1, intensity)],
-        ..Cloud::new(points)
-    }
+    Cloud { attributes: vec![column("color", 3, color), column("intensity", 1, intensity)], ..Cloud::new(points) }
 }
 
 fn read(path: &PathBuf) -> Result<Cloud, ReadError> {

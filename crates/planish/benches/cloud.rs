@@ -15,7 +15,7 @@ use planish::Silent;
 use planish::cloud::{self, CleanParams, Cloud};
 use planish::contour::ContourParams;
 use planish::geom::{Bvh, KdTree, random};
-use planish::mesh::{Adjacency, TriMesh, diagnose, sharp_edges, shapes};
+use planish::mesh::{Adjacency, TriMesh, diagnose, shapes, sharp_edges};
 use planish::pipeline::{ScanParams, mesh_scan};
 use rayon::prelude::*;
 use std::time::Instant;
@@ -28,7 +28,9 @@ fn main() {
     let names: Vec<&str> = args.first().map_or(vec!["demo", "torus"], |a| a.split(',').collect());
     let levels: Vec<f64> =
         args.get(1).map_or(vec![0.1, 0.25], |a| a.split(',').filter_map(|x| x.parse().ok()).collect());
-    println!("shape noise  points   clean   mesh  noise_est samples  rms   mean  max  normal zone_rms zone_normal  closed components genus");
+    println!(
+        "shape noise  points   clean   mesh  noise_est samples  rms   mean  max  normal zone_rms zone_normal  closed components genus"
+    );
     for name in &names {
         let Some(mesh) = shape(name) else {
             println!("skipped: {name} is no shape of ours and PLANISH_DATA does not have it");
@@ -43,8 +45,14 @@ fn main() {
         for n in [25_000, 50_000, 100_000, 200_000] {
             let points = scan(&part, n, 0.001 * part.bounds().diagonal(), 1);
             let start = Instant::now();
-            let samples = cloud::clean(&Cloud::new(points), &CleanParams::default(), &Silent).expect("a part is a surface");
-            println!("clean/default/demo_{}k {:.3} s, {} samples", n / 1000, start.elapsed().as_secs_f64(), samples.samples.len());
+            let samples =
+                cloud::clean(&Cloud::new(points), &CleanParams::default(), &Silent).expect("a part is a surface");
+            println!(
+                "clean/default/demo_{}k {:.3} s, {} samples",
+                n / 1000,
+                start.elapsed().as_secs_f64(),
+                samples.samples.len()
+            );
         }
     }
 }
@@ -75,9 +83,8 @@ fn truth(path: &str) -> Option<TriMesh> {
             f32::from_le_bytes(bytes[at..at + 4].try_into().expect("4 bytes")) as f64
         }
     };
-    let points = (0..vertices)
-        .map(|v| DVec3::from_array([0, 1, 2].map(|k| number(end + (3 * v + k) * size))))
-        .collect();
+    let points =
+        (0..vertices).map(|v| DVec3::from_array([0, 1, 2].map(|k| number(end + (3 * v + k) * size)))).collect();
     let faces = end + 3 * vertices * size;
     let corner = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("4 bytes"));
     let triangles = (0..count("face")?).map(|f| [1, 5, 9].map(|k| corner(faces + 13 * f + k))).collect();
@@ -109,8 +116,7 @@ fn scan(mesh: &TriMesh, count: u64, noise: f64, seed: u64) -> Vec<DVec3> {
         .map(|i| {
             let r: [f64; 9] = std::array::from_fn(|k| random::unit(seed, 9 * i + k as u64));
             let g = |u: f64, v: f64| (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos();
-            pick(mesh, &sums, [r[0], r[1], r[2]]).0
-                + noise * DVec3::new(g(r[3], r[4]), g(r[5], r[6]), g(r[7], r[8]))
+            pick(mesh, &sums, [r[0], r[1], r[2]]).0 + noise * DVec3::new(g(r[3], r[4]), g(r[5], r[6]), g(r[7], r[8]))
         })
         .collect()
 }
@@ -130,7 +136,8 @@ fn row(name: &str, mesh: &TriMesh, level: f64) {
         close: None,
     };
     let start = Instant::now();
-    let made = clean.map_err(|e| e.to_string()).and_then(|_| mesh_scan(&scan, &params, &Silent).map_err(|e| e.to_string()));
+    let made =
+        clean.map_err(|e| e.to_string()).and_then(|_| mesh_scan(&scan, &params, &Silent).map_err(|e| e.to_string()));
     let seconds = start.elapsed().as_secs_f64();
     let made = match made {
         Ok(made) => made,
@@ -145,7 +152,9 @@ fn row(name: &str, mesh: &TriMesh, level: f64) {
         [distances(mesh, got, &edges, diagonal), distances(got, mesh, &edges, diagonal)].concat();
     let zone: Vec<_> = both.iter().filter(|r| r.2).copied().collect();
     let rms = |v: &[(f64, f64, bool)]| (v.iter().map(|r| r.0 * r.0).sum::<f64>() / v.len().max(1) as f64).sqrt();
-    let mean = |v: &[(f64, f64, bool)], of: fn(&(f64, f64, bool)) -> f64| v.iter().map(of).sum::<f64>() / v.len().max(1) as f64;
+    let mean = |v: &[(f64, f64, bool)], of: fn(&(f64, f64, bool)) -> f64| {
+        v.iter().map(of).sum::<f64>() / v.len().max(1) as f64
+    };
     let facts = diagnose(got);
     println!(
         "{name} {level} {} {clean_seconds:.2} {seconds:.2} {:.4} {} {:.4} {:.4} {:.3} {:.2} {:.4} {:.2} {} {} {:?}",

@@ -66,7 +66,8 @@ fn boxes_straight_and_turned_have_their_8_corners_to_1e_9_of_the_size_and_12_str
                 assert!(on >= 2, "{name}: a feature vertex lies off the edges: {q}");
             }
         }
-        let length: f64 = tags.edges.iter().map(|e| mesh.points[e[0] as usize].distance(mesh.points[e[1] as usize])).sum();
+        let length: f64 =
+            tags.edges.iter().map(|e| mesh.points[e[0] as usize].distance(mesh.points[e[1] as usize])).sum();
         assert!((length - 4.0 * (2.0 + 1.5 + 1.0)).abs() < 1e-6, "{name}: {length}");
     }
 }
@@ -202,8 +203,7 @@ fn closed_meshes_come_back_certified_with_their_genus_and_volume() {
 fn lattices_through_the_vertices_of_a_cube_are_decided_without_a_gap() {
     // Every face, edge and corner of the cube lies on planes of nodes.
     let mesh = planish::mesh::shapes::cuboid(DVec3::splat(8.0), 4);
-    let lattice =
-        planish::field::Lattice { origin: mesh.bounds().min - 2.0, step: DVec3::ONE, cells: [12; 3] };
+    let lattice = planish::field::Lattice { origin: mesh.bounds().min - 2.0, step: DVec3::ONE, cells: [12; 3] };
     let field = planish::field::MeshField::new(&mesh).unwrap();
     let directed = field.sample(&lattice, &Silent).unwrap();
     assert_eq!(directed.mended, 0);

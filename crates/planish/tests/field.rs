@@ -33,8 +33,7 @@ fn a_mesh_and_its_formula_give_the_same_sides_but_where_facets_fall_short() {
     let l = lattice(40);
     let mesh = shapes::sphere(0.8, 5);
     let field = MeshField::new(&mesh).unwrap();
-    let (a, b) =
-        (field.sample(&l, &Silent).unwrap(), sample(&Solid::Sphere { radius: 0.8 }, &l, &Silent).unwrap());
+    let (a, b) = (field.sample(&l, &Silent).unwrap(), sample(&Solid::Sphere { radius: 0.8 }, &l, &Silent).unwrap());
     assert_eq!(a.mended, 0);
     let (m, n) = (a.hit_count() as f64, b.hit_count() as f64);
     assert!((m / n - 1.0).abs() < 0.01, "{m} {n}");

@@ -37,8 +37,7 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
         return Err(Failure::interrupted());
     }
     let samples = made.map_err(|e| Failure::input(&args.scan, super::with_hint(&e.to_string())))?;
-    let (made, moved) =
-        session.bars.step("points", |o| cloud::project(&scan, &samples, params.outlier, &project, o));
+    let (made, moved) = session.bars.step("points", |o| cloud::project(&scan, &samples, params.outlier, &project, o));
     if progress::interrupted() {
         return Err(Failure::interrupted());
     }
@@ -121,7 +120,10 @@ fn table(args: &Clean, samples: &Samples, cleaned: &Cleaned, report: &Report) ->
     table.row("spacing", distance(samples.spacing, diagonal, unit));
     table.row("samples", count(samples.samples.len() as u64));
     table.row("segments", count(samples.closed.len() as u64));
-    table.row("orientation", format!("{} % of the evidence agrees", number(100.0 * report.figure("scan.confidence").unwrap_or(0.0))));
+    table.row(
+        "orientation",
+        format!("{} % of the evidence agrees", number(100.0 * report.figure("scan.confidence").unwrap_or(0.0))),
+    );
     table.row("outliers", count(cleaned.outliers as u64));
     table.row("points", format!("{}: {}", args.output.display(), count(cleaned.cloud.points.len() as u64)));
     if let Some(path) = &args.lines {

@@ -7,11 +7,11 @@ use crate::files;
 use crate::products::Staged;
 use crate::progress;
 use crate::summary::Summary;
+use planish::cloud::CleanParams;
 use planish::contour::{self, Meshed, MeshingError, Sampling};
 use planish::field::{Part, Spacing};
 use planish::mesh::{TriMesh, diagnose};
 use planish::model::Units;
-use planish::cloud::CleanParams;
 use planish::pipeline::{self, Figure, ScanError, ScanParams, Warning};
 use planish_io::WriteOptions;
 use planish_io::report::{Input, Report, count, number};
@@ -68,7 +68,9 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
         }
         Source::Mesh(mesh) => contour::from_mesh(mesh, sampling, &params, o).map_err(Trouble::Meshing),
         Source::Script(Script::Part(part)) => contour::from_part(part, sampling, &params, o).map_err(Trouble::Meshing),
-        Source::Script(Script::Job(milling)) => contour::from_field(milling, sampling, &params, o).map_err(Trouble::Meshing),
+        Source::Script(Script::Job(milling)) => {
+            contour::from_field(milling, sampling, &params, o).map_err(Trouble::Meshing)
+        }
         Source::Grid(grid) => contour::from_grid(grid, &grid_params, memory, &params, o).map_err(Trouble::Meshing),
     });
     if progress::interrupted() {
@@ -167,7 +169,8 @@ fn failure(args: &Mesh, source: &Source, error: MeshingError) -> Failure {
 
 pub fn default_memory() -> u64 {
     let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    let total = text.lines().find_map(|l| l.strip_prefix("MemTotal:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
+    let total =
+        text.lines().find_map(|l| l.strip_prefix("MemTotal:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
     (total.map_or(MEMORY_GUESS, |kb| kb << 10) as f64 * MEMORY_SHARE) as u64
 }
 
@@ -211,7 +214,8 @@ fn figures(made: &Meshed, report: &mut Report) {
 
 fn table(args: &Mesh, made: &Meshed, report: &Report) -> Summary {
     let unit = report.input.units.as_str();
-    let flag = |key: &str, yes: &str, no: &str| if report.flag(key) == Some(true) { yes.into() } else { String::from(no) };
+    let flag =
+        |key: &str, yes: &str, no: &str| if report.flag(key) == Some(true) { yes.into() } else { String::from(no) };
     let mut table = Summary::default();
     let [x, y, z] = made.lattice.cells;
     table.row("input", format!("{}: {}", report.input.path, report.input.kind));

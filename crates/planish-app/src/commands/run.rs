@@ -79,9 +79,9 @@ pub fn from_scan(
         return Err(Failure::interrupted());
     }
     let made = made.map_err(|e| fault(&e))?;
-    let (points, project) = session.bars.step("points", |o| {
-        planish::cloud::project(scan, &made.samples, params.clean.outlier, &Default::default(), o)
-    });
+    let (points, project) = session
+        .bars
+        .step("points", |o| planish::cloud::project(scan, &made.samples, params.clean.outlier, &Default::default(), o));
     if crate::progress::interrupted() {
         return Err(Failure::interrupted());
     }

@@ -6,7 +6,11 @@ use glam::DVec3;
 use planish::cloud::Cloud;
 
 fn fault(what: impl Into<String>) -> ReadError {
-    ReadError::Header { what: what.into(), place: Place::Byte(0), hint: "save an array of shape (n, 3) with numpy.save" }
+    ReadError::Header {
+        what: what.into(),
+        place: Place::Byte(0),
+        hint: "save an array of shape (n, 3) with numpy.save",
+    }
 }
 
 /// Type, order and shape of an array, and where its numbers begin.

@@ -14,7 +14,11 @@ struct Field {
 }
 
 fn fault(what: impl Into<String>, line: usize) -> ReadError {
-    ReadError::Header { what: what.into(), place: Place::Line(line), hint: "write it again with the program it is from" }
+    ReadError::Header {
+        what: what.into(),
+        place: Place::Line(line),
+        hint: "write it again with the program it is from",
+    }
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<Cloud, ReadError> {
@@ -30,8 +34,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Cloud, ReadError> {
         let numbers = || rest.iter().map(|w| w.parse::<usize>().ok()).collect::<Option<Vec<usize>>>();
         match key {
             "FIELDS" | "COLUMNS" => {
-                fields =
-                    rest.iter().map(|n| Field { name: n.to_string(), size: 4, kind: b'F', count: 1 }).collect();
+                fields = rest.iter().map(|n| Field { name: n.to_string(), size: 4, kind: b'F', count: 1 }).collect();
             }
             "SIZE" | "COUNT" => {
                 let n = numbers().filter(|n| n.len() == fields.len());
@@ -129,8 +132,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Cloud, ReadError> {
             if plain < needed || plain / 88 > packed {
                 return Err(short(needed, plain.min(packed * 88)));
             }
-            let content = unpack(&body[8..8 + packed], plain)
-                .ok_or_else(|| ReadError::Syntax { what: "the packed points are damaged".into(), place: Place::Byte(start) })?;
+            let content = unpack(&body[8..8 + packed], plain).ok_or_else(|| ReadError::Syntax {
+                what: "the packed points are damaged".into(),
+                place: Place::Byte(start),
+            })?;
             table = Vec::new();
             let mut at = 0;
             for f in &fields {

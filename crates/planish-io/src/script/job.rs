@@ -34,7 +34,11 @@ pub fn read(root: &Table, folder: &Path, units: Option<Units>) -> Result<(Millin
         table.only(&["tool", "points", "gcode"])?;
         let wanted = table.required("tool")?;
         let Some(tool) = names.iter().position(|n| wanted.text().is_ok_and(|w| w == n)) else {
-            let known = if names.is_empty() { "write [[tool]] first".into() } else { format!("tools are {}", names.join(", ")) };
+            let known = if names.is_empty() {
+                "write [[tool]] first".into()
+            } else {
+                format!("tools are {}", names.join(", "))
+            };
             return Err(wanted.fault(format!("there is no tool \"{}\"", wanted.text()?), known));
         };
         match (table.optional("points"), table.optional("gcode")) {
@@ -66,7 +70,9 @@ fn tool(table: &Table) -> Result<Tool, ScriptError> {
         ("bull", Some(c)) => {
             let corner = c.positive()?;
             if corner >= radius {
-                return Err(c.fault(format!("a corner of {corner} does not fit a radius of {radius}"), "use a ball end"));
+                return Err(
+                    c.fault(format!("a corner of {corner} does not fit a radius of {radius}"), "use a ball end")
+                );
             }
             Ok(Tool::Bull { radius, corner })
         }

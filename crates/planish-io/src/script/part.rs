@@ -142,7 +142,9 @@ fn primitive(shape: &Value) -> Result<Solid, ScriptError> {
             let round = t.optional("round").map(|r| r.number()).transpose()?.unwrap_or(0.0);
             if !(0.0..=size.min_element() / 2.0).contains(&round) {
                 let most = size.min_element() / 2.0;
-                return Err(shape.fault(format!("a box of this size cannot be rounded by {round}"), format!("use 0 to {most}")));
+                return Err(
+                    shape.fault(format!("a box of this size cannot be rounded by {round}"), format!("use 0 to {most}"))
+                );
             }
             Solid::Cuboid { size, round }
         }
@@ -154,7 +156,11 @@ fn primitive(shape: &Value) -> Result<Solid, ScriptError> {
             t.only(&["bottom", "top", "height"])?;
             let radius = |key: &str| -> Result<f64, ScriptError> {
                 let v = t.optional(key).map(|v| v.number()).transpose()?.unwrap_or(0.0);
-                if v < 0.0 { Err(shape.fault(format!("\"{key}\" must not be negative"), "give a radius")) } else { Ok(v) }
+                if v < 0.0 {
+                    Err(shape.fault(format!("\"{key}\" must not be negative"), "give a radius"))
+                } else {
+                    Ok(v)
+                }
             };
             let (bottom, top) = (radius("bottom")?, radius("top")?);
             if bottom == 0.0 && top == 0.0 {

@@ -78,7 +78,9 @@ impl<'a> Table<'a> {
     /// Refuses keys that are not among `known`.
     pub fn only(&self, known: &[&str]) -> Result<(), ScriptError> {
         match self.values().into_iter().find(|v| !known.contains(&v.name)) {
-            Some(v) => Err(v.fault(format!("unknown key \"{}\"", v.name), format!("keys here are {}", known.join(", ")))),
+            Some(v) => {
+                Err(v.fault(format!("unknown key \"{}\"", v.name), format!("keys here are {}", known.join(", "))))
+            }
             None => Ok(()),
         }
     }

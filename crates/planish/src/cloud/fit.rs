@@ -204,8 +204,6 @@ pub(super) struct Sheet {
     pub quadric: Quadric,
     /// Root of the weighted mean of squared first-order distances, corrected for the parameters; world units.
     pub rms: f64,
-    /// Sum of the weights.
-    pub weight: f64,
     /// Parameters of the model: 3 plane, 6 height field, 9 general quadric.
     pub parameters: f64,
 }
@@ -252,7 +250,7 @@ pub(super) fn sheet(
     let ((a, parameters, rss), weight) = last?;
     let quadric = Quadric { center, scale, a };
     let freedom = (weight - parameters).max(1.0);
-    Some(Sheet { quadric, rms: (rss / freedom).sqrt() * scale, weight, parameters })
+    Some(Sheet { quadric, rms: (rss / freedom).sqrt() * scale, parameters })
 }
 
 /// A quadric in other local coordinates.
@@ -300,11 +298,7 @@ fn choose(
 
 fn squared(a: &[f64; 10], points: &[Weighted], weights: &[f64]) -> f64 {
     let q = Quadric { center: DVec3::ZERO, scale: 1.0, a: *a };
-    points
-        .iter()
-        .zip(weights)
-        .map(|(p, &w)| if w > 0.0 { w * q.distance(p.y).0.powi(2) } else { 0.0 })
-        .sum()
+    points.iter().zip(weights).map(|(p, &w)| if w > 0.0 { w * q.distance(p.y).0.powi(2) } else { 0.0 }).sum()
 }
 
 /// Tukey's biweight of a residual in noise levels.

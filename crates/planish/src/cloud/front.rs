@@ -193,8 +193,7 @@ fn fit_site(
     starts
         .into_iter()
         .filter_map(|Start { sheet: start, at, radius }| {
-            let others: Vec<Quadric> =
-                rivals.iter().filter(|r| differ(r, &start, at, noise)).copied().collect();
+            let others: Vec<Quadric> = rivals.iter().filter(|r| differ(r, &start, at, noise)).copied().collect();
             let (s, radius, error) = widen(tree, at, radius, &start, &others, noise)?;
             let (center, normal) = s.quadric.project(at);
             Some(Fit {

@@ -77,11 +77,8 @@ impl Cloud {
                     .collect(),
             })
             .collect();
-        let seen_by = if self.seen_by.is_empty() {
-            Vec::new()
-        } else {
-            ids.iter().map(|&i| self.seen_by[i as usize]).collect()
-        };
+        let seen_by =
+            if self.seen_by.is_empty() { Vec::new() } else { ids.iter().map(|&i| self.seen_by[i as usize]).collect() };
         Cloud {
             points: ids.iter().map(|&i| self.points[i as usize]).collect(),
             shift: self.shift,
@@ -113,7 +110,9 @@ impl Default for CleanParams {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CloudError {
     /// Too few different points.
-    #[error("{distinct} different points of {given} are left after those that are no numbers or repeat others; at least {needed} are needed")]
+    #[error(
+        "{distinct} different points of {given} are left after those that are no numbers or repeat others; at least {needed} are needed"
+    )]
     TooFew {
         /// Points given.
         given: usize,
@@ -210,8 +209,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
     let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
     let fit_tree = KdTree::new(&centers);
     let votes = link::votes(&fits, &fit_tree);
-    let areas: Vec<f64> =
-        fits.iter().map(|f| f.owned as f64 * sites.survey[f.site as usize].spacing.powi(2)).collect();
+    let areas: Vec<f64> = fits.iter().map(|f| f.owned as f64 * sites.survey[f.site as usize].spacing.powi(2)).collect();
     let normals = (!params.ignore_normals).then(|| given_normals(cloud, &ids, &fits, &sites)).flatten();
     let toward = toward_scanner(cloud, &ids, &fits, &sites);
     let hints = Hints { toward: toward.as_deref(), normals: normals.as_deref(), areas: &areas };
@@ -275,8 +273,7 @@ impl Observer for Part<'_> {
 
 /// Different finite points in the order of their tree, with the index of each in the cloud.
 fn distinct(cloud: &Cloud) -> Result<(Vec<DVec3>, Vec<u32>), CloudError> {
-    let finite: Vec<u32> =
-        (0..cloud.points.len() as u32).filter(|&i| cloud.points[i as usize].is_finite()).collect();
+    let finite: Vec<u32> = (0..cloud.points.len() as u32).filter(|&i| cloud.points[i as usize].is_finite()).collect();
     let tree = KdTree::new(&finite.iter().map(|&i| cloud.points[i as usize]).collect::<Vec<_>>());
     let mut ids: Vec<u32> = tree.order().iter().map(|&k| finite[k as usize]).collect();
     // Equal points are neighbours in a leaf, or nearly so; a sort by place finds them all.

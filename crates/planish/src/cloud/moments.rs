@@ -92,12 +92,6 @@ impl Moments {
         }
     }
 
-    pub(super) fn add_all(&mut self, other: &Moments) {
-        for k in 0..COUNT {
-            self.0[k] += other.0[k];
-        }
-    }
-
     /// Sum of the weights.
     pub(super) fn weight(&self) -> f64 {
         self.0[0]
@@ -218,9 +212,8 @@ mod tests {
         let q = super::super::Quadric { center: DVec3::ZERO, scale: 1.0, a };
         let mut sums = Moments::ZERO;
         points.iter().for_each(|&p| sums.add(p, 2.0));
-        let form = |m: [[f64; 10]; 10]| -> f64 {
-            (0..10).flat_map(|i| (0..10).map(move |j| a[i] * m[i][j] * a[j])).sum()
-        };
+        let form =
+            |m: [[f64; 10]; 10]| -> f64 { (0..10).flat_map(|i| (0..10).map(move |j| a[i] * m[i][j] * a[j])).sum() };
         let values: f64 = points.iter().map(|&p| 2.0 * q.value(p).0.powi(2)).sum();
         let gradients: f64 = points.iter().map(|&p| 2.0 * q.value(p).1.length_squared()).sum();
         assert!((form(sums.matrix()) - values).abs() < 1e-12);

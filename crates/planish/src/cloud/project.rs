@@ -92,15 +92,15 @@ pub fn project(
     let moved_rms = (placed.iter().filter(|p| !p.outlier).map(|p| p.moved * p.moved).sum::<f64>() / inner).sqrt();
     let lines = feature_lines(&placed, LINE * samples.spacing);
     let thinned = params.spacing > 0.0;
-    let mut kept: Vec<u32> = (0..placed.len() as u32)
-        .filter(|&k| !placed[k as usize].outlier || (params.outliers && !thinned))
-        .collect();
+    let mut kept: Vec<u32> =
+        (0..placed.len() as u32).filter(|&k| !placed[k as usize].outlier || (params.outliers && !thinned)).collect();
     if thinned {
         let points: Vec<DVec3> = kept.iter().map(|&k| placed[k as usize].at).collect();
         let order = KdTree::new(&points);
         let sorted: Vec<u32> = order.order().iter().map(|&k| kept[k as usize]).collect();
         let points: Vec<DVec3> = sorted.iter().map(|&k| placed[k as usize].at).collect();
-        kept = cover(&points, &KdTree::new(&points), |_| params.spacing).into_iter().map(|i| sorted[i as usize]).collect();
+        kept =
+            cover(&points, &KdTree::new(&points), |_| params.spacing).into_iter().map(|i| sorted[i as usize]).collect();
     }
     let ids: Vec<u32> = kept.iter().map(|&k| finite[k as usize]).collect();
     let mut result = cloud.select(&ids);

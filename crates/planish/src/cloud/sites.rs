@@ -59,7 +59,7 @@ pub(super) fn in_pieces<T: Send>(
 /// Chooses and surveys the sites of points in the order of their tree. `None` if cancelled.
 pub(super) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -> Option<Sites> {
     let scouts: Vec<u32> = (0..points.len() as u32).step_by(SCOUT.min(points.len() / 8 + 1)).collect();
-    let blank = Prior { noise: 0.0, radius: 0.0 };
+    let blank = Prior { noise: 0.0 };
     let first = in_pieces(scouts.len(), (0.0, 0.2), observer, |s, i| {
         survey(tree, points[scouts[i] as usize], f64::INFINITY, blank, s)
     })?;
@@ -71,8 +71,7 @@ pub(super) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
         Some((known, scout_tree)) => {
             let regions = regions(&scouts.iter().map(|&i| points[i as usize]).collect::<Vec<_>>(), &scout_tree, &known);
             in_pieces(scouts.len(), (0.2, 0.4), observer, |s, i| {
-                let prior = Prior { radius: 0.0, ..regions[i].2 };
-                survey(tree, points[scouts[i] as usize], f64::INFINITY, prior, s)
+                survey(tree, points[scouts[i] as usize], f64::INFINITY, regions[i].2, s)
             })?
         }
         None => first,
@@ -121,7 +120,7 @@ fn regions(points: &[DVec3], tree: &KdTree, known: &[Survey]) -> Vec<(f64, f64, 
                 noises.sort_unstable_by(f64::total_cmp);
                 let middle = radii[radii.len() / 2];
                 // A scout in a crease sees next to nothing; sites there stand as for half of the usual radius.
-                let prior = Prior { noise: noises[noises.len() / 2], radius: middle };
+                let prior = Prior { noise: noises[noises.len() / 2] };
                 (least.max(USUAL * middle), REACH * most, prior)
             },
         )

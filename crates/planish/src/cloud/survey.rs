@@ -38,8 +38,6 @@ const PARAMETERS: f64 = 6.0;
 pub(super) struct Survey {
     /// Radius over which one quadric holds, world units.
     pub radius: f64,
-    /// Points in that radius.
-    pub count: usize,
     /// Standard deviation of the points, world units.
     pub noise: f64,
     /// Expected squared error of the fit, world units squared.
@@ -63,8 +61,6 @@ pub(super) struct Scratch {
 pub(super) struct Prior {
     /// Noise of the region, world units; 0 where nothing is known.
     pub noise: f64,
-    /// Usual radius of the region, world units.
-    pub radius: f64,
 }
 
 /// Surveys the surface near one point.
@@ -140,7 +136,6 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
                 least = error;
                 best = Some(Survey {
                     radius: radius(j),
-                    count,
                     noise: noise * r0,
                     error: error * r0 * r0,
                     spacing: radius(j) * (std::f64::consts::PI / count as f64).sqrt(),

@@ -256,7 +256,11 @@ pub fn loops_between(
     let (from, to) = (region[from], region[to]);
     for (l, a) in sides.iter().enumerate() {
         for (m, b) in sides.iter().enumerate() {
-            if l != m && a.contains(&from) && b.contains(&to) && a.iter().any(|r| *r != from && *r != to && b.contains(r)) {
+            if l != m
+                && a.contains(&from)
+                && b.contains(&to)
+                && a.iter().any(|r| *r != from && *r != to && b.contains(r))
+            {
                 return Some([l, m]);
             }
         }

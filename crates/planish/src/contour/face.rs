@@ -4,11 +4,11 @@
 //! two meet in the plane of the face. It is made from the face's own hits alone and shared by both cells, so feature
 //! lines run from cell to cell without the flips of [K01] §4 (fig. 9).
 
+use super::Thresholds;
 use super::caps::FACE_POINT;
 use super::cell::{AMBIGUOUS, FACE_EDGES, chain};
 use super::patch::{Wish, edge_point, joined};
 use super::walk::{Cell, walk};
-use super::Thresholds;
 use crate::field::{Creases, Directed};
 use crate::geom::predicates::segments_meet;
 use glam::{DVec2, DVec3};

@@ -6,13 +6,13 @@
 //! disjoint by exact signs; else they are made anew without features, and as [`super::caps`] in the last resort. As
 //! cells are convex and meet in shared polylines, the whole mesh is then manifold and free of self-intersections.
 
+use super::Thresholds;
 use super::caps::{self, Corner, FACE_POINT};
 use super::cell::{AMBIGUOUS, CROSSED, EDGE_FACES, EDGES, chain, joined_by_hits, joined_by_values};
 use super::face::FacePoints;
 use super::feature::{Shape, classify, solve};
 use super::topology::Trilinear;
 use super::walk::Cell;
-use super::Thresholds;
 use crate::field::{Creases, Directed};
 use crate::geom::predicates::triangles_meet;
 use crate::mesh::FeatureKind;

@@ -115,11 +115,8 @@ impl Trilinear {
             }
         } else {
             // A quadratic: its gradient is linear.
-            let m = glam::DMat3::from_cols(
-                DVec3::new(0.0, cxy, czx),
-                DVec3::new(cxy, 0.0, cyz),
-                DVec3::new(czx, cyz, 0.0),
-            );
+            let m =
+                glam::DMat3::from_cols(DVec3::new(0.0, cxy, czx), DVec3::new(cxy, 0.0, cyz), DVec3::new(czx, cyz, 0.0));
             let det = m.determinant();
             if det.abs() > (FLAT * scale).powi(3) {
                 found.push(m.inverse() * -DVec3::new(cx, cy, cz));

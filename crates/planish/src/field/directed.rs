@@ -119,7 +119,11 @@ fn fill(words: &mut [u64], from: usize, to: usize, value: bool) {
         let (word, bit) = (at / 64, at % 64);
         let count = (64 - bit).min(to - at);
         let mask = if count == 64 { !0 } else { ((1u64 << count) - 1) << bit };
-        if value { words[word] |= mask } else { words[word] &= !mask }
+        if value {
+            words[word] |= mask
+        } else {
+            words[word] &= !mask
+        }
         at += count;
     }
 }
@@ -230,7 +234,8 @@ impl Directed {
             .into_par_iter()
             .map(|k| {
                 let here: Vec<_> = (0..ny).map(|j| bits(lattice.row(j, k))).collect();
-                let above: Option<Vec<_>> = (k + 1 < nz).then(|| (0..ny).map(|j| bits(lattice.row(j, k + 1))).collect());
+                let above: Option<Vec<_>> =
+                    (k + 1 < nz).then(|| (0..ny).map(|j| bits(lattice.row(j, k + 1))).collect());
                 let mut out: [Plane; 3] = Default::default();
                 for j in 0..ny {
                     let row = lattice.row(j, k);

@@ -116,9 +116,7 @@ pub fn sample_grid(grid: &ScalarGrid, params: &GridParams, observer: &dyn Observ
                     }
                 };
                 collect(&mut crossing, 0, nx - 1, &bits);
-                for (axis, inside, other) in
-                    [(1, j + 1 < ny, (j + 1, k)), (2, k + 1 < nz, (j, k + 1))]
-                {
+                for (axis, inside, other) in [(1, j + 1 < ny, (j + 1, k)), (2, k + 1 < nz, (j, k + 1))] {
                     if inside {
                         let other = lattice.row(other.0, other.1);
                         collect(&mut signs(&values[other * nx..(other + 1) * nx]), axis, nx, &bits);

@@ -83,10 +83,8 @@ impl<'a> MeshField<'a> {
     /// # Errors
     /// [`FieldError::Cancelled`].
     pub fn sample(&self, lattice: &Lattice, observer: &dyn Observer) -> Result<Directed, FieldError> {
-        let normals: Vec<DVec3> = (0..self.mesh.triangles.len())
-            .into_par_iter()
-            .map(|t| self.mesh.normal(t) * self.turn as f64)
-            .collect();
+        let normals: Vec<DVec3> =
+            (0..self.mesh.triangles.len()).into_par_iter().map(|t| self.mesh.normal(t) * self.turn as f64).collect();
         let mut crossings: [Vec<Crossing>; 3] = Default::default();
         for axis in 0..3 {
             if observer.cancelled() {
@@ -330,11 +328,8 @@ fn rasterise_one(corners: [DVec3; 3], face: u32, lattice: &Lattice, axis: usize,
             let weights = [1, 2, 0].map(|k| orient2d(flat[k], flat[(k + 1) % 3], q));
             // All three on the side of the triangle, or on the edge and shifted to it.
             let inside = (0..3).all(|k| {
-                let s = if weights[k] != 0.0 {
-                    weights[k]
-                } else {
-                    shifted(flat[(k + 1) % 3], flat[(k + 2) % 3], ua, va)
-                };
+                let s =
+                    if weights[k] != 0.0 { weights[k] } else { shifted(flat[(k + 1) % 3], flat[(k + 2) % 3], ua, va) };
                 (s > 0.0) == (turn > 0.0) && s != 0.0
             });
             if !inside {

@@ -149,14 +149,7 @@ pub fn side_of(value: f64) -> Side {
 pub trait Creases: Sync {
     /// Where the feature between two hits passes the plane of nodes perpendicular to `axis` through `guess`; `None`
     /// if the guess is as good as anything. `a` and `b` are position and normal of the hits, `size` that of a cell.
-    fn face_point(
-        &self,
-        axis: usize,
-        guess: DVec3,
-        a: (DVec3, DVec3),
-        b: (DVec3, DVec3),
-        size: f64,
-    ) -> Option<DVec3>;
+    fn face_point(&self, axis: usize, guess: DVec3, a: (DVec3, DVec3), b: (DVec3, DVec3), size: f64) -> Option<DVec3>;
 
     /// A place of the feature inside the cell from `low` to `high`, near `guess`; `through` are the points at which it
     /// passes the cell's faces, `corner` whether several features seem to meet here, `hits` the

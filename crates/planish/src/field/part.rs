@@ -82,9 +82,7 @@ impl Part {
                     parts.into_iter().map(|p| p.placed(scale, turn, shift)).collect();
                 Part::Combined(operation, parts?)
             }
-            Part::Offset(part, distance) => {
-                Part::Offset(Box::new(part.placed(scale, turn, shift)?), distance * scale)
-            }
+            Part::Offset(part, distance) => Part::Offset(Box::new(part.placed(scale, turn, shift)?), distance * scale),
         })
     }
 
@@ -208,9 +206,7 @@ impl Field for Part {
                 let first = boxes.next().unwrap_or(Aabb::EMPTY);
                 match operation {
                     Operation::Difference => first,
-                    Operation::Union => {
-                        boxes.fold(first, |a, b| Aabb { min: a.min.min(b.min), max: a.max.max(b.max) })
-                    }
+                    Operation::Union => boxes.fold(first, |a, b| Aabb { min: a.min.min(b.min), max: a.max.max(b.max) }),
                     Operation::Intersection => {
                         boxes.fold(first, |a, b| Aabb { min: a.min.max(b.min), max: a.max.min(b.max) })
                     }

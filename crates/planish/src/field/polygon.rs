@@ -86,11 +86,7 @@ impl Polygon {
         let l = best.sqrt();
         // On the outline itself the difference has no direction.
         let out = if l > 1e-9 * self.points[0].distance(self.points[1]) { (p - nearest) / l } else { normal };
-        if inside {
-            (-l, if out == normal { normal } else { -out })
-        } else {
-            (l, out)
-        }
+        if inside { (-l, if out == normal { normal } else { -out }) } else { (l, out) }
     }
 }
 

@@ -72,9 +72,8 @@ impl SampleField {
         let mut bounds = Aabb::of(&centers);
         bounds.min -= DVec3::splat(0.5 * widest);
         bounds.max += DVec3::splat(0.5 * widest);
-        let closing = close.then(|| {
-            Dipoles::new(&items.iter().map(|s| (s.center, s.normal * s.area)).collect::<Vec<_>>())
-        });
+        let closing =
+            close.then(|| Dipoles::new(&items.iter().map(|s| (s.center, s.normal * s.area)).collect::<Vec<_>>()));
         SampleField { samples: items, tree, bounds, widest, noise_deg: samples.normal_noise_deg, closing }
     }
 
@@ -230,12 +229,7 @@ impl SampleField {
 }
 
 /// Nested maxima and minima: the sheet that stands to all others in the same way is joined last.
-fn nest(
-    ids: &mut Vec<usize>,
-    all: &[Sheet],
-    relation: &[[f64; SHEETS]; SHEETS],
-    rows: &[usize],
-) -> (f64, DVec3) {
+fn nest(ids: &mut Vec<usize>, all: &[Sheet], relation: &[[f64; SHEETS]; SHEETS], rows: &[usize]) -> (f64, DVec3) {
     if rows.len() == 1 {
         let s = &all[ids[rows[0]]];
         return (s.distance, s.normal);
@@ -278,10 +272,10 @@ impl Field for SampleField {
     }
 
     fn values(&self, points: &[DVec3], values: &mut [f64]) {
-        values.par_iter_mut().zip(points).for_each_init(
-            || Vec::with_capacity(ASKED),
-            |near, (v, &p)| *v = self.evaluate_with(p, near).0,
-        );
+        values
+            .par_iter_mut()
+            .zip(points)
+            .for_each_init(|| Vec::with_capacity(ASKED), |near, (v, &p)| *v = self.evaluate_with(p, near).0);
     }
 
     fn crosses(&self, aabb: &Aabb) -> bool {

@@ -203,9 +203,7 @@ impl Solid {
     pub fn interval(&self, aabb: &Aabb) -> [f64; 2] {
         match self {
             Solid::Union(parts) => parts.iter().map(|s| s.interval(aabb)).fold([f64::INFINITY; 2], least),
-            Solid::Intersection(parts) => {
-                parts.iter().map(|s| s.interval(aabb)).fold([f64::NEG_INFINITY; 2], greatest)
-            }
+            Solid::Intersection(parts) => parts.iter().map(|s| s.interval(aabb)).fold([f64::NEG_INFINITY; 2], greatest),
             Solid::Difference(parts) => {
                 let Some((first, rest)) = parts.split_first() else { return [f64::INFINITY; 2] };
                 rest.iter().fold(first.interval(aabb), |all, s| {
@@ -270,16 +268,14 @@ impl Solid {
                 let b = solid.bounding_box();
                 Aabb { min: b.min - *distance, max: b.max + *distance }
             }
-            Solid::Union(parts) => parts.iter().map(Solid::bounding_box).fold(Aabb::EMPTY, |a, b| Aabb {
-                min: a.min.min(b.min),
-                max: a.max.max(b.max),
-            }),
-            Solid::Intersection(parts) => {
-                parts.iter().map(Solid::bounding_box).fold(centred(DVec3::INFINITY), |a, b| Aabb {
-                    min: a.min.max(b.min),
-                    max: a.max.min(b.max),
-                })
-            }
+            Solid::Union(parts) => parts
+                .iter()
+                .map(Solid::bounding_box)
+                .fold(Aabb::EMPTY, |a, b| Aabb { min: a.min.min(b.min), max: a.max.max(b.max) }),
+            Solid::Intersection(parts) => parts
+                .iter()
+                .map(Solid::bounding_box)
+                .fold(centred(DVec3::INFINITY), |a, b| Aabb { min: a.min.max(b.min), max: a.max.min(b.max) }),
             Solid::Difference(parts) => parts.first().map_or(Aabb::EMPTY, Solid::bounding_box),
         }
     }
@@ -332,7 +328,13 @@ fn cuboid(p: DVec3, half: DVec3, round: f64) -> (f64, DVec3) {
     if l > 0.0 {
         return (l - round, out / l * sign);
     }
-    let k = if q.x >= q.y && q.x >= q.z { 0 } else if q.y >= q.z { 1 } else { 2 };
+    let k = if q.x >= q.y && q.x >= q.z {
+        0
+    } else if q.y >= q.z {
+        1
+    } else {
+        2
+    };
     let mut g = DVec3::ZERO;
     g[k] = sign[k];
     (q[k] - round, g)
@@ -354,12 +356,7 @@ fn rectangle(p: DVec2, half: DVec2) -> (f64, DVec2) {
 
 /// Distance from the half section of a cut cone: `p.x` from the axis, `p.y` along it.
 fn frustum(p: DVec2, bottom: f64, top: f64, half: f64) -> (f64, DVec2) {
-    let corners = [
-        DVec2::new(0.0, -half),
-        DVec2::new(bottom, -half),
-        DVec2::new(top, half),
-        DVec2::new(0.0, half),
-    ];
+    let corners = [DVec2::new(0.0, -half), DVec2::new(bottom, -half), DVec2::new(top, half), DVec2::new(0.0, half)];
     // The convex outline: planes inside, segments outside. The axis is no side of it.
     let mut inside = f64::NEG_INFINITY;
     let mut normal = DVec2::Y;
@@ -424,7 +421,10 @@ mod tests {
             ("cut cone", Solid::Cone { bottom: 0.3, top: 0.6, height: 1.0 }),
             ("torus", Solid::Torus { major: 0.7, minor: 0.2 }),
             ("plane", Solid::Plane { normal: DVec3::new(0.6, 0.0, 0.8), offset: 0.2 }),
-            ("capsule", Solid::Capsule { from: DVec3::new(-0.5, 0.0, 0.1), to: DVec3::new(0.4, 0.3, 0.0), radius: 0.3 }),
+            (
+                "capsule",
+                Solid::Capsule { from: DVec3::new(-0.5, 0.0, 0.1), to: DVec3::new(0.4, 0.3, 0.0), radius: 0.3 },
+            ),
             ("extrusion", Solid::Extrusion { polygon, height: 0.6 }),
             (
                 "placed",

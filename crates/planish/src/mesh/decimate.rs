@@ -162,9 +162,8 @@ pub fn decimate(
 fn sharp_tags(mesh: &TriMesh, angle_deg: f64) -> FeatureTags {
     let adjacency = super::Adjacency::new(mesh);
     let sharp = super::sharp_edges(mesh, &adjacency, angle_deg);
-    let edges = (0..sharp.len() as u32)
-        .filter(|&h| sharp[h as usize])
-        .map(|h| [mesh.origin(h), mesh.origin(super::next(h))]);
+    let edges =
+        (0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| [mesh.origin(h), mesh.origin(super::next(h))]);
     FeatureTags::from_edges(mesh.points.len(), edges)
 }
 

@@ -405,9 +405,8 @@ mod tests {
         let cube = shapes::cuboid(DVec3::ONE, 16);
         let adjacency = Adjacency::new(&cube);
         let sharp = crate::mesh::sharp_edges(&cube, &adjacency, 40.0);
-        let edges = (0..sharp.len() as u32)
-            .filter(|&h| sharp[h as usize])
-            .map(|h| [cube.origin(h), cube.origin(next(h))]);
+        let edges =
+            (0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| [cube.origin(h), cube.origin(next(h))]);
         let tags = FeatureTags::from_edges(cube.points.len(), edges);
         let mut rough = noisy(&cube, 0.004);
         for (v, kind) in tags.vertices.iter().enumerate() {

@@ -80,8 +80,7 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
         (None, None) => Spacing::Voxel(voxel_for(&samples)),
     };
     let sampling = Sampling { spacing, memory: params.memory };
-    let mut meshed =
-        contour::from_field(&field, sampling, &params.contour, &Share { observer, from: 0.6, to: 0.95 })?;
+    let mut meshed = contour::from_field(&field, sampling, &params.contour, &Share { observer, from: 0.6, to: 0.95 })?;
     let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags);
     let to_points = distances(scan, &meshed.extracted.mesh);
     observer.progress(1.0);

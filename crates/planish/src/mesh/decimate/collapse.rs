@@ -20,7 +20,12 @@ impl Quadric {
     fn plane(n: DVec3, p: DVec3, weight: f64) -> Quadric {
         let d = -n.dot(p);
         let w = n * weight;
-        Quadric { a: [w.x * n.x, w.x * n.y, w.x * n.z, w.y * n.y, w.y * n.z, w.z * n.z], b: w * d, c: weight * d * d, weight }
+        Quadric {
+            a: [w.x * n.x, w.x * n.y, w.x * n.z, w.y * n.y, w.y * n.z, w.z * n.z],
+            b: w * d,
+            c: weight * d * d,
+            weight,
+        }
     }
 
     fn plus(mut self, o: &Quadric) -> Quadric {
@@ -237,7 +242,11 @@ impl<'a> Collapse<'a> {
             .iter()
             .map(|&v| {
                 // Vertices that never moved keep their bits.
-                if self.stamp[v as usize] == 0 { self.mesh.points[v as usize] } else { self.points[v as usize] + self.center }
+                if self.stamp[v as usize] == 0 {
+                    self.mesh.points[v as usize]
+                } else {
+                    self.points[v as usize] + self.center
+                }
             })
             .collect();
         let mut edges = Vec::new();
@@ -344,7 +353,9 @@ impl<'a> Collapse<'a> {
         let g = self.opposite[h as usize];
         let sides = [Some(h), (g != NONE).then_some(g)];
         let apex: Vec<u32> = sides.into_iter().flatten().map(|h| self.from(previous(h))).collect();
-        let on_rim = |v: u32| self.fan(v).any(|h| self.opposite[h as usize] == NONE || self.opposite[previous(h) as usize] == NONE);
+        let on_rim = |v: u32| {
+            self.fan(v).any(|h| self.opposite[h as usize] == NONE || self.opposite[previous(h) as usize] == NONE)
+        };
         // Two places of the rim that are joined across the mesh must stay apart.
         if g != NONE && on_rim(a) && on_rim(b) {
             return false;
