@@ -11,7 +11,7 @@ mod intersect;
 pub mod path;
 mod repair;
 mod rings;
-mod sets;
+pub(crate) mod sets;
 pub mod shapes;
 mod slivers;
 pub mod smooth;

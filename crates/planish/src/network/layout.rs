@@ -7,6 +7,7 @@
 //!    each drawn in a one-to-one map of that union ([`recut`]), so that nothing ever crosses or gets lost.
 
 mod complex;
+mod fill;
 mod improve;
 mod lines;
 mod outline;
@@ -14,7 +15,9 @@ mod partition;
 mod polygon;
 mod recut;
 mod refine;
+mod shape;
 mod slide;
+mod tips;
 
 use super::imprint::Shared;
 use super::{Corner, Curve, Network, Patch, Side, imprint};
@@ -53,7 +56,8 @@ pub struct LayoutParams {
     /// Edges whose faces meet at more than this angle are sharp and become patch boundaries.
     #[schemars(range(min = 1.0, max = 180.0), extend("unit" = "deg"))]
     pub sharp_angle_deg: f64,
-    /// Connected sharp edges shorter together than this fraction of the diagonal are surface detail.
+    /// Sharp lines with a loose end that are shorter than this fraction of the diagonal are surface detail, and so
+    /// are closed ones half as long.
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "diagonal"))]
     pub feature_length: f64,
     /// Rounds of relaxing corners and curves.
@@ -63,7 +67,7 @@ pub struct LayoutParams {
 
 impl Default for LayoutParams {
     fn default() -> LayoutParams {
-        LayoutParams { patches: 120, sharp_angle_deg: 40.0, feature_length: 0.05, smoothing: 3 }
+        LayoutParams { patches: 120, sharp_angle_deg: 40.0, feature_length: 0.1, smoothing: 3 }
     }
 }
 
@@ -118,6 +122,11 @@ pub fn layout(mesh: &TriMesh, params: &LayoutParams, observer: &dyn Observer) ->
             {
                 // Features may force more patches than asked for; shape is not given up for the number.
                 let patches = params.patches.max((FORCED * bench.complex.live_cells().count() as f64) as usize);
+                improve::relax(&mut bench, 1, observer)?;
+                let work_sharp = carry(&work, &work_adjacency, &sharp);
+                let ground = partition::Ground::new(&work.mesh, &work_adjacency, &work_sharp);
+                let tips = tips::tips(&ground, side);
+                tips::plant(&mut bench, &tips, patches);
                 improve::relax(&mut bench, 1, observer)?;
                 improve::improve(&mut bench, patches, observer)?;
                 improve::relax(&mut bench, params.smoothing, observer)?;
