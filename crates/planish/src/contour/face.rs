@@ -149,7 +149,7 @@ fn place(
     }
     // Along the feature, so that its vertices keep their order, not across it.
     let kept = lift(q.clamp(low + margin, high - margin));
-    let wish = refine.and_then(|r| r.nearest(kept, size.max_element())).unwrap_or(lift(q));
+    let wish = refine.and_then(|r| r.nearest(kept, size.max_element(), &[a, b])).unwrap_or(lift(q));
     Some((kept, Some(wish)))
 }
 

@@ -17,6 +17,7 @@ mod cell;
 mod certificate;
 mod face;
 mod feature;
+mod octree;
 mod patch;
 mod polish;
 mod refine;
@@ -32,6 +33,7 @@ pub use sources::{Meshed, MeshingError, Sampling, from_field, from_grid, from_me
 
 use face::FacePoints;
 use glam::DVec3;
+use octree::Octree;
 use patch::{INNER, Patcher, Scratch, Sheet};
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -49,11 +51,14 @@ pub struct ContourParams {
     pub corner: f64,
     /// No features: the standard algorithm
     pub plain: bool,
+    /// Merge cells where the surface is flat within this distance; all cells have one size if not given
+    #[schemars(range(min = 0.0), extend("unit" = "input units"))]
+    pub adaptive: Option<f64>,
 }
 
 impl Default for ContourParams {
     fn default() -> Self {
-        ContourParams { sharp: 0.9, corner: 0.7, plain: false }
+        ContourParams { sharp: 0.9, corner: 0.7, plain: false, adaptive: None }
     }
 }
 
@@ -113,6 +118,8 @@ pub struct Thresholds {
 
 /// Layers of cells that a task takes at once.
 const LAYERS: usize = 4;
+/// Normals within one merged cell of the standard algorithm differ by less than this (cosine).
+const SMOOTH: f64 = 0.9;
 /// Normals that differ by less than so many times their noise are no evidence of a feature.
 const NOISE: f64 = 3.0;
 
@@ -153,6 +160,16 @@ pub fn extract(
     observer.progress(0.3);
     let (faces, mut wishes) = FacePoints::join(field, parts, hits as u32);
 
+    let octree = params.adaptive.filter(|t| *t > 0.0).map(|tolerance| {
+        let cells = chunks.par_iter().flat_map_iter(|&(from, to)| {
+            let mut cells = Vec::new();
+            walk::walk(field, from, to, |cell| cells.push(octree::candidate(cell, base)));
+            cells
+        });
+        // Standard cells have no features to keep, but no reason to bend either.
+        let sharp = if params.plain { SMOOTH } else { limits.sharp };
+        Octree::new(field, base, cells.collect(), sharp, tolerance)
+    });
     let patcher = Patcher { field, limits: &limits, faces: &faces, refine: creases, base };
     let sheets: Option<Vec<Sheet>> = chunks
         .par_iter()
@@ -161,11 +178,16 @@ pub fn extract(
                 return None;
             }
             let (mut sheet, mut scratch) = (Sheet::default(), Scratch::default());
-            walk::walk(field, from, to, |cell| patcher.patch(cell, &mut scratch, &mut sheet));
+            walk::walk(field, from, to, |cell| {
+                if octree.as_ref().is_none_or(|o| !o.is_merged(cell.at)) {
+                    patcher.patch(cell, &mut scratch, &mut sheet);
+                }
+            });
             Some(sheet)
         })
         .collect();
-    let sheets = sheets.ok_or(ContourError::Cancelled)?;
+    let mut sheets = sheets.ok_or(ContourError::Cancelled)?;
+    sheets.extend(octree.iter().map(Octree::patches));
     observer.progress(0.8);
 
     let outer = hits + faces.len();
@@ -200,9 +222,13 @@ pub fn extract(
     let cells = sheets.iter().scan(0, |first, sheet| {
         let own = *first;
         *first += sheet.triangles.len() as u32;
-        Some(sheet.cells.iter().map(move |(at, t)| (*at, own + t)))
+        Some(sheet.cells.iter().map(move |&(at, a, b)| (at, own + a, own + b)))
     });
-    counts.moved = polish::polish(&mut mesh, field, base, cells.flatten().collect(), &wishes);
+    let mut cells: Vec<_> = cells.flatten().collect();
+    if octree.is_some() {
+        cells.par_sort_unstable_by_key(|c| [c.0[2], c.0[1], c.0[0]]);
+    }
+    counts.moved = polish::polish(&mut mesh, field, base, cells, &wishes);
     counts.kept = wishes.len() - counts.moved;
     let mut extracted = Extracted { mesh, tags: tags(kinds, edges), counts };
     drop_unused(&mut extracted);

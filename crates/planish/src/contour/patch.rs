@@ -44,8 +44,8 @@ pub struct Sheet {
     pub edges: Vec<[u32; 2]>,
     /// Inner vertices that were clamped.
     pub wishes: Vec<Wish>,
-    /// Cells with triangles, and the number of their first triangle.
-    pub cells: Vec<([u32; 3], u32)>,
+    /// Cells with triangles, and the numbers of their first triangle and of that after the last.
+    pub cells: Vec<([u32; 3], u32, u32)>,
     /// Cells whose feature had to be given up.
     pub fallbacks: usize,
     /// Cells whose patches were pushed in from the boundary.
@@ -83,7 +83,12 @@ const FAR: f64 = 1.0;
 impl Patcher<'_> {
     /// Appends the patches of `cell` to `sheet`.
     pub fn patch(&self, cell: &Cell, scratch: &mut Scratch, sheet: &mut Sheet) {
-        sheet.cells.push((cell.at.map(|x| x as u32), sheet.triangles.len() as u32));
+        let first = sheet.triangles.len() as u32;
+        self.patches(cell, scratch, sheet);
+        sheet.cells.push((cell.at.map(|x| x as u32), first, sheet.triangles.len() as u32));
+    }
+
+    fn patches(&self, cell: &Cell, scratch: &mut Scratch, sheet: &mut Sheet) {
         self.loops(cell, scratch);
         let count = scratch.ends.len();
         let low = self.field.lattice.node(cell.at[0], cell.at[1], cell.at[2]);
@@ -221,7 +226,7 @@ impl Patcher<'_> {
             // A bent edge looks like a corner; it is one only if that explains the hits much better.
             let rms = |p: DVec3| scratch.planes.iter().map(|(s, n)| n.dot(p - s).powi(2)).sum::<f64>();
             let edge = solve(&scratch.planes, middle, Shape::Edge);
-            if rms(edge) < CORNER_GAIN * rms(p) || !within(p, low, high, 0.0) {
+            if rms(edge) < CORNER_GAIN * rms(p) || !within(p, low, high, POKE) {
                 (shape, p) = (Shape::Edge, edge);
             }
         } else if shape == Shape::Edge && points.len() > 2 {
@@ -237,7 +242,7 @@ impl Patcher<'_> {
         let kind = if shape == Shape::Corner { FeatureKind::Corner } else { FeatureKind::Edge };
         let (clamped, moved) = inside(p, low, high);
         let mut apex = clamped;
-        let along = |r: &dyn Creases| r.nearest(clamped, (high - low).max_element());
+        let along = |r: &dyn Creases| r.nearest(clamped, (high - low).max_element(), &scratch.planes);
         let mut wish = moved.then(|| self.refine.filter(|_| shape == Shape::Edge).and_then(along).unwrap_or(p));
         let mut given_up = !features || !p.is_finite() || !within(p, low, high, FAR);
         if !given_up && turned(l, apex) {
@@ -317,6 +322,8 @@ impl Patcher<'_> {
     }
 }
 
+/// A corner may poke out of its cell by so much, in cells.
+const POKE: f64 = 0.5;
 /// A corner must explain the hits so many times better than an edge (squared distances).
 const CORNER_GAIN: f64 = 16.0;
 
@@ -386,7 +393,7 @@ pub fn cell_corners(low: DVec3, high: DVec3) -> [DVec3; 8] {
 }
 
 /// `p` kept clear of the faces of the cell, and whether it had to be moved.
-fn inside(p: DVec3, low: DVec3, high: DVec3) -> (DVec3, bool) {
+pub fn inside(p: DVec3, low: DVec3, high: DVec3) -> (DVec3, bool) {
     let margin = (high - low) * CLEAR;
     if p.is_nan() {
         return ((low + high) / 2.0, true);
@@ -404,11 +411,11 @@ fn within(p: DVec3, low: DVec3, high: DVec3, reach: f64) -> bool {
     p.cmpge(low - slack).all() && p.cmple(high + slack).all()
 }
 
-fn center(l: &[Corner]) -> DVec3 {
+pub fn center(l: &[Corner]) -> DVec3 {
     l.iter().map(|c| c.p).sum::<DVec3>() / l.len() as f64
 }
 
-fn fan(l: &[Corner], apex: u32, out: &mut Vec<[u32; 3]>) {
+pub fn fan(l: &[Corner], apex: u32, out: &mut Vec<[u32; 3]>) {
     for k in 0..l.len() {
         out.push([apex, l[k].id, l[(k + 1) % l.len()].id]);
     }
@@ -425,7 +432,7 @@ fn turned(l: &[Corner], apex: DVec3) -> bool {
 }
 
 /// Triangulates a loop without an inner vertex; false if there is no safe way.
-fn flat(l: &[Corner], out: &mut Vec<[u32; 3]>) -> bool {
+pub fn flat(l: &[Corner], out: &mut Vec<[u32; 3]>) -> bool {
     let n = l.len();
     if n == 3 {
         out.push([l[0].id, l[1].id, l[2].id]);

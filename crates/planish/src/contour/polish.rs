@@ -15,15 +15,15 @@ use glam::DVec3;
 /// Parts of the way that are tried.
 const WAYS: [f64; 3] = [1.0, 0.6, 0.3];
 /// Rounds: a neighbour that moved may make room.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 8;
 
 struct Polish<'a> {
     mesh: &'a mut TriMesh,
     field: &'a Directed,
     /// First name of the hits of each axis.
     base: [u32; 3],
-    /// Cells in the order of z, y, x with their first triangle.
-    cells: Vec<([u32; 3], u32)>,
+    /// Cells in the order of z, y, x with the range of their triangles.
+    cells: Vec<([u32; 3], u32, u32)>,
 }
 
 /// Moves the vertices of `wishes`; returns how many arrived where they belong.
@@ -31,16 +31,17 @@ pub fn polish(
     mesh: &mut TriMesh,
     field: &Directed,
     base: [u32; 3],
-    cells: Vec<([u32; 3], u32)>,
+    cells: Vec<([u32; 3], u32, u32)>,
     wishes: &[Wish],
 ) -> usize {
     if wishes.is_empty() {
         return 0;
     }
     let stars = stars(mesh, wishes);
+    let starts: Vec<DVec3> = wishes.iter().map(|(v, _)| mesh.points[*v as usize]).collect();
     let polish = Polish { mesh, field, base, cells };
     let mut open: Vec<usize> = (0..wishes.len()).collect();
-    let mut arrived = 0;
+    let mut arrived = vec![false; wishes.len()];
     for _ in 0..ROUNDS {
         open.retain(|&w| {
             let (v, target) = wishes[w];
@@ -48,7 +49,7 @@ pub fn polish(
             for way in WAYS {
                 polish.mesh.points[v as usize] = if way == 1.0 { target } else { start.lerp(target, way) };
                 if polish.allowed(&stars[w]) {
-                    arrived += (way == 1.0) as usize;
+                    arrived[w] = way == 1.0;
                     return way != 1.0;
                 }
             }
@@ -56,7 +57,23 @@ pub fn polish(
             true
         });
     }
-    arrived
+    // A vertex that moved before its neighbours turns triangles for a while. Where that stayed, it goes back.
+    for _ in 0..ROUNDS {
+        for (w, &(v, _)) in wishes.iter().enumerate() {
+            let here = polish.mesh.points[v as usize];
+            let turned = polish.turned_in(&stars[w]);
+            if turned == 0 || here == starts[w] {
+                continue;
+            }
+            polish.mesh.points[v as usize] = starts[w];
+            if polish.turned_in(&stars[w]) < turned && polish.allowed(&stars[w]) {
+                arrived[w] = false;
+            } else {
+                polish.mesh.points[v as usize] = here;
+            }
+        }
+    }
+    arrived.into_iter().filter(|&a| a).count()
 }
 
 /// Triangles around each vertex that wants to move.
@@ -77,16 +94,13 @@ fn stars(mesh: &TriMesh, wishes: &[Wish]) -> Vec<Vec<u32>> {
 }
 
 impl Polish<'_> {
-    /// True if the triangles of `star`, as they are now, meet nothing and face the way their hits do.
+    /// True if the triangles of `star`, as they are now, meet nothing.
     fn allowed(&self, star: &[u32]) -> bool {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for &t in star {
             let corners = self.mesh.corners(t as usize);
             low = corners.into_iter().fold(low, DVec3::min);
             high = corners.into_iter().fold(high, DVec3::max);
-            if self.turned(t, corners) {
-                return false;
-            }
         }
         let all = self.near(low, high);
         star.iter().all(|&s| {
@@ -98,6 +112,11 @@ impl Polish<'_> {
                 apart || !triangles_meet(p, names, q, self.mesh.triangles[t as usize])
             })
         })
+    }
+
+    /// Triangles of `star` that face against their hits.
+    fn turned_in(&self, star: &[u32]) -> usize {
+        star.iter().filter(|&&t| self.turned(t, self.mesh.corners(t as usize))).count()
     }
 
     /// True if a triangle faces against the normals of all hits among its corners.
@@ -130,17 +149,18 @@ impl Polish<'_> {
         for z in clamp(a.z, 2)..=clamp(b.z, 2) {
             for y in clamp(a.y, 1)..=clamp(b.y, 1) {
                 let (x0, x1) = (clamp(a.x, 0), clamp(b.x, 0));
-                let first = self.cells.partition_point(|(c, _)| [c[2], c[1], c[0]] < [z, y, x0]);
-                for n in first..self.cells.len() {
-                    let (c, t) = self.cells[n];
+                let first = self.cells.partition_point(|(c, ..)| [c[2], c[1], c[0]] < [z, y, x0]);
+                for &(c, first, end) in &self.cells[first..] {
                     if c[2] != z || c[1] != y || c[0] > x1 {
                         break;
                     }
-                    let end = self.cells.get(n + 1).map_or(self.mesh.triangles.len() as u32, |c| c.1);
-                    found.extend(t..end);
+                    found.extend(first..end);
                 }
             }
         }
+        // Merged cells name their triangles in each of their parts.
+        found.sort_unstable();
+        found.dedup();
         found
     }
 }

@@ -109,7 +109,16 @@ impl Creases for FieldCreases<'_> {
         found
     }
 
-    fn nearest(&self, _p: DVec3, _reach: f64) -> Option<DVec3> {
-        None
+    fn nearest(&self, p: DVec3, reach: f64, hits: &[(DVec3, DVec3)]) -> Option<DVec3> {
+        let mut found = solve(hits, p, Shape::Edge);
+        for share in ROUNDS {
+            let planes: Vec<_> = hits.iter().filter_map(|&hit| self.again(found, hit, share, None)).collect();
+            let normals: Vec<DVec3> = planes.iter().map(|p| p.1).collect();
+            if classify(&normals, self.sharp, self.corner) == Shape::Smooth {
+                break;
+            }
+            found = solve(&planes, found, Shape::Edge);
+        }
+        (found.distance(p) < reach).then_some(found)
     }
 }

@@ -165,7 +165,7 @@ impl Creases for MeshCreases {
         (hit.distance < REACH * size).then_some(hit.position)
     }
 
-    fn nearest(&self, p: DVec3, reach: f64) -> Option<DVec3> {
+    fn nearest(&self, p: DVec3, reach: f64, _hits: &[(DVec3, DVec3)]) -> Option<DVec3> {
         let hit = self.lines.as_ref()?.closest(p);
         (hit.distance < reach).then_some(hit.position)
     }

@@ -164,6 +164,7 @@ pub trait Creases: Sync {
         hits: &[(DVec3, DVec3)],
     ) -> Option<DVec3>;
 
-    /// The place of a feature nearest to `p`, within `reach`: where a vertex goes that had to stay in its cell.
-    fn nearest(&self, p: DVec3, reach: f64) -> Option<DVec3>;
+    /// The place of a feature nearest to `p`, within `reach`: where a vertex goes that had to stay in its cell. `hits`
+    /// are the positions and normals around.
+    fn nearest(&self, p: DVec3, reach: f64, hits: &[(DVec3, DVec3)]) -> Option<DVec3>;
 }
