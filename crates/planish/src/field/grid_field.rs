@@ -85,7 +85,7 @@ pub fn sample_grid(grid: &ScalarGrid, params: &GridParams, observer: &dyn Observ
     let (values, lattice) = shifted(grid, params);
     let [nx, ny, nz] = [0, 1, 2].map(|a| lattice.nodes(a));
     let value = |i: usize, j: usize, k: usize| values[lattice.row(j, k) * nx + i];
-    let planes: Vec<Option<(Vec<Vec<u32>>, [Vec<Placed>; 3])>> = (0..nz)
+    let planes: Vec<Option<Plane>> = (0..nz)
         .into_par_iter()
         .map(|k| {
             if observer.cancelled() {
@@ -142,6 +142,9 @@ pub fn sample_grid(grid: &ScalarGrid, params: &GridParams, observer: &dyn Observ
     observer.progress(1.0);
     Ok(field)
 }
+
+/// Changes of side of the rows of one plane, and its hits along the three axes.
+type Plane = (Vec<Vec<u32>>, [Vec<Placed>; 3]);
 
 /// Hits that come row by row already.
 fn in_order<'a>(rows: usize, planes: impl Iterator<Item = &'a Vec<Placed>>) -> Hits {

@@ -30,7 +30,7 @@ pub fn sample(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> 
         if cancelled.load(Ordering::Relaxed) {
             return Hit { t: 0.5, normal: DVec3::X };
         }
-        if at[0] % 64 == 0 && observer.cancelled() {
+        if at[0].is_multiple_of(64) && observer.cancelled() {
             cancelled.store(true, Ordering::Relaxed);
         }
         hit_on_edge(field, lattice, axis, at)
