@@ -3,6 +3,7 @@
 use crate::failure::Failure;
 use crate::options::{StageOptions, StageParams};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use planish::cloud::{CleanParams, ProjectParams};
 use planish::contour::ContourParams;
 use planish::field;
 use planish::grid::GridParams;
@@ -41,7 +42,9 @@ pub enum Command {
     Demo(Demo),
     /// Everything: mesh in; surfaces, displacement maps and a report out
     Run(Run),
-    /// Mesh, solid script, milling job or volume -> a closed mesh with sharp edges
+    /// Scan -> denoised, oriented points with outliers and features flagged
+    Clean(Clean),
+    /// Scan, mesh, solid script, milling job or volume -> a closed mesh with sharp edges
     Mesh(Mesh),
     /// Take noise off a mesh; sharp edges stay
     Smooth(Smooth),
@@ -141,11 +144,16 @@ pub struct Demo {
 /// `planish run`
 #[derive(Args, Debug)]
 pub struct Run {
-    /// The mesh: PLY, OBJ, STL, GLB or glTF
+    /// A mesh (PLY, OBJ, STL, GLB, glTF) or a scan (E57, LAS, LAZ, PLY without faces, PCD, XYZ, TXT, CSV, ASC, PTS, NPY,
+    /// NPZ)
     pub input: PathBuf,
     /// Folder for the products; made if missing
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub scan: ScanArgs,
+    #[command(flatten)]
+    pub holes: HoleArgs,
     /// Network to use instead of an automatic one
     #[arg(long, value_name = "NETWORK.json")]
     pub network: Option<PathBuf>,
@@ -158,10 +166,63 @@ pub struct Run {
     pub stages: AllStages,
 }
 
+/// How a scan is read.
+#[derive(Args, Clone, Debug, Default)]
+pub struct ScanArgs {
+    /// Columns of a text scan: letters (xyzirgb, n for a normal, _ skips) or names parted by commas
+    #[arg(long, value_name = "NAMES")]
+    pub columns: Option<String>,
+    /// Classes of a LAS scan that are kept, e.g. 2,6
+    #[arg(long, value_name = "N", value_delimiter = ',')]
+    pub classes: Vec<u8>,
+}
+
+/// Holes of a scan.
+#[derive(Args, Clone, Debug, Default)]
+pub struct HoleArgs {
+    /// Leave holes of a scan open
+    #[arg(long, conflicts_with = "close")]
+    pub open: bool,
+    /// Close holes of a scan
+    #[arg(long)]
+    pub close: bool,
+}
+
+impl HoleArgs {
+    /// What the user decided.
+    pub fn choice(&self) -> Option<bool> {
+        if self.open || self.close { Some(self.close) } else { None }
+    }
+}
+
+/// `planish clean`
+#[derive(Args, Debug)]
+pub struct Clean {
+    /// The scan: E57, LAS, LAZ, PLY, PCD, XYZ, TXT, CSV, ASC, PTS, NPY or NPZ
+    pub scan: PathBuf,
+    /// The points: .ply (all columns), .las, .e57 or .xyz
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Also write each segment into a file of its own beside the output
+    #[arg(long)]
+    pub segment: bool,
+    /// Also write feature lines as polylines
+    #[arg(long, value_name = "FILE.obj")]
+    pub lines: Option<PathBuf>,
+    #[command(flatten)]
+    pub options: ScanArgs,
+    #[command(flatten)]
+    pub common: Common,
+    #[command(flatten)]
+    pub clean: StageOptions<CleanParams>,
+    #[command(flatten)]
+    pub project: StageOptions<ProjectParams>,
+}
+
 /// `planish mesh`
 #[derive(Args, Debug)]
 pub struct Mesh {
-    /// A mesh (PLY, OBJ, STL, GLB, glTF), also one with holes and intersections; a script of solids or a milling job
+    /// A scan (see `clean`); a mesh (PLY, OBJ, STL, GLB, glTF), also one with holes and intersections; a script of solids or a milling job
     /// (.toml); or a volume (.nrrd, .npy)
     pub input: PathBuf,
     /// The mesh: .ply (with feature tags), .obj, .stl or .glb
@@ -182,6 +243,10 @@ pub struct Mesh {
     pub contour: StageOptions<ContourParams>,
     #[command(flatten)]
     pub volume: StageOptions<field::GridParams>,
+    #[command(flatten)]
+    pub scan: ScanArgs,
+    #[command(flatten)]
+    pub holes: HoleArgs,
 }
 
 /// `planish smooth`
@@ -362,6 +427,16 @@ impl StageParams for SmoothParams {
 impl StageParams for DecimateParams {
     const STAGE: &'static str = "decimate";
     const HEADING: &'static str = "Decimation: one target";
+}
+
+impl StageParams for CleanParams {
+    const STAGE: &'static str = "clean";
+    const HEADING: &'static str = "Samples of a scan";
+}
+
+impl StageParams for ProjectParams {
+    const STAGE: &'static str = "points";
+    const HEADING: &'static str = "Points that are written";
 }
 
 impl StageParams for LayoutParams {

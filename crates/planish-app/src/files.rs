@@ -37,6 +37,14 @@ pub fn tagged_mesh(path: &Path) -> Result<(TriMesh, Option<FeatureTags>), Failur
     planish_io::read_tagged_mesh(path).map_err(|e| Failure::input(path, e))
 }
 
+/// Reads a scan.
+/// # Errors
+/// If the file is no usable scan.
+pub fn scan(path: &Path, options: &crate::args::ScanArgs) -> Result<planish::cloud::Cloud, Failure> {
+    let options = planish_io::ScanOptions { columns: options.columns.clone(), classes: options.classes.clone() };
+    planish_io::read_scan(path, &options).map_err(|e| Failure::input(path, e))
+}
+
 /// Reads a model.
 /// # Errors
 /// If the file is no usable model.

@@ -105,6 +105,9 @@ pub enum ReadError {
         /// Faces found, all of them without area.
         faces: usize,
     },
+    /// There is nothing to be a scan.
+    #[error("the file has no points (0 found) - hint: write it again from its source")]
+    NoPoints,
     /// More than the 32-bit indices of a mesh can name, or than fits into memory.
     #[error(
         "{count} {what} are more than the {limit} that a mesh can hold ({place}) - hint: split or decimate the file"

@@ -210,7 +210,7 @@ fn write_with_edges(path: &Path, mesh: &TriMesh, edges: &[[u32; 2]], options: &W
 }
 
 /// The whole file, if it is one.
-fn content(path: &Path) -> Result<Vec<u8>, ReadError> {
+pub(crate) fn content(path: &Path) -> Result<Vec<u8>, ReadError> {
     let mut file = File::open(path)?;
     let metadata = file.metadata()?;
     if metadata.is_dir() {

@@ -17,6 +17,7 @@
 //! # Ok::<(), pipeline::PipelineError>(())
 //! ```
 
+pub mod cloud;
 pub mod contour;
 pub mod field;
 pub mod geom;

@@ -5,9 +5,11 @@
 
 mod quality;
 mod record;
+mod scan;
 
 pub use quality::{SEAM_ANGLE_WARNING_DEG, displaced_mesh, span_count, surface_mesh, surface_mesh_cut, worst_seams};
 pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
+pub use scan::{ScanError, ScanMeshed, ScanParams, mesh_scan, sample_figures, scan_figures, voxel_for};
 
 use crate::grid::{self, GridError, GridParams};
 use crate::mesh::{self, CompareError, MeshError, Repairs, TriMesh};

@@ -28,6 +28,7 @@ pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
         demanded: None,
         output: &args.output,
         up: Up::Z,
+        scan: None,
     };
     produce(session, job, staged, Vec::new())
 }

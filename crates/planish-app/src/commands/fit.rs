@@ -45,6 +45,7 @@ fn anew(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
         demanded: args.stages.demanded_tolerance(),
         output: &args.output,
         up: Up::default(),
+        scan: None,
     };
     fitted(session, job, vec![read])
 }

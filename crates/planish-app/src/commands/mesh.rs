@@ -7,11 +7,12 @@ use crate::files;
 use crate::products::Staged;
 use crate::progress;
 use crate::summary::Summary;
+use planish::cloud::CleanParams;
 use planish::contour::{self, Meshed, MeshingError, Sampling};
 use planish::field::{Part, Spacing};
 use planish::mesh::{TriMesh, diagnose};
 use planish::model::Units;
-use planish::pipeline::{Figure, Warning};
+use planish::pipeline::{self, Figure, ScanError, ScanParams, Warning};
 use planish_io::WriteOptions;
 use planish_io::report::{Input, Report, count, number};
 use planish_io::script::Script;
@@ -25,6 +26,7 @@ const MEMORY_GUESS: u64 = 8 << 30;
 
 /// What is to be meshed.
 enum Source {
+    Scan(planish::cloud::Cloud),
     Mesh(TriMesh),
     Script(Script),
     Grid(Box<planish::field::ScalarGrid>),
@@ -43,16 +45,41 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     };
     let memory = args.memory.map_or_else(default_memory, |gb| (gb * (1u64 << 30) as f64) as u64);
     let sampling = Sampling { spacing, memory };
+    let mut scanned = None;
     let (made, record) = session.bars.step("mesh", |o| match &source {
-        Source::Mesh(mesh) => contour::from_mesh(mesh, sampling, &params, o),
-        Source::Script(Script::Part(part)) => contour::from_part(part, sampling, &params, o),
-        Source::Script(Script::Job(milling)) => contour::from_field(milling, sampling, &params, o),
-        Source::Grid(grid) => contour::from_grid(grid, &grid_params, memory, &params, o),
+        Source::Scan(scan) => {
+            let params = ScanParams {
+                clean: CleanParams::default(),
+                contour: params.clone(),
+                voxel: args.voxel,
+                resolution: args.resolution.map(|n| n.get()),
+                memory,
+                close: args.holes.choice(),
+            };
+            match pipeline::mesh_scan(scan, &params, o) {
+                Ok(made) => {
+                    let meshed = made.meshed.clone();
+                    scanned = Some(made);
+                    Ok(meshed)
+                }
+                Err(ScanError::Mesh(e)) => Err(Trouble::Meshing(e)),
+                Err(ScanError::Cloud(e)) => Err(Trouble::Cloud(e)),
+            }
+        }
+        Source::Mesh(mesh) => contour::from_mesh(mesh, sampling, &params, o).map_err(Trouble::Meshing),
+        Source::Script(Script::Part(part)) => contour::from_part(part, sampling, &params, o).map_err(Trouble::Meshing),
+        Source::Script(Script::Job(milling)) => {
+            contour::from_field(milling, sampling, &params, o).map_err(Trouble::Meshing)
+        }
+        Source::Grid(grid) => contour::from_grid(grid, &grid_params, memory, &params, o).map_err(Trouble::Meshing),
     });
     if progress::interrupted() {
         return Err(Failure::interrupted());
     }
-    let made = made.map_err(|e| failure(args, &source, e))?;
+    let made = made.map_err(|e| match e {
+        Trouble::Meshing(e) => failure(args, &source, e),
+        Trouble::Cloud(e) => Failure::input(&args.input, super::with_hint(&e.to_string())),
+    })?;
     let (mesh, tags) = (&made.extracted.mesh, &made.extracted.tags);
     let options = WriteOptions { units, ..WriteOptions::default() };
     let (_, write) = session.step("write", || {
@@ -62,6 +89,9 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let mut report = Report::new("mesh", input);
     report.stages = vec![read, record, write];
     figures(&made, &mut report);
+    if let Some(scanned) = &scanned {
+        pipeline::scan_figures(scanned, &mut report.quality, &mut report.warnings);
+    }
     staged.commit()?;
     commit_report(own_report, &report)?;
     if !session.common.quiet {
@@ -69,6 +99,12 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
         table(args, &made, &report).print();
     }
     Ok(Status::Done)
+}
+
+/// What can go wrong with one of the sources.
+enum Trouble {
+    Meshing(MeshingError),
+    Cloud(planish::cloud::CloudError),
 }
 
 /// Reads whatever the input is, by its extension.
@@ -95,7 +131,7 @@ fn read(session: &Session, args: &Mesh) -> Result<(Source, Input, Units), Failur
         };
         return Ok((Source::Script(file.script), input, units));
     }
-    if planish_io::is_grid(path) {
+    if planish_io::is_grid(path) && !planish_io::is_scan(path) {
         let mut grid = planish_io::read_grid(path).map_err(|e| Failure::input(path, e))?;
         // NumPy arrays carry no size of a voxel.
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
@@ -112,6 +148,11 @@ fn read(session: &Session, args: &Mesh) -> Result<(Source, Input, Units), Failur
         };
         return Ok((Source::Grid(Box::new(grid)), input, units));
     }
+    if planish_io::is_scan(path) {
+        let scan = files::scan(path, &args.scan)?;
+        let input = super::clean::scan_facts(path, &scan, session.units());
+        return Ok((Source::Scan(scan), input, session.units()));
+    }
     let mesh = files::mesh(path)?;
     let input = files::mesh_facts(path, &mesh, session.units());
     Ok((Source::Mesh(mesh), input, session.units()))
@@ -126,7 +167,7 @@ fn failure(args: &Mesh, source: &Source, error: MeshingError) -> Failure {
     Failure::input(&args.input, super::with_hint(&error.to_string())).hint(hint)
 }
 
-fn default_memory() -> u64 {
+pub fn default_memory() -> u64 {
     let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
     let total =
         text.lines().find_map(|l| l.strip_prefix("MemTotal:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
@@ -179,6 +220,9 @@ fn table(args: &Mesh, made: &Meshed, report: &Report) -> Summary {
     let [x, y, z] = made.lattice.cells;
     table.row("input", format!("{}: {}", report.input.path, report.input.kind));
     table.row("voxel", format!("{} {unit} ({x} x {y} x {z} cells)", number(made.lattice.step.x)));
+    if let Some(noise) = report.figure("scan.noise") {
+        table.row("noise", planish_io::report::distance(noise, report.input.diagonal, unit));
+    }
     table.row("triangles", count(made.extracted.mesh.triangles.len() as u64));
     table.row("feature edges", count(made.extracted.tags.edges.len() as u64));
     table.row(

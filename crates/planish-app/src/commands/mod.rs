@@ -1,5 +1,6 @@
 //! One file per command, and what they share.
 
+mod clean;
 mod compare;
 mod decimate;
 mod demo;
@@ -30,6 +31,7 @@ pub fn run(cli: Cli) -> Result<Status, Failure> {
     match cli.command {
         Command::Demo(args) => demo::demo(&Session::new(&args.common)?, &args),
         Command::Run(args) => run::run(&Session::new(&args.common)?, &args),
+        Command::Clean(args) => clean::clean(&Session::new(&args.common)?, &args),
         Command::Mesh(args) => mesh::mesh(&Session::new(&args.common)?, &args),
         Command::Smooth(args) => smooth::smooth(&Session::new(&args.common)?, &args),
         Command::Decimate(args) => decimate::decimate(&Session::new(&args.common)?, &args),

@@ -18,7 +18,20 @@ use std::path::Path;
 pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
     let staged = Staged::folder(&args.output)?;
     let params = args.stages.params(session.common.seed)?;
-    let (input, read) = session.step("read", || files::mesh(&args.input))?;
+    let mut before = Vec::new();
+    let mut extra = None;
+    let input = if planish_io::is_scan(&args.input) {
+        let (scan, read) = session.step("read", || files::scan(&args.input, &args.scan))?;
+        let (mesh, more, records) = from_scan(session, &args.input, &scan, args.holes.choice(), &staged)?;
+        before.push(read);
+        before.extend(records);
+        extra = Some(more);
+        mesh
+    } else {
+        let (mesh, read) = session.step("read", || files::mesh(&args.input))?;
+        before.push(read);
+        mesh
+    };
     let network = files::optional_network(args.network.as_deref(), &input)?;
     let job = Job {
         command: "run",
@@ -29,8 +42,60 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
         demanded: args.stages.demanded_tolerance(),
         output: &args.output,
         up: args.up.into(),
+        scan: extra,
     };
-    produce(session, job, staged, vec![read])
+    produce(session, job, staged, before)
+}
+
+/// What the stages before the mesh found.
+pub struct ScanFacts {
+    /// Facts of the input.
+    pub input: report::Input,
+    /// Figures of the scan.
+    pub quality: pipeline::Quality,
+    /// Warnings of the scan.
+    pub warnings: Vec<pipeline::Warning>,
+}
+
+/// The stages from a scan to a mesh; leaves `points.ply`.
+pub fn from_scan(
+    session: &Session,
+    path: &Path,
+    scan: &planish::cloud::Cloud,
+    close: Option<bool>,
+    staged: &Staged,
+) -> Result<(TriMesh, ScanFacts, Vec<StageRecord>), Failure> {
+    let params = pipeline::ScanParams {
+        clean: Default::default(),
+        contour: Default::default(),
+        voxel: None,
+        resolution: None,
+        memory: super::mesh::default_memory(),
+        close,
+    };
+    let fault = |e: &dyn std::fmt::Display| Failure::input(path, super::with_hint(&e.to_string()));
+    let (made, mesh) = session.bars.step("mesh", |o| pipeline::mesh_scan(scan, &params, o));
+    if crate::progress::interrupted() {
+        return Err(Failure::interrupted());
+    }
+    let made = made.map_err(|e| fault(&e))?;
+    let (points, project) = session
+        .bars
+        .step("points", |o| planish::cloud::project(scan, &made.samples, params.clean.outlier, &Default::default(), o));
+    if crate::progress::interrupted() {
+        return Err(Failure::interrupted());
+    }
+    let points = points.map_err(|e| fault(&e))?;
+    planish_io::write_scan(staged.path("points.ply"), &points.cloud).map_err(|e| Failure::usage(path, e))?;
+    let mut facts = ScanFacts {
+        input: super::clean::scan_facts(path, scan, session.units()),
+        quality: Default::default(),
+        warnings: Vec::new(),
+    };
+    pipeline::scan_figures(&made, &mut facts.quality, &mut facts.warnings);
+    facts.quality.insert("scan.outliers".into(), pipeline::Figure::Count(points.outliers as u64));
+    facts.quality.insert("scan.moved_rms".into(), pipeline::Figure::Number(points.moved_rms));
+    Ok((made.meshed.extracted.mesh, facts, vec![mesh, project]))
 }
 
 /// A mesh on its way to a model.
@@ -51,6 +116,8 @@ pub struct Job<'a> {
     pub output: &'a Path,
     /// Axis that points up.
     pub up: Up,
+    /// What the stages before the mesh found, if the input is a scan.
+    pub scan: Option<ScanFacts>,
 }
 
 /// Fits a model and writes all products.
@@ -91,6 +158,11 @@ pub fn fitted(session: &Session, job: Job, before: Vec<StageRecord>) -> Result<(
     report.quality = quality;
     report.warnings = warnings;
     report.seams = seam_rows(&model, &seams);
+    if let Some(scan) = job.scan {
+        report.input = scan.input;
+        report.quality.extend(scan.quality);
+        report.warnings.extend(scan.warnings);
+    }
     model.units = units;
     model.params = serde_json::to_string(&job.params).map_err(Failure::fault)?;
     model.history.push(HistoryEntry { command: "fit".into(), parameters: model.params.clone() });

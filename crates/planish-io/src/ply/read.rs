@@ -64,6 +64,38 @@ pub(crate) fn read(bytes: &[u8]) -> Result<(TriMesh, Vec<[u32; 2]>), ReadError> 
     Ok((checked(mesh, polygons.count())?, edges))
 }
 
+/// True if the file is a PLY whose header has vertices and no faces.
+pub(crate) fn is_points(bytes: &[u8]) -> bool {
+    header(bytes).is_ok_and(|head| {
+        let some = |name: &str| head.elements.iter().any(|e| e.name == name && e.count > 0);
+        some("vertex") && !some("face") && !some("tristrips")
+    })
+}
+
+/// Reads the vertices alone, as points: coordinates that are not numbers stay, faces are stepped over.
+pub(crate) fn read_points(bytes: &[u8]) -> Result<TriMesh, ReadError> {
+    let head = header(bytes)?;
+    let Some(at) = head.elements.iter().position(|e| e.name == "vertex") else {
+        return Err(ReadError::NoPoints);
+    };
+    let layout = Layout::of(&head.elements[at], &head)?;
+    let mut mesh = TriMesh::default();
+    let mut body = Body::new(bytes, head.encoding, head.body, head.body_line);
+    for element in &head.elements[..=at] {
+        let (needed, left) = (element.count.saturating_mul(element.least_bytes(head.encoding)), body.left(bytes.len()));
+        if needed > left + 1 {
+            let what = format!("\"element {} {}\"", element.name, element.count);
+            return Err(ReadError::Truncated { what, needed, left, place: body.place() });
+        }
+        if element.name == "vertex" {
+            layout.read(element, &mut body, &mut mesh, bytes.len())?;
+        } else if !element.properties.is_empty() {
+            skip(element, &mut body, bytes.len())?;
+        }
+    }
+    Ok(mesh)
+}
+
 /// The two ends of each edge; none if the element is another thing of that name.
 fn read_edges(element: &Element, body: &mut Body, vertices: u64, total: usize) -> Result<Vec<[u32; 2]>, ReadError> {
     let whole = |name: &str| {

@@ -37,7 +37,9 @@ pub(crate) fn write<W: Write>(
         }
         columns.push(column);
     }
-    writeln!(out, "element face {}\nproperty list uchar int vertex_indices", mesh.triangles.len())?;
+    if !mesh.triangles.is_empty() {
+        writeln!(out, "element face {}\nproperty list uchar int vertex_indices", mesh.triangles.len())?;
+    }
     if !edges.is_empty() {
         writeln!(out, "element edge {}\nproperty int vertex1\nproperty int vertex2", edges.len())?;
     }
@@ -71,6 +73,17 @@ pub(crate) fn write<W: Write>(
         out.write_all(&v.to_le_bytes())?;
     }
     Ok(())
+}
+
+/// Writes points with attributes and no faces.
+pub(crate) fn write_points<W: Write>(
+    out: &mut W,
+    points: &[glam::DVec3],
+    attributes: &[Attribute],
+    generator: &str,
+) -> Result<(), WriteError> {
+    let mesh = TriMesh { points: points.to_vec(), triangles: Vec::new(), attributes: attributes.to_vec() };
+    write(out, &mesh, &[], generator)
 }
 
 /// How one attribute is written.

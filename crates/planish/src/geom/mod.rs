@@ -2,9 +2,11 @@
 
 mod aabb;
 mod bvh;
+mod kd_tree;
 pub mod predicates;
 pub mod random;
 pub mod tolerance;
 
 pub use aabb::Aabb;
 pub use bvh::{Bvh, RayHit, SurfaceHit};
+pub use kd_tree::{KdTree, nearest_distances};

@@ -1,0 +1,133 @@
+//! `planish clean`: a scan to denoised, oriented points with flags.
+
+use super::{Session, commit_report};
+use crate::args::Clean;
+use crate::failure::{Failure, Status};
+use crate::files;
+use crate::products::Staged;
+use crate::progress;
+use crate::summary::Summary;
+use planish::cloud::{self, Cleaned, Cloud, Samples};
+use planish::mesh::Attribute;
+use planish::pipeline::{self, Figure};
+use planish_io::report::{Input, Report, count, distance, number};
+use std::path::{Path, PathBuf};
+
+/// The facts of a scan as an input.
+pub fn scan_facts(path: &Path, scan: &Cloud, units: planish::model::Units) -> Input {
+    Input {
+        path: path.display().to_string(),
+        kind: "scan".into(),
+        counts: [("points".to_owned(), scan.points.len() as u64)].into(),
+        units: units.symbol().into(),
+        diagonal: scan.bounds().diagonal(),
+    }
+}
+
+pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
+    files::check_extension(&args.output, &["ply", "las", "e57", "xyz"])?;
+    let staged = Staged::file(&args.output)?;
+    let own_report = session.stage_report()?;
+    let params = args.clean.params(None)?;
+    let project = args.project.params(None)?;
+    let (scan, read) = session.step("read", || files::scan(&args.scan, &args.options))?;
+    let mut report = Report::new("clean", scan_facts(&args.scan, &scan, session.units()));
+    let (made, fit) = session.bars.step("samples", |o| cloud::clean(&scan, &params, o));
+    if progress::interrupted() {
+        return Err(Failure::interrupted());
+    }
+    let samples = made.map_err(|e| Failure::input(&args.scan, super::with_hint(&e.to_string())))?;
+    let (made, moved) = session.bars.step("points", |o| cloud::project(&scan, &samples, params.outlier, &project, o));
+    if progress::interrupted() {
+        return Err(Failure::interrupted());
+    }
+    let cleaned = made.map_err(|e| Failure::input(&args.scan, super::with_hint(&e.to_string())))?;
+    let wrong = |path: &Path, e: &dyn std::fmt::Display| Failure::usage(path, e);
+    let (_, write) = session.step("write", || {
+        planish_io::write_scan(staged.file_path(), &cleaned.cloud).map_err(|e| wrong(&args.output, &e))?;
+        if args.segment {
+            for (path, part) in segments(&args.output, &cleaned) {
+                planish_io::write_scan(&path, &part).map_err(|e| wrong(&path, &e))?;
+            }
+        }
+        if let Some(path) = &args.lines {
+            super::write_text(path, &lines_obj(&cleaned))?;
+        }
+        Ok(())
+    })?;
+    report.stages = vec![read, fit, moved, write];
+    pipeline::sample_figures(&samples, &mut report.quality, &mut report.warnings);
+    figures(&cleaned, &mut report);
+    staged.commit()?;
+    commit_report(own_report, &report)?;
+    if !session.common.quiet {
+        session.tell_warnings(&report);
+        table(args, &samples, &cleaned, &report).print();
+    }
+    Ok(Status::Done)
+}
+
+fn figures(cleaned: &Cleaned, report: &mut Report) {
+    let counts = [
+        ("scan.outliers", cleaned.outliers),
+        ("scan.points_out", cleaned.cloud.points.len()),
+        ("scan.feature_lines", cleaned.lines.len()),
+    ];
+    report.quality.extend(counts.map(|(key, n)| (key.to_owned(), Figure::Count(n as u64))));
+    report.quality.insert("scan.moved_rms".into(), Figure::Number(cleaned.moved_rms));
+}
+
+/// The points of each segment beside the output: `NAME-0.ply`, `NAME-1.ply` ...
+fn segments(output: &Path, cleaned: &Cleaned) -> Vec<(PathBuf, Cloud)> {
+    let Some(Attribute { values, .. }) = cleaned.cloud.attribute("segment", 1) else { return Vec::new() };
+    let most = values.iter().copied().fold(0.0, f32::max) as usize;
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let extension = output.extension().unwrap_or_default().to_string_lossy().into_owned();
+    (0..=most)
+        .filter_map(|k| {
+            let ids: Vec<u32> = (0..values.len() as u32).filter(|&i| values[i as usize] as usize == k).collect();
+            let path = output.with_file_name(format!("{stem}-{k}.{extension}"));
+            (!ids.is_empty()).then(|| (path, cleaned.cloud.select(&ids)))
+        })
+        .collect()
+}
+
+/// Feature lines as polylines of an OBJ file.
+fn lines_obj(cleaned: &Cleaned) -> String {
+    use std::fmt::Write;
+    let mut text = format!("# planish {}: feature lines\n", env!("CARGO_PKG_VERSION"));
+    let mut next = 1;
+    for line in &cleaned.lines {
+        for p in line {
+            let p = *p + cleaned.cloud.shift;
+            let _ = writeln!(text, "v {} {} {}", p.x, p.y, p.z);
+        }
+        text.push('l');
+        for k in 0..line.len() {
+            let _ = write!(text, " {}", next + k);
+        }
+        text.push('\n');
+        next += line.len();
+    }
+    text
+}
+
+fn table(args: &Clean, samples: &Samples, cleaned: &Cleaned, report: &Report) -> Summary {
+    let (unit, diagonal) = (report.input.units.as_str(), report.input.diagonal);
+    let mut table = Summary::default();
+    table.row("input", format!("{}: {} points", report.input.path, count(report.input.counts["points"])));
+    table.row("noise", distance(samples.noise, diagonal, unit));
+    table.row("spacing", distance(samples.spacing, diagonal, unit));
+    table.row("samples", count(samples.samples.len() as u64));
+    table.row("segments", count(samples.closed.len() as u64));
+    table.row(
+        "orientation",
+        format!("{} % of the evidence agrees", number(100.0 * report.figure("scan.confidence").unwrap_or(0.0))),
+    );
+    table.row("outliers", count(cleaned.outliers as u64));
+    table.row("points", format!("{}: {}", args.output.display(), count(cleaned.cloud.points.len() as u64)));
+    if let Some(path) = &args.lines {
+        table.row("feature lines", format!("{}: {}", path.display(), count(cleaned.lines.len() as u64)));
+    }
+    table
+}

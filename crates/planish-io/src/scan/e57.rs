@@ -1,0 +1,90 @@
+//! E57: scans with poses (ASTM E2807). All scans of a file become one cloud.
+
+use super::{column, foreign, guarded};
+use crate::{Place, ReadError, WriteError};
+use e57::{CartesianCoordinate, E57Reader, E57Writer, Record, RecordValue};
+use glam::DVec3;
+use planish::cloud::Cloud;
+use std::io::Cursor;
+use std::path::Path;
+
+pub(super) fn read(bytes: Vec<u8>) -> Result<Cloud, ReadError> {
+    if !bytes.starts_with(b"ASTM-E57") {
+        return Err(ReadError::WrongFormat {
+            expected: "E57",
+            found: "something else",
+            hint: "name a file that begins with ASTM-E57".into(),
+        });
+    }
+    let size = bytes.len() as u64;
+    guarded(move || {
+        E57Reader::validate_crc(Cursor::new(&bytes)).map_err(|e| foreign(format!("a page is damaged: {e}")))?;
+        let mut file = E57Reader::new(Cursor::new(&bytes)).map_err(foreign)?;
+        let mut cloud = Cloud::default();
+        let (mut color, mut intensity) = (Vec::new(), Vec::new());
+        let (mut has_color, mut has_intensity) = (false, false);
+        for (k, scan) in file.pointclouds().into_iter().enumerate() {
+            // A point takes at least one bit.
+            if scan.records / 8 > size {
+                let (what, needed) = (format!("scan {k} with {} points", scan.records), scan.records / 8);
+                return Err(ReadError::Truncated { what, needed, left: size, place: Place::Item("scan", k) });
+            }
+            let origin = scan.transform.as_ref().map(|t| &t.translation).map(|t| DVec3::new(t.x, t.y, t.z));
+            cloud.scanners.push(origin.unwrap_or(DVec3::ZERO));
+            let mut points = file.pointcloud_simple(&scan).map_err(foreign)?;
+            points.apply_pose(true);
+            points.spherical_to_cartesian(true);
+            for point in points {
+                let p = point.map_err(foreign)?;
+                let CartesianCoordinate::Valid { x, y, z } = p.cartesian else { continue };
+                cloud.points.push(DVec3::new(x, y, z));
+                cloud.seen_by.push(k as u32);
+                has_color |= p.color.is_some();
+                has_intensity |= p.intensity.is_some();
+                color.extend(p.color.map_or([0.0; 3], |c| [c.red, c.green, c.blue]));
+                intensity.push(p.intensity.unwrap_or(0.0));
+            }
+        }
+        if has_color {
+            cloud.attributes.push(column("color", 3, color));
+        }
+        if has_intensity {
+            cloud.attributes.push(column("intensity", 1, intensity));
+        }
+        Ok(cloud)
+    })
+}
+
+/// Identifiers in a file written here: the content decides, so that the same cloud gives the same bytes.
+fn guid(name: &str, count: usize) -> String {
+    format!("{{planish-{name}-{count}}}")
+}
+
+pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud) -> Result<(), WriteError> {
+    let fault = |e: e57::Error| WriteError::Io(std::io::Error::other(e));
+    let mut file = E57Writer::from_file(path, &guid("file", world.len())).map_err(fault)?;
+    let color = cloud.attribute("color", 3);
+    let intensity = cloud.attribute("intensity", 1);
+    let mut prototype = vec![Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64];
+    if color.is_some() {
+        prototype.extend([Record::COLOR_RED_U8, Record::COLOR_GREEN_U8, Record::COLOR_BLUE_U8]);
+    }
+    if intensity.is_some() {
+        prototype.push(Record::INTENSITY_UNIT_F32);
+    }
+    let mut scan = file.add_pointcloud(&guid("scan", world.len()), prototype).map_err(fault)?;
+    scan.set_name(Some("planish".into()));
+    for (i, p) in world.iter().enumerate() {
+        let mut values: Vec<RecordValue> = p.to_array().map(RecordValue::Double).into();
+        if let Some(a) = color {
+            let byte = |x: f32| RecordValue::Integer((x.clamp(0.0, 1.0) * 255.0).round() as i64);
+            values.extend(a.values[3 * i..3 * i + 3].iter().map(|&x| byte(x)));
+        }
+        if let Some(a) = intensity {
+            values.push(RecordValue::Single(a.values[i].clamp(0.0, 1.0)));
+        }
+        scan.add_point(values).map_err(fault)?;
+    }
+    scan.finalize().map_err(fault)?;
+    file.finalize().map_err(fault)
+}

@@ -1,0 +1,169 @@
+//! Scan formats: there and back, and files that are damaged.
+
+use glam::DVec3;
+use planish::cloud::Cloud;
+use planish::mesh::Attribute;
+use planish_io::{ReadError, ScanOptions, is_scan, read_scan, write_scan};
+use std::path::PathBuf;
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+fn column(name: &str, width: usize, values: Vec<f32>) -> Attribute {
+    Attribute { name: name.into(), width, values }
+}
+
+/// Points with large coordinates, colour and intensity.
+fn scan(count: usize) -> Cloud {
+    let points = (0..count)
+        .map(|i| {
+            DVec3::new(515_380.25 + 0.001 * i as f64, 4_918_360.5 - 0.002 * i as f64, 2_330.0 + (i % 7) as f64 * 0.01)
+        })
+        .collect();
+    let color = (0..3 * count).map(|k| (k % 256) as f32 / 255.0).collect();
+    let intensity = (0..count).map(|k| (k % 100) as f32 / 100.0).collect();
+    Cloud { attributes: vec![column("color", 3, color), column("intensity", 1, intensity)], ..Cloud::new(points) }
+}
+
+fn read(path: &PathBuf) -> Result<Cloud, ReadError> {
+    read_scan(path, &ScanOptions::default())
+}
+
+#[test]
+fn large_coordinates_survive_every_written_format_within_1e_6_and_leave_with_their_shift() {
+    let folder = folder();
+    let given = scan(500);
+    for extension in ["ply", "las", "e57", "xyz"] {
+        let path = folder.path().join(format!("a.{extension}"));
+        write_scan(&path, &given).unwrap();
+        assert!(is_scan(&path), "{extension}");
+        let back = read(&path).unwrap();
+        assert!(back.shift.length() > 1e6, "{extension}");
+        assert_eq!(back.points.len(), 500);
+        for (p, q) in given.points.iter().zip(&back.points) {
+            assert!((*p - (*q + back.shift)).length() < 1e-6, "{extension}: {p} {q}");
+        }
+        let again = folder.path().join(format!("b.{extension}"));
+        write_scan(&again, &back).unwrap();
+        let twice = read(&again).unwrap();
+        assert!(twice.points.iter().zip(&back.points).all(|(p, q)| (*p - *q).length() < 1e-6), "{extension}");
+        let color = back.attribute("color", 3).unwrap();
+        assert!((color.values[3 * 20] - 60.0 / 255.0).abs() < 0.003, "{extension}");
+        let intensity = back.attribute("intensity", 1).unwrap();
+        assert!((intensity.values[42] - 0.42).abs() < 0.003, "{extension}");
+    }
+}
+
+#[test]
+fn text_columns_come_from_the_header_the_option_or_a_guess() {
+    let folder = folder();
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let header = read(&write("a.csv", "intensity,x,y,z\n0.5,1,2,3\n0.7,4,5,6\n")).unwrap();
+    assert_eq!(header.points, [DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0)]);
+    assert_eq!(header.attribute("intensity", 1).unwrap().values, [0.5, 0.7]);
+    let guess = read(&write("a.xyz", "# made by hand\n1 2 3 0 0 1\n4 5 6 0 1 0\n")).unwrap();
+    assert_eq!(guess.attribute("normal", 3).unwrap().values, [0.0, 0.0, 1.0, 0.0, 1.0, 0.0]);
+    let pts = read(&write("a.pts", "2\n1 2 3 -1000 255 0 51\n4 5 6 12 0 255 0\n")).unwrap();
+    assert_eq!(pts.points.len(), 2);
+    assert_eq!(pts.attribute("color", 3).unwrap().values[..3], [1.0, 0.0, 0.2]);
+    let options = ScanOptions { columns: Some("_yxz".into()), ..ScanOptions::default() };
+    let named = read_scan(write("b.txt", "9;2;1;3\n9;5;4;6\n"), &options).unwrap();
+    assert_eq!(named.points[0], DVec3::new(1.0, 2.0, 3.0));
+    let wrong = ScanOptions { columns: Some("ab".into()), ..ScanOptions::default() };
+    assert!(matches!(read_scan(write("c.txt", "1 2 3\n"), &wrong), Err(ReadError::Header { .. })));
+    assert!(matches!(read(&write("d.xyz", "1 2 3\n4 five 6\n")), Err(ReadError::Syntax { .. })));
+    assert!(matches!(read(&write("e.xyz", "1 2 3\n4 5\n")), Err(ReadError::Syntax { .. })));
+    assert!(matches!(read(&write("f.xyz", "# nothing\n")), Err(ReadError::NoPoints)));
+    assert!(matches!(read(&write("g.xyz", "")), Err(ReadError::Empty)));
+}
+
+fn pcd(data: &str, body: &[u8]) -> Vec<u8> {
+    let mut bytes = format!(
+        "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\n\
+         VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA {data}\n"
+    )
+    .into_bytes();
+    bytes.extend_from_slice(body);
+    bytes
+}
+
+#[test]
+fn pcd_is_read_as_text_binary_and_compressed() {
+    let folder = folder();
+    let rgb = f32::from_bits(0x00ff_8000);
+    let rows = [[1.0f32, 2.0, 3.0, rgb], [4.0, 5.0, 6.0, rgb]];
+    let binary: Vec<u8> = rows.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+    let columns: Vec<u8> = (0..4).flat_map(|k| rows.map(|r| r[k].to_le_bytes())).flatten().collect();
+    // LZF with plain runs only.
+    let packed: Vec<u8> = columns.chunks(32).flat_map(|c| [&[c.len() as u8 - 1], c].concat()).collect();
+    let mut compressed = [(packed.len() as u32).to_le_bytes(), (columns.len() as u32).to_le_bytes()].concat();
+    compressed.extend(packed);
+    let text = format!("1 2 3 {rgb:e}\n4 5 6 {rgb:e}\n").into_bytes();
+    for (data, body) in [("ascii", text), ("binary", binary), ("binary_compressed", compressed)] {
+        let path = folder.path().join(format!("{data}.pcd"));
+        let bytes = pcd(data, &body);
+        std::fs::write(&path, &bytes).unwrap();
+        let cloud = read(&path).unwrap();
+        assert_eq!(cloud.points, [DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0)], "{data}");
+        assert_eq!(cloud.attribute("color", 3).unwrap().values[..3], [1.0, 128.0 / 255.0, 0.0]);
+        // Cut anywhere: an error, never a panic.
+        for cut in 1..bytes.len() - 2 {
+            std::fs::write(&path, &bytes[..cut]).unwrap();
+            assert!(read(&path).is_err(), "{data} cut at {cut}");
+        }
+    }
+}
+
+fn npy(shape: &str, values: &[f64]) -> Vec<u8> {
+    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(values.iter().flat_map(|x| x.to_le_bytes()));
+    bytes
+}
+
+#[test]
+fn numpy_rows_are_points_and_volumes_are_not() {
+    let folder = folder();
+    let path = folder.path().join("a.npy");
+    std::fs::write(&path, npy("(2, 3)", &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])).unwrap();
+    assert!(is_scan(&path));
+    assert_eq!(read(&path).unwrap().points[1], DVec3::new(4.0, 5.0, 6.0));
+    std::fs::write(&path, npy("(2, 2, 2)", &[0.0; 8])).unwrap();
+    assert!(!is_scan(&path));
+    std::fs::write(&path, npy("(20000000, 3)", &[0.0; 6])).unwrap();
+    assert!(matches!(read(&path), Err(ReadError::Truncated { .. })));
+}
+
+#[test]
+fn truncated_and_flipped_binary_scans_give_an_error_or_a_result_and_never_hang() {
+    std::panic::set_hook(Box::new(|_| {}));
+    let folder = folder();
+    for extension in ["las", "e57"] {
+        let path = folder.path().join(format!("a.{extension}"));
+        write_scan(&path, &scan(300)).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        for part in [1, 10, 100, bytes.len() / 3, bytes.len() / 2, bytes.len() - 40] {
+            std::fs::write(&path, &bytes[..part]).unwrap();
+            assert!(read(&path).is_err(), "{extension} cut at {part}");
+        }
+        for k in 0..120 {
+            let mut damaged = bytes.clone();
+            let at = (k * 7919 + 5) % bytes.len();
+            damaged[at] ^= 0xff;
+            std::fs::write(&path, &damaged).unwrap();
+            let result = read(&path);
+            // Every page of E57 carries a checksum.
+            assert!(extension != "e57" || result.is_err(), "{extension} flipped at {at}");
+        }
+    }
+    let path = folder.path().join("b.las");
+    std::fs::write(&path, b"this is no scan").unwrap();
+    assert!(matches!(read(&path), Err(ReadError::WrongFormat { .. })));
+}

@@ -1,0 +1,315 @@
+//! Fits of one sheet to weighted points: both families of quadrics and the choice between them.
+//!
+//! [X03] §4.1, §6.2; [T91] Taubin, *Estimation of Planar Curves, Surfaces and Nonplanar Space Curves Defined by
+//! Implicit Equations*, 1991: the normalisation of family B.
+//! 1. frame: smallest eigenvector of the covariance, then the gradient of the height field
+//! 2. family A: a plane or a height-field quadric; family B: a general quadric by inverse iteration
+//! 3. choice by AICc on first-order distances; robust weights from the residuals, then again from 1.
+//!
+//! Departs from [X03]: the singular vector of the algebraic distance is biased and changes under rigid motion, so family
+//! B takes Taubin's constraint; family B is asked only where the next term of a height field (order four) would show in
+//! the residual. The weights of a fit are flat in the middle (1 - t^4): a bell wastes half of the points, and
+//! smoothness comes from the blend. [X03] mixes models that are close; one is chosen here, since the blend of
+//! neighbouring fits mixes them anyway.
+
+use super::Quadric;
+use super::dense;
+use super::moments::Moments;
+use glam::DVec3;
+
+/// Points closer to zero than this many noise levels keep their weight (Tukey's biweight, 95 % efficiency).
+const TUKEY: f64 = 4.685;
+/// Rounds of robust weights.
+const ROUNDS: usize = 3;
+/// Family B is tried when the fourth-order term of the height field is above this share of the residual.
+const ORDER_FOUR_SHARE: f64 = 0.2;
+/// Fewest points of effective weight: two more than the six parameters of a height field.
+pub(super) const FEWEST: f64 = 8.0;
+
+/// Right-handed orthonormal axes with `n` along the surface normal.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    pub u: DVec3,
+    pub v: DVec3,
+    pub n: DVec3,
+}
+
+impl Frame {
+    pub(super) fn of(n: DVec3) -> Frame {
+        // The axis farthest from n gives the steadiest tangent; ties go to the first.
+        let a = n.abs();
+        let axis = if a.x <= a.y && a.x <= a.z {
+            DVec3::X
+        } else if a.y <= a.z {
+            DVec3::Y
+        } else {
+            DVec3::Z
+        };
+        let u = axis.cross(n).normalize();
+        Frame { u, v: n.cross(u), n }
+    }
+
+    /// Frame of the plane of least squared distances.
+    pub(super) fn of_moments(m: &Moments) -> Frame {
+        let (_, rows) = dense::eigen3(m.covariance());
+        Frame::of(DVec3::from_array(rows[0]))
+    }
+}
+
+/// Coefficients of a height field in its frame: n = a uu + b uv + c vv + d u + e v + f.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Height {
+    pub frame: Frame,
+    pub c: [f64; 6],
+}
+
+impl Height {
+    #[inline]
+    pub(super) fn residual(&self, y: DVec3) -> f64 {
+        let (u, v) = (self.frame.u.dot(y), self.frame.v.dot(y));
+        let c = &self.c;
+        self.frame.n.dot(y) - (u * (c[0] * u + c[1] * v + c[3]) + v * (c[2] * v + c[4]) + c[5])
+    }
+
+    /// As coefficients of a quadric in local coordinates.
+    pub(super) fn implicit(&self) -> [f64; 10] {
+        let t = directions(&self.frame);
+        let mut a = t[0];
+        for k in 0..6 {
+            for i in 0..10 {
+                a[i] -= self.c[k] * t[k + 1][i];
+            }
+        }
+        a
+    }
+
+    /// The frame whose normal is the gradient at the foot of the origin.
+    fn tilted(&self) -> Frame {
+        Frame::of((self.frame.n - self.c[3] * self.frame.u - self.c[4] * self.frame.v).normalize())
+    }
+}
+
+/// Coefficients of n, uu, uv, vv, u, v, 1 as quadrics.
+fn directions(f: &Frame) -> [[f64; 10]; 7] {
+    let product = |a: DVec3, b: DVec3| {
+        [
+            a.x * b.x,
+            a.x * b.y + a.y * b.x,
+            a.x * b.z + a.z * b.x,
+            a.y * b.y,
+            a.y * b.z + a.z * b.y,
+            a.z * b.z,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        ]
+    };
+    let linear = |a: DVec3| [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, a.x, a.y, a.z, 0.0];
+    let mut one = [0.0; 10];
+    one[9] = 1.0;
+    [linear(f.n), product(f.u, f.u), product(f.u, f.v), product(f.v, f.v), linear(f.u), linear(f.v), one]
+}
+
+/// Least-squares height field in a frame. `None` if the points do not determine one.
+pub(super) fn height(matrix: &[[f64; 10]; 10], frame: Frame) -> Option<Height> {
+    let t = directions(&frame);
+    let mut g = [[0.0; 6]; 6];
+    let mut b = [0.0; 6];
+    let mut image = [[0.0; 10]; 7];
+    for k in 0..7 {
+        for i in 0..10 {
+            if t[k][i] != 0.0 {
+                for j in 0..10 {
+                    image[k][j] += t[k][i] * matrix[i][j];
+                }
+            }
+        }
+    }
+    let dot = |a: &[f64; 10], b: &[f64; 10]| (0..10).map(|i| a[i] * b[i]).sum::<f64>();
+    for i in 0..6 {
+        b[i] = dot(&image[0], &t[i + 1]);
+        for j in 0..=i {
+            g[i][j] = dot(&image[i + 1], &t[j + 1]);
+        }
+    }
+    ridge(&mut g);
+    dense::solve(&mut g, &mut b).then_some(Height { frame, c: b })
+}
+
+/// A height field in the frame of the points, once more in the frame of its own gradient.
+pub(super) fn framed_height(matrix: &[[f64; 10]; 10], start: Frame) -> Option<Height> {
+    let first = height(matrix, start)?;
+    // Below six degrees the frame makes no difference to a height field that shows.
+    if first.c[3].hypot(first.c[4]) < 0.1 {
+        return Some(first);
+    }
+    height(matrix, first.tilted())
+}
+
+/// The plane of least squared offsets along the normal of a frame.
+fn plane(m: &Moments, frame: Frame) -> [f64; 10] {
+    let mut a = [0.0; 10];
+    [a[6], a[7], a[8]] = frame.n.to_array();
+    a[9] = -m.mean().dot(frame.n);
+    a
+}
+
+/// A relative ridge at the level of rounding: collinear points leave directions without data.
+fn ridge<const N: usize>(g: &mut [[f64; N]; N]) {
+    for i in 0..N {
+        g[i][i] += 1e-13 * g[i][i] + 1e-300;
+    }
+}
+
+/// The general quadric of least squared values under Taubin's constraint, near the quadric `start`.
+pub(super) fn general(m: &Moments, start: &[f64; 10]) -> Option<[f64; 10]> {
+    let mut matrix = m.matrix();
+    let n = m.gradient_matrix();
+    let trace: f64 = (0..10).map(|i| matrix[i][i]).sum();
+    for i in 0..10 {
+        // On exact data the matrix is singular at the answer; the shift keeps the factor and moves nothing else.
+        matrix[i][i] += 1e-14 * trace;
+    }
+    if !dense::factor(&mut matrix) {
+        return None;
+    }
+    let mut a = *start;
+    // Inverse iteration gains the ratio of the two least eigenvalues each time.
+    for _ in 0..4 {
+        let mut b = [0.0; 10];
+        for i in 0..10 {
+            b[i] = (0..10).map(|j| n[i][j] * a[j]).sum();
+        }
+        dense::substitute(&matrix, &mut b);
+        let norm = b.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if !(norm > 0.0) || !norm.is_finite() {
+            return None;
+        }
+        a = b.map(|x| x / norm);
+    }
+    Some(a)
+}
+
+/// A point of a neighbourhood, in local coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Weighted {
+    pub y: DVec3,
+    pub weight: f64,
+}
+
+/// One fitted sheet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sheet {
+    pub quadric: Quadric,
+    /// Root of the weighted mean of squared first-order distances, corrected for the parameters; world units.
+    pub rms: f64,
+    /// Parameters of the model: 3 plane, 6 height field, 9 general quadric.
+    pub parameters: f64,
+}
+
+/// Fits a sheet to points in local coordinates around `center` with unit `scale`.
+///
+/// * `start` - a first guess whose residuals give the first robust weights, or `None`
+/// * `noise` - standard deviation of the points in local units
+pub(super) fn sheet(
+    center: DVec3,
+    scale: f64,
+    points: &[Weighted],
+    start: Option<&Quadric>,
+    noise: f64,
+    rounds: Option<usize>,
+) -> Option<Sheet> {
+    let mut model = start.map(|q| (localized(q, center, scale), 6.0));
+    let mut weights: Vec<f64> = Vec::with_capacity(points.len());
+    let mut last = None;
+    for _ in 0..rounds.unwrap_or(ROUNDS) {
+        let mut m = Moments::ZERO;
+        weights.clear();
+        for p in points {
+            let w = match &model {
+                Some((q, _)) => p.weight * tukey(q.distance(p.y).0 / noise),
+                None => p.weight,
+            };
+            weights.push(w);
+            if w > 0.0 {
+                m.add(p.y, w);
+            }
+        }
+        if m.weight() < FEWEST {
+            return None;
+        }
+        let frame = match &model {
+            Some((q, _)) => Frame::of(q.value(m.mean()).1.normalize_or(DVec3::Z)),
+            None => Frame::of_moments(&m),
+        };
+        let chosen = choose(&m, frame, points, &weights, noise)?;
+        model = Some((Quadric { center: DVec3::ZERO, scale: 1.0, a: chosen.0 }, chosen.1));
+        last = Some((chosen, m.weight()));
+    }
+    let ((a, parameters, rss), weight) = last?;
+    let quadric = Quadric { center, scale, a };
+    let freedom = (weight - parameters).max(1.0);
+    Some(Sheet { quadric, rms: (rss / freedom).sqrt() * scale, parameters })
+}
+
+/// A quadric in other local coordinates.
+pub(super) fn localized(q: &Quadric, center: DVec3, scale: f64) -> Quadric {
+    Quadric { center: (q.center - center) / scale, scale: q.scale / scale, a: q.a }
+}
+
+/// The model of least AICc: coefficients, parameters and weighted sum of squared distances.
+fn choose(
+    m: &Moments,
+    frame: Frame,
+    points: &[Weighted],
+    weights: &[f64],
+    noise: f64,
+) -> Option<([f64; 10], f64, f64)> {
+    let matrix = m.matrix();
+    let curved = framed_height(&matrix, frame)?;
+    let n = m.weight();
+    let flat = plane(m, Frame::of_moments(m));
+    let score = |rss: f64, p: f64| n * (rss / n).max(1e-30).ln() + 2.0 * p * n / (n - p - 1.0).max(0.5);
+    let flat_rss = squared(&flat, points, weights);
+    let a = curved.implicit();
+    let rss = squared(&a, points, weights);
+    let mut best = (a, 6.0, rss);
+    let bend = curved.c[0].abs().max(curved.c[2].abs()) * 2.0;
+    let reach = points.iter().map(|p| p.y.length_squared()).fold(0.0, f64::max).sqrt();
+    let order_four = bend.powi(3) * reach.powi(4) / 8.0;
+    if n > 12.0
+        && order_four > ORDER_FOUR_SHARE * (rss / n).sqrt().min(noise)
+        && let Some(b) = general(m, &a)
+    {
+        let general_rss = squared(&b, points, weights);
+        if score(general_rss, 9.0) < score(rss, 6.0) {
+            // A general quadric may have come out inside out; the sign of the height field is kept.
+            let q = Quadric { center: DVec3::ZERO, scale: 1.0, a: b };
+            let along = q.value(m.mean()).1.dot(curved.frame.n);
+            best = (if along < 0.0 { b.map(|x| -x) } else { b }, 9.0, general_rss);
+        }
+    }
+    if score(flat_rss, 3.0) < score(best.2, best.1) {
+        best = (flat, 3.0, flat_rss);
+    }
+    Some(best)
+}
+
+fn squared(a: &[f64; 10], points: &[Weighted], weights: &[f64]) -> f64 {
+    let q = Quadric { center: DVec3::ZERO, scale: 1.0, a: *a };
+    points.iter().zip(weights).map(|(p, &w)| if w > 0.0 { w * q.distance(p.y).0.powi(2) } else { 0.0 }).sum()
+}
+
+/// Tukey's biweight of a residual in noise levels.
+#[inline]
+pub(super) fn tukey(t: f64) -> f64 {
+    let s = (t / TUKEY) * (t / TUKEY);
+    if s < 1.0 { (1.0 - s) * (1.0 - s) } else { 0.0 }
+}
+
+/// Weight of a point at squared distance `t2` of the support (1 at its rim).
+#[inline]
+pub(super) fn kernel(t2: f64) -> f64 {
+    (1.0 - t2 * t2).max(0.0)
+}

@@ -1,0 +1,395 @@
+//! The prioritised front: regular places first, each class leaning on what is fitted already.
+//!
+//! [X03] §5, fig. 7.
+//! 1. irregularity of every site from its survey, classes by quantiles
+//! 2. class by class, in rounds: a site takes its own fit or, where they explain its points better, the sheets of
+//!    fitted neighbours carried on to here: one, two at a crease, three or four at a corner
+//! 3. every sheet grows: the ball widens by steps, points that do not belong to the sheet lose their weight, and the
+//!    widest ball stays in which the points that do belong show noise and no bias
+//!
+//! Departs from [X03]: a class is worked off in one round; its sites see only what was fitted before the round, so they
+//! are fitted in parallel and the result is that of any number of threads. Where nothing fitted is near, a site stands
+//! on its own fit, which is the seed jump of [X03]. Supports follow from the data and not from factors c_i.
+
+use super::Quadric;
+use super::fit::{Sheet, Weighted, kernel, localized, sheet};
+use super::sites::{Sites, in_pieces};
+use crate::geom::KdTree;
+use crate::observe::Observer;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Quantiles of irregularity that part the classes.
+const CLASSES: [f64; 5] = [0.4, 0.6, 0.75, 0.85, 0.94];
+/// Weight of the variation of the gradient in the irregularity (a_1 of [X03]).
+const VARIATION: f64 = 0.25;
+/// Weight of noise over radius (a_2).
+const ROUGHNESS: f64 = 1.0;
+/// Residuals above this many noise levels are explained by no sheet.
+const LIMIT: f64 = 3.0;
+/// What a carried-on sheet must explain, in squared noise levels: the freedom of its choice.
+const PRICE: f64 = 10.0;
+/// The same for a fit of its own: six parameters, each worth two.
+const OWN_PRICE: f64 = 16.0;
+/// Cosine of 20 degrees: sheets that meet flatter are one, with a bend.
+const TURNED: f64 = 0.94;
+/// Noise levels between two sheets that can be told apart.
+const APART: f64 = 2.5;
+/// Points that must be nearest to a sheet.
+const NEEDED: usize = 3;
+/// Neighbours asked whether they carry a sheet on, how many must, and how far off they may be over their distance.
+const AROUND: usize = 16;
+const COMPANY: usize = 4;
+const OFFSET: f64 = 0.12;
+/// Most sheets at one site: a corner of four faces.
+const MOST: usize = 4;
+/// Sheets of fitted neighbours that are asked.
+const ASKED: usize = 16;
+/// Fitted neighbours are sought within this many radii.
+const FARTHEST: f64 = 3.0;
+/// A sheet is kept by a site if it owns this share of the points of the site.
+const SHARE: f64 = 0.12;
+/// Fits that guide others have an expected error below this share of the noise.
+const SURE: f64 = 0.35;
+/// A carried-on sheet begins with the ball that it has, at most this many times that of the site.
+const CARRIED: f64 = 3.0;
+/// Density of points that belong to no sheet, as that of a sheet three noise levels away.
+const STRAY: f64 = 0.011;
+/// Ratio of one ball to the next when a sheet grows, and how often it grows at most.
+const WIDEN: f64 = 1.35;
+const STEPS: usize = 3;
+
+/// A fitted sample of the surface: not oriented yet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fit {
+    pub quadric: Quadric,
+    pub center: DVec3,
+    pub normal: DVec3,
+    /// Radius of the points it was fitted to, world units.
+    pub radius: f64,
+    /// Standard deviation of the points around it.
+    pub noise: f64,
+    /// Expected error.
+    pub error: f64,
+    pub irregularity: f64,
+    pub class: u8,
+    /// The site it stands on.
+    pub site: u32,
+    /// Number of sheets of that site.
+    pub sheets: u8,
+    /// Points that it explains better than its neighbours do.
+    pub owned: u32,
+}
+
+/// Fits all sites. `None` if cancelled.
+pub(super) fn grow(points: &[DVec3], tree: &KdTree, sites: &Sites, observer: &dyn Observer) -> Option<Vec<Fit>> {
+    let irregularity: Vec<f64> = sites
+        .survey
+        .iter()
+        .map(|s| {
+            let v = s.quadric.variation(s.quadric.center, s.radius);
+            VARIATION * v + ROUGHNESS * s.noise / s.radius
+        })
+        .collect();
+    let mut ranks: Vec<u32> = (0..irregularity.len() as u32).collect();
+    ranks.sort_by(|&a, &b| irregularity[a as usize].total_cmp(&irregularity[b as usize]).then(a.cmp(&b)));
+    let mut owned: Vec<Vec<u32>> = vec![Vec::new(); sites.point.len()];
+    for (i, &o) in sites.owner.iter().enumerate() {
+        if o != u32::MAX {
+            owned[o as usize].push(i as u32);
+        }
+    }
+    let mut closed: Vec<Fit> = Vec::new();
+    let mut start = 0;
+    for class in 0..=CLASSES.len() {
+        let end = CLASSES.get(class).map_or(ranks.len(), |q| (q * ranks.len() as f64).round() as usize).max(start);
+        let mut open: Vec<u32> = ranks[start..end].to_vec();
+        open.sort_unstable();
+        let span = [start, end].map(|x| x as f64 / ranks.len().max(1) as f64);
+        start = end;
+        let centers: Vec<DVec3> = closed.iter().map(|f| f.center).collect();
+        let closed_tree = KdTree::new(&centers);
+        let snapshot = &closed;
+        let fitted = in_pieces(open.len(), (span[0], span[1]), observer, |_, k| {
+            let site = open[k] as usize;
+            let own = &owned[site];
+            fit_site(points, tree, sites, own, site, irregularity[site], class as u8, snapshot, &closed_tree)
+        })?;
+        closed.extend(fitted.into_iter().flatten());
+    }
+    Some(supported(points, closed))
+}
+
+/// Drops sheets that hardly any point is nearest to.
+fn supported(points: &[DVec3], fits: Vec<Fit>) -> Vec<Fit> {
+    let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
+    let tree = KdTree::new(&centers);
+    let best: Vec<u32> = points
+        .par_iter()
+        .map_init(Vec::new, |near, &p| {
+            tree.nearest(p, 10, near);
+            near.iter()
+                .map(|n| {
+                    let f = &fits[n.1 as usize];
+                    ((f.quadric.distance(p).0 / f.noise.max(1e-300)).powi(2) + 9.0 * n.0 / (f.radius * f.radius), n.1)
+                })
+                .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+                .map_or(u32::MAX, |b| b.1)
+        })
+        .collect();
+    let mut count = vec![0usize; fits.len()];
+    best.iter().filter(|&&b| b != u32::MAX).for_each(|&b| count[b as usize] += 1);
+    let fits: Vec<Fit> =
+        fits.into_iter().zip(count).filter(|(_, c)| *c >= NEEDED).map(|(f, c)| Fit { owned: c as u32, ..f }).collect();
+    accompanied(fits)
+}
+
+/// Drops sheets that hardly any neighbour carries on: a fit across a crease stands alone, a face does not.
+fn accompanied(fits: Vec<Fit>) -> Vec<Fit> {
+    let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
+    let tree = KdTree::new(&centers);
+    let company: Vec<usize> = (0..fits.len())
+        .into_par_iter()
+        .map_init(Vec::new, |near, i| {
+            let f = &fits[i];
+            tree.nearest(f.center, AROUND + 1, near);
+            near.iter()
+                .filter(|n| n.1 as usize != i)
+                .filter(|n| {
+                    let g = &fits[n.1 as usize];
+                    let ((d, m), (e, k)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
+                    let slack = OFFSET * n.0.sqrt() + 2.0 * (f.error + g.error);
+                    m.dot(g.normal).abs() > TURNED
+                        && k.dot(f.normal).abs() > TURNED
+                        && d.abs() < slack
+                        && e.abs() < slack
+                })
+                .count()
+        })
+        .collect();
+    fits.into_iter().zip(company).filter(|(_, c)| *c >= COMPANY).map(|(f, _)| f).collect()
+}
+
+fn fit_site(
+    points: &[DVec3],
+    tree: &KdTree,
+    sites: &Sites,
+    owned: &[u32],
+    site: usize,
+    irregularity: f64,
+    class: u8,
+    closed: &[Fit],
+    closed_tree: &KdTree,
+) -> Vec<Fit> {
+    let survey = &sites.survey[site];
+    let p = survey.quadric.center;
+    let noise = sites.prior[site].noise.min(survey.noise).max(1e-300);
+    let (starts, rivals) = if class == 0 {
+        (vec![Start { sheet: survey.quadric, at: p, radius: survey.radius }], Vec::new())
+    } else {
+        choose(points, tree, owned, survey.radius, survey.quadric, noise, closed, closed_tree)
+    };
+    let sheets = starts.len() as u8;
+    starts
+        .into_iter()
+        .filter_map(|Start { sheet: start, at, radius }| {
+            let others: Vec<Quadric> = rivals.iter().filter(|r| differ(r, &start, at, noise)).copied().collect();
+            let (s, radius, error) = widen(tree, at, radius, &start, &others, noise)?;
+            let (center, normal) = s.quadric.project(at);
+            Some(Fit {
+                quadric: s.quadric.normalized_at(center),
+                center,
+                normal,
+                radius,
+                noise: s.rms,
+                error,
+                irregularity,
+                class,
+                site: site as u32,
+                sheets,
+                owned: 0,
+            })
+        })
+        .collect()
+}
+
+/// The sheets that explain the points of a site, each with the middle of the points that it owns there.
+fn choose(
+    points: &[DVec3],
+    tree: &KdTree,
+    owned: &[u32],
+    radius: f64,
+    own: Quadric,
+    noise: f64,
+    closed: &[Fit],
+    closed_tree: &KdTree,
+) -> (Vec<Start>, Vec<Quadric>) {
+    let p = own.center;
+    let mut near = Vec::new();
+    closed_tree.within(p, FARTHEST * radius, |i, _, d2| near.push((d2, i)));
+    near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut asked: Vec<Quadric> = Vec::new();
+    let mut radii: Vec<f64> = Vec::new();
+    for &(_, i) in &near {
+        let f = &closed[i as usize];
+        if f.error > SURE * noise {
+            continue;
+        }
+        let (d, n) = f.quadric.distance(p);
+        // Two that say the same here are one: same offset within the noise, same direction within 8 degrees.
+        let known = asked.iter().any(|a| {
+            let (e, m) = a.distance(p);
+            let turn = n.dot(m);
+            turn.abs() > 0.99 && (d - e * turn.signum()).abs() < 0.7 * noise
+        });
+        if !known && d.abs() < radius {
+            asked.push(f.quadric);
+            radii.push(f.radius);
+            if asked.len() == ASKED {
+                break;
+            }
+        }
+    }
+    let mut ball = Vec::new();
+    tree.within(p, radius, |_, q, _| ball.push(q));
+    let cost = |q: &Quadric| -> Vec<f64> {
+        ball.iter().map(|&x| (q.distance(x).0 / noise).powi(2).min(LIMIT * LIMIT)).collect()
+    };
+    asked.push(own);
+    radii.push(radius);
+    let costs: Vec<Vec<f64>> = asked.iter().map(cost).collect();
+    let price = |i: usize| if i + 1 == asked.len() { OWN_PRICE } else { PRICE };
+    let mut least = vec![LIMIT * LIMIT; ball.len()];
+    let mut chosen: Vec<usize> = Vec::new();
+    while chosen.len() < MOST {
+        let total: f64 = least.iter().sum();
+        let best = (0..asked.len())
+            .filter(|&i| chosen.iter().all(|&c| differ(&asked[i], &asked[c], p, noise)))
+            .map(|i| (costs[i].iter().zip(&least).map(|(a, b)| a.min(*b)).sum::<f64>() + price(i), i))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((next, i)) = best else { break };
+        if next >= total {
+            break;
+        }
+        chosen.push(i);
+        least.iter_mut().zip(&costs[i]).for_each(|(l, c)| *l = l.min(*c));
+    }
+    let alone = Start { sheet: own, at: p, radius };
+    if chosen.is_empty() {
+        return (vec![alone], Vec::new());
+    }
+    // Who owns the points of the site.
+    let mut own_points = vec![(0usize, DVec3::ZERO); chosen.len()];
+    for &i in owned {
+        let q = points[i as usize];
+        let (k, d) = chosen
+            .iter()
+            .enumerate()
+            .map(|(k, &c)| (k, asked[c].distance(q).0.abs()))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .expect("a sheet is chosen");
+        if d < LIMIT * noise {
+            own_points[k].0 += 1;
+            own_points[k].1 += q;
+        }
+    }
+    let enough = SHARE * owned.len() as f64;
+    let kept: Vec<Start> = chosen
+        .iter()
+        .zip(&own_points)
+        .filter(|(_, o)| o.0 > 0 && o.0 as f64 >= enough)
+        .map(|(&c, o)| Start {
+            sheet: asked[c],
+            at: o.1 / o.0 as f64,
+            radius: if c + 1 == asked.len() { radius } else { radii[c].min(CARRIED * radius).max(radius) },
+        })
+        .collect();
+    asked.pop();
+    if kept.is_empty() { (vec![alone], Vec::new()) } else { (kept, asked) }
+}
+
+/// Where a sheet begins to grow.
+struct Start {
+    sheet: Quadric,
+    at: DVec3,
+    radius: f64,
+}
+
+/// Two sheets are two if they meet at an angle or lie apart.
+fn differ(a: &Quadric, b: &Quadric, p: DVec3, noise: f64) -> bool {
+    let ((d, n), (e, m)) = (a.distance(p), b.distance(p));
+    let turn = n.dot(m);
+    turn.abs() < TURNED || (d - e * turn.signum()).abs() > APART * noise
+}
+
+/// Fits a sheet from a first guess and widens its ball while its own points show no bias: sheet, radius, expected error.
+fn widen(
+    tree: &KdTree,
+    p: DVec3,
+    radius: f64,
+    start: &Quadric,
+    others: &[Quadric],
+    noise: f64,
+) -> Option<(Sheet, f64, f64)> {
+    let mut best: Option<(Sheet, f64, f64)> = None;
+    let mut guess = *start;
+    let mut ball = Vec::new();
+    for step in 0..=STEPS {
+        let r = radius * WIDEN.powi(step as i32);
+        ball.clear();
+        tree.within(p, r, |_, q, _| {
+            let y = (q - p) / r;
+            let mut weight = kernel(y.length_squared());
+            if !others.is_empty() {
+                // The chance that the point belongs to this sheet and to none of the others.
+                let chance = |s: &Quadric| (-0.5 * (s.distance(q).0 / noise).powi(2)).exp();
+                let own = chance(&guess);
+                weight *= own / (own + others.iter().map(chance).sum::<f64>() + STRAY);
+            }
+            if weight > 1e-3 {
+                ball.push(Weighted { y, weight });
+            }
+        });
+        let Some(found) = sheet(p, r, &ball, Some(&guess), noise / r, Some(if step == 0 { 2 } else { 1 })) else {
+            if best.is_none() && step < STEPS {
+                continue;
+            }
+            break;
+        };
+        let error = expected(&found, p, r, &ball, noise);
+        if best.as_ref().is_some_and(|b| error >= b.2) {
+            break;
+        }
+        guess = found.quadric;
+        best = Some((found, r, error));
+    }
+    best
+}
+
+/// Expected error of a sheet at its centre: its parameters and the bias that the averages of the sectors of its own
+/// points show.
+fn expected(s: &Sheet, p: DVec3, radius: f64, ball: &[Weighted], noise: f64) -> f64 {
+    let q = localized(&s.quadric, p, radius);
+    let sigma = noise / radius;
+    let frame = super::fit::Frame::of(q.value(DVec3::ZERO).1.normalize_or(DVec3::Z));
+    let mut sums = [(0.0, 0.0); 16];
+    let mut count = 0.0;
+    for w in ball {
+        let r = q.distance(w.y).0 / sigma;
+        if r.abs() < LIMIT {
+            let (u, v) = (frame.u.dot(w.y), frame.v.dot(w.y));
+            let mut at = usize::from(u > 0.0) | usize::from(v > 0.0) << 1 | usize::from(u.abs() > v.abs()) << 2;
+            if ball.len() >= 80 && u * u + v * v > 0.5 {
+                at |= 8;
+            }
+            sums[at].0 += 1.0;
+            sums[at].1 += r;
+            count += 1.0;
+        }
+    }
+    let parts = sums.iter().filter(|s| s.0 > 0.0).count() as f64;
+    let between: f64 = sums.iter().filter(|s| s.0 > 0.0).map(|s| s.1 * s.1 / s.0).sum();
+    let freedom = (parts - if ball.len() >= 80 { 5.0 } else { 4.0 }).max(1.0);
+    let excess = (between - freedom).max(0.0);
+    noise * ((s.parameters + excess) / f64::max(count, 1.0)).sqrt()
+}

@@ -1,0 +1,335 @@
+//! Noisy points to oriented, denoised samples of a surface.
+//!
+//! [X03] Xie, Wang, Hua, Qin, Kaufman, *Piecewise C1 Continuous Surface Reconstruction of Noisy Point Clouds via Local
+//! Implicit Quadric Regression*, 2003.
+//! 1. order, duplicates: [`Cloud`]                   2. noise and radius of the fits (§6.1): `survey`, `sites`
+//! 3. fits in rising irregularity (§5, fig. 7; §4.1, §6.2): `front`, `fit`
+//! 4. orientation (§7, fig. 12): `link`, `orient`     5. points on the surface, outliers, segments: `project`
+//!
+//! The blend (§4.2, eq. 4) is `field::SampleField`. Where a step departs from the paper its file says so.
+
+mod dense;
+mod dipoles;
+mod fit;
+mod front;
+mod link;
+mod moments;
+mod orient;
+mod project;
+mod quadric;
+mod sites;
+mod survey;
+
+pub use dipoles::Dipoles;
+pub use project::{Cleaned, ProjectParams, project};
+pub use quadric::Quadric;
+
+use crate::geom::{Aabb, KdTree};
+use crate::mesh::Attribute;
+use crate::observe::Observer;
+use glam::DVec3;
+use orient::Hints;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A scan: points and whatever else the file told of them. Flat arrays, one entry per point.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cloud {
+    /// Positions, world units, less [`Cloud::shift`].
+    pub points: Vec<DVec3>,
+    /// Added to every position to get those of the file: large coordinates keep their digits.
+    pub shift: DVec3,
+    /// Named scalars or vectors per point: `normal` (3), `color` (3 or 4, 0 to 1), `intensity`, `classification`, ...
+    pub attributes: Vec<Attribute>,
+    /// Positions of the scanners, less the shift.
+    pub scanners: Vec<DVec3>,
+    /// Scanner that saw each point, an index into `scanners`; empty if unknown.
+    pub seen_by: Vec<u32>,
+}
+
+impl Cloud {
+    /// A cloud of bare points.
+    pub fn new(points: Vec<DVec3>) -> Cloud {
+        Cloud { points, ..Cloud::default() }
+    }
+
+    /// Bounding box of the points that are numbers.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::of(self.points.iter().filter(|p| p.is_finite()))
+    }
+
+    /// The attribute of this name and width.
+    pub fn attribute(&self, name: &str, width: usize) -> Option<&Attribute> {
+        self.attributes.iter().find(|a| a.name == name && a.width == width)
+    }
+
+    /// Keeps the points of these indices, in their order.
+    pub fn select(&self, ids: &[u32]) -> Cloud {
+        let attributes = self
+            .attributes
+            .iter()
+            .map(|a| Attribute {
+                name: a.name.clone(),
+                width: a.width,
+                values: ids
+                    .iter()
+                    .flat_map(|&i| a.values[i as usize * a.width..(i as usize + 1) * a.width].iter().copied())
+                    .collect(),
+            })
+            .collect();
+        let seen_by =
+            if self.seen_by.is_empty() { Vec::new() } else { ids.iter().map(|&i| self.seen_by[i as usize]).collect() };
+        Cloud {
+            points: ids.iter().map(|&i| self.points[i as usize]).collect(),
+            shift: self.shift,
+            attributes,
+            scanners: self.scanners.clone(),
+            seen_by,
+        }
+    }
+}
+
+/// How to make samples. Nothing has to be set: noise and sizes come from the points.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CleanParams {
+    /// Do not use the normals of the file for the orientation
+    pub ignore_normals: bool,
+    /// Residuals above this many noise levels make an outlier
+    #[schemars(range(min = 2.0, max = 20.0), extend("unit" = "noise"))]
+    pub outlier: f64,
+}
+
+impl Default for CleanParams {
+    fn default() -> Self {
+        CleanParams { ignore_normals: false, outlier: 4.0 }
+    }
+}
+
+/// Why there are no samples.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CloudError {
+    /// Too few different points.
+    #[error(
+        "{distinct} different points of {given} are left after those that are no numbers or repeat others; at least {needed} are needed"
+    )]
+    TooFew {
+        /// Points given.
+        given: usize,
+        /// Different finite points.
+        distinct: usize,
+        /// Points needed.
+        needed: usize,
+    },
+    /// All points on a line.
+    #[error("all {points} points lie on a line; a surface needs points beside it")]
+    Collinear {
+        /// Number of points.
+        points: usize,
+    },
+    /// No neighbourhood looks like a surface.
+    #[error("no neighbourhood of the {points} points looks like a surface; the points may be too few or fill a volume")]
+    NoSurface {
+        /// Number of points.
+        points: usize,
+    },
+    /// The observer wants no result any more.
+    #[error("cleaning cancelled")]
+    Cancelled,
+}
+
+/// A fitted sample: position, oriented normal, local quadric, support, irregularity.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sample {
+    /// Place on the surface, world units.
+    pub center: DVec3,
+    /// Unit normal, outward.
+    pub normal: DVec3,
+    /// The local surface, positive outside, gradient of length one at the centre.
+    pub quadric: Quadric,
+    /// Radius of the points that it was fitted to, world units.
+    pub radius: f64,
+    /// Radius within which it takes part in the blend, world units.
+    pub support: f64,
+    /// Expected error of the fit, world units.
+    pub error: f64,
+    /// Weight in the blend: higher for surer fits.
+    pub trust: f64,
+    /// Standard deviation of the points around it, world units.
+    pub noise: f64,
+    /// Area that it stands for, world units squared.
+    pub area: f64,
+    /// Variation of the gradient and noise over the radius.
+    pub irregularity: f64,
+    /// Priority class, 0 the most regular.
+    pub class: u8,
+    /// Sheets at its site: 1 regular, 2 crease, 3 and more corner.
+    pub sheets: u8,
+    /// Connected part that it belongs to, by falling area.
+    pub segment: u32,
+    /// Share of its meetings with other samples that agree with its orientation, 0 to 1.
+    pub confidence: f64,
+}
+
+/// All samples of a scan.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Samples {
+    /// The samples.
+    pub samples: Vec<Sample>,
+    /// Standard deviation of the points, world units: the middle of all places.
+    pub noise: f64,
+    /// Distance of neighbouring points, world units: the middle of all places.
+    pub spacing: f64,
+    /// Typical error of the normals, degrees.
+    pub normal_noise_deg: f64,
+    /// Whether each segment is closed.
+    pub closed: Vec<bool>,
+    /// Bounding-box diagonal of the points, world units.
+    pub diagonal: f64,
+}
+
+/// Fewest different points: those of the smallest ball.
+pub const FEWEST: usize = 18;
+
+/// Fits oriented samples to a scan.
+/// # Errors
+/// [`CloudError`] for too few or collinear points, no surface, or if cancelled.
+pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Result<Samples, CloudError> {
+    let (points, ids) = distinct(cloud)?;
+    let tree = KdTree::new(&points);
+    let part = |from: f64, to: f64| Part { observer, from, to };
+    let sites = sites::choose(&points, &tree, &part(0.0, 0.45)).ok_or(CloudError::Cancelled)?;
+    if sites.point.is_empty() {
+        return Err(CloudError::NoSurface { points: points.len() });
+    }
+    let fits = front::grow(&points, &tree, &sites, &part(0.45, 0.9)).ok_or(CloudError::Cancelled)?;
+    if fits.is_empty() {
+        return Err(CloudError::NoSurface { points: points.len() });
+    }
+    let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
+    let fit_tree = KdTree::new(&centers);
+    let votes = link::votes(&fits, &fit_tree);
+    let areas: Vec<f64> = fits.iter().map(|f| f.owned as f64 * sites.survey[f.site as usize].spacing.powi(2)).collect();
+    let normals = (!params.ignore_normals).then(|| given_normals(cloud, &ids, &fits, &sites)).flatten();
+    let toward = toward_scanner(cloud, &ids, &fits, &sites);
+    let hints = Hints { toward: toward.as_deref(), normals: normals.as_deref(), areas: &areas };
+    let oriented = orient::orient(&fits, &votes, &hints);
+    observer.progress(1.0);
+    let samples: Vec<Sample> = fits
+        .iter()
+        .enumerate()
+        .map(|(i, f)| {
+            let survey = &sites.survey[f.site as usize];
+            let sign = oriented.sign[i];
+            Sample {
+                center: f.center,
+                normal: f.normal * sign,
+                quadric: if sign < 0.0 { f.quadric.flipped() } else { f.quadric },
+                radius: f.radius,
+                support: 1.15 * survey.radius.max(sites.gap[f.site as usize] * 2.0),
+                error: f.error,
+                trust: (survey.radius / f.error.max(1e-6 * survey.radius)).min(1e6).powi(2),
+                noise: f.noise,
+                area: areas[i],
+                irregularity: f.irregularity,
+                class: f.class,
+                sheets: f.sheets,
+                segment: oriented.part[i],
+                confidence: oriented.confidence[i],
+            }
+        })
+        .collect();
+    let middle = |mut v: Vec<f64>| {
+        v.sort_unstable_by(f64::total_cmp);
+        v[v.len() / 2]
+    };
+    // A slope of a fit is off by about twice the noise over radius and root of the points.
+    let slope = middle(samples.iter().map(|s| 2.0 * s.error / s.radius).collect());
+    Ok(Samples {
+        noise: middle(sites.survey.iter().map(|s| s.noise).collect()),
+        spacing: middle(sites.survey.iter().map(|s| s.spacing).collect()),
+        normal_noise_deg: slope.to_degrees(),
+        samples,
+        closed: oriented.closed,
+        diagonal: Aabb::of(&points).diagonal(),
+    })
+}
+
+/// A piece of the progress of a stage.
+struct Part<'a> {
+    observer: &'a dyn Observer,
+    from: f64,
+    to: f64,
+}
+
+impl Observer for Part<'_> {
+    fn progress(&self, fraction: f64) {
+        self.observer.progress(self.from + (self.to - self.from) * fraction);
+    }
+    fn cancelled(&self) -> bool {
+        self.observer.cancelled()
+    }
+}
+
+/// Different finite points in the order of their tree, with the index of each in the cloud.
+fn distinct(cloud: &Cloud) -> Result<(Vec<DVec3>, Vec<u32>), CloudError> {
+    let finite: Vec<u32> = (0..cloud.points.len() as u32).filter(|&i| cloud.points[i as usize].is_finite()).collect();
+    let tree = KdTree::new(&finite.iter().map(|&i| cloud.points[i as usize]).collect::<Vec<_>>());
+    let mut ids: Vec<u32> = tree.order().iter().map(|&k| finite[k as usize]).collect();
+    // Equal points are neighbours in a leaf, or nearly so; a sort by place finds them all.
+    let mut by_place = ids.clone();
+    by_place.sort_unstable_by(|&a, &b| {
+        let (p, q) = (cloud.points[a as usize], cloud.points[b as usize]);
+        p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z)).then(a.cmp(&b))
+    });
+    let mut repeats = vec![false; cloud.points.len()];
+    for pair in by_place.windows(2) {
+        if cloud.points[pair[0] as usize] == cloud.points[pair[1] as usize] {
+            repeats[pair[1] as usize] = true;
+        }
+    }
+    ids.retain(|&i| !repeats[i as usize]);
+    if ids.len() < FEWEST {
+        return Err(CloudError::TooFew { given: cloud.points.len(), distinct: ids.len(), needed: FEWEST });
+    }
+    let points: Vec<DVec3> = ids.iter().map(|&i| cloud.points[i as usize]).collect();
+    let center = points.iter().sum::<DVec3>() / points.len() as f64;
+    let mut m = moments::Moments::ZERO;
+    let size = Aabb::of(&points).diagonal();
+    points.iter().for_each(|&p| m.add((p - center) / size, 1.0));
+    let (values, _) = dense::eigen3(m.covariance());
+    // Rounding of the covariance, relative to the longest direction.
+    if values[1] < 1e-14 * values[2] {
+        return Err(CloudError::Collinear { points: points.len() });
+    }
+    Ok((points, ids))
+}
+
+/// Normals of the file at the sites of the fits, if there are any.
+fn given_normals(cloud: &Cloud, ids: &[u32], fits: &[front::Fit], sites: &sites::Sites) -> Option<Vec<DVec3>> {
+    let normals = cloud.attribute("normal", 3)?;
+    Some(
+        fits.iter()
+            .map(|f| {
+                let i = ids[sites.point[f.site as usize] as usize] as usize;
+                DVec3::from_array([0, 1, 2].map(|k| normals.values[3 * i + k] as f64)).normalize_or_zero()
+            })
+            .collect(),
+    )
+}
+
+/// Direction to the scanner at the sites of the fits, if scanners are known.
+fn toward_scanner(cloud: &Cloud, ids: &[u32], fits: &[front::Fit], sites: &sites::Sites) -> Option<Vec<DVec3>> {
+    if cloud.scanners.is_empty() || (cloud.seen_by.is_empty() && cloud.scanners.len() != 1) {
+        return None;
+    }
+    Some(
+        fits.iter()
+            .map(|f| {
+                let i = ids[sites.point[f.site as usize] as usize] as usize;
+                let by = cloud.seen_by.get(i).copied().unwrap_or(0) as usize;
+                cloud.scanners.get(by).map_or(DVec3::ZERO, |s| (*s - f.center).normalize_or_zero())
+            })
+            .collect(),
+    )
+}

@@ -1,0 +1,249 @@
+//! What the cleaning leaves of every point: its place on the surface, normal, curvature, flags; and feature lines.
+//!
+//! METHODS 1.8: outliers are flagged and not deleted; feature lines are the points beside a second sheet, moved to where
+//! both sheets meet, thinned and joined.
+
+use super::sites::cover;
+use super::{Cloud, CloudError, Samples};
+use crate::geom::KdTree;
+use crate::mesh::Attribute;
+use crate::observe::Observer;
+use glam::DVec3;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Samples asked for each point.
+const ASKED: usize = 10;
+/// Samples of two sheets meet at an edge if their normals differ by more than this, degrees.
+const SHARP_DEG: f64 = 30.0;
+/// Points within this many noise levels (and one spacing) of a second sheet are feature points.
+const BESIDE: f64 = 2.0;
+/// Distance of points of a feature line, in spacings.
+const LINE: f64 = 3.0;
+/// Points between two looks at the observer.
+const CHUNK: usize = 1 << 15;
+
+/// Which points are kept.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ProjectParams {
+    /// Distance of the points that are kept, world units; 0 keeps all
+    #[schemars(range(min = 0.0), extend("unit" = "length"))]
+    pub spacing: f64,
+    /// Keep outliers, flagged; they are left out of a thinned cloud in any case
+    pub outliers: bool,
+}
+
+/// The cleaned cloud.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cleaned {
+    /// Points on the surface, with `normal`, `curvature` (mean), `gauss`, `irregularity`, `noise`, `segment`, `feature`,
+    /// `outlier`, `confidence`, and the attributes of the scan.
+    pub cloud: Cloud,
+    /// Feature lines.
+    pub lines: Vec<Vec<DVec3>>,
+    /// Number of outliers among all points of the scan.
+    pub outliers: usize,
+    /// Root of the mean squared distance of the points that are no outliers to the surface, world units.
+    pub moved_rms: f64,
+}
+
+/// A point on the surface.
+#[derive(Clone, Copy)]
+struct Placed {
+    at: DVec3,
+    normal: DVec3,
+    sample: u32,
+    moved: f64,
+    edge: Option<DVec3>,
+    outlier: bool,
+}
+
+/// Moves every point of a scan to the surface of its samples.
+/// * `outlier` - residual in noise levels from which a point is one
+/// # Errors
+/// [`CloudError::Cancelled`].
+pub fn project(
+    cloud: &Cloud,
+    samples: &Samples,
+    outlier: f64,
+    params: &ProjectParams,
+    observer: &dyn Observer,
+) -> Result<Cleaned, CloudError> {
+    let centers: Vec<DVec3> = samples.samples.iter().map(|s| s.center).collect();
+    let tree = KdTree::new(&centers);
+    let finite: Vec<u32> = (0..cloud.points.len() as u32).filter(|&i| cloud.points[i as usize].is_finite()).collect();
+    let mut placed: Vec<Placed> = Vec::with_capacity(finite.len());
+    while placed.len() < finite.len() {
+        if observer.cancelled() {
+            return Err(CloudError::Cancelled);
+        }
+        observer.progress(placed.len() as f64 / finite.len() as f64);
+        let range = placed.len()..(placed.len() + CHUNK).min(finite.len());
+        placed.par_extend(
+            range
+                .into_par_iter()
+                .map_init(Vec::new, |near, k| place(cloud.points[finite[k] as usize], samples, &tree, outlier, near)),
+        );
+    }
+    let outliers = placed.iter().filter(|p| p.outlier).count();
+    let inner = (placed.len() - outliers).max(1) as f64;
+    let moved_rms = (placed.iter().filter(|p| !p.outlier).map(|p| p.moved * p.moved).sum::<f64>() / inner).sqrt();
+    let lines = feature_lines(&placed, LINE * samples.spacing);
+    let thinned = params.spacing > 0.0;
+    let mut kept: Vec<u32> =
+        (0..placed.len() as u32).filter(|&k| !placed[k as usize].outlier || (params.outliers && !thinned)).collect();
+    if thinned {
+        let points: Vec<DVec3> = kept.iter().map(|&k| placed[k as usize].at).collect();
+        let order = KdTree::new(&points);
+        let sorted: Vec<u32> = order.order().iter().map(|&k| kept[k as usize]).collect();
+        let points: Vec<DVec3> = sorted.iter().map(|&k| placed[k as usize].at).collect();
+        kept =
+            cover(&points, &KdTree::new(&points), |_| params.spacing).into_iter().map(|i| sorted[i as usize]).collect();
+    }
+    let ids: Vec<u32> = kept.iter().map(|&k| finite[k as usize]).collect();
+    let mut result = cloud.select(&ids);
+    result.points = kept.iter().map(|&k| placed[k as usize].at).collect();
+    result.attributes.retain(|a| a.name != "normal");
+    let column = |name: &str, of: &dyn Fn(&Placed) -> f64| Attribute {
+        name: name.into(),
+        width: 1,
+        values: kept.iter().map(|&k| of(&placed[k as usize]) as f32).collect(),
+    };
+    let sample = |p: &Placed| &samples.samples[p.sample as usize];
+    let normal = Attribute {
+        name: "normal".into(),
+        width: 3,
+        values: kept.iter().flat_map(|&k| placed[k as usize].normal.to_array().map(|x| x as f32)).collect(),
+    };
+    let mut attributes = vec![
+        normal,
+        column("curvature", &|p| sample(p).quadric.curvature(p.at).1),
+        column("gauss", &|p| sample(p).quadric.curvature(p.at).0),
+        column("irregularity", &|p| sample(p).irregularity),
+        column("noise", &|p| sample(p).noise),
+        column("segment", &|p| sample(p).segment as f64),
+        column("feature", &|p| f64::from(u8::from(p.edge.is_some()))),
+        column("outlier", &|p| f64::from(u8::from(p.outlier))),
+        column("confidence", &|p| sample(p).confidence),
+    ];
+    let named = |name: &str| attributes.iter().any(|a| a.name == name);
+    let own: Vec<Attribute> = result.attributes.drain(..).filter(|a| !named(&a.name)).collect();
+    attributes.extend(own);
+    result.attributes = attributes;
+    observer.progress(1.0);
+    Ok(Cleaned { cloud: result, lines, outliers, moved_rms })
+}
+
+fn place(p: DVec3, samples: &Samples, tree: &KdTree, outlier: f64, near: &mut Vec<(f64, u32)>) -> Placed {
+    tree.nearest(p, ASKED, near);
+    let best = near
+        .iter()
+        .map(|n| {
+            let s = &samples.samples[n.1 as usize];
+            let noise = s.noise.max(1e-9 * s.radius);
+            ((s.quadric.distance(p).0 / noise).powi(2) + 4.0 * n.0 / (s.support * s.support), n.1)
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+        .map_or(0, |b| b.1);
+    let s = &samples.samples[best as usize];
+    let (at, normal) = s.quadric.project(p);
+    let moved = at.distance(p);
+    let noise = s.noise.max(samples.noise);
+    let off = s.center.distance(p) > s.support + outlier * noise;
+    let astray = moved > outlier * noise.max(1e-9 * s.radius) || off || !at.is_finite();
+    let mut edge = None;
+    if !astray {
+        for n in near.iter() {
+            let t = &samples.samples[n.1 as usize];
+            let (d, m) = t.quadric.distance(at);
+            if m.dot(normal) < SHARP_DEG.to_radians().cos()
+                && d.abs() < BESIDE * noise + samples.spacing
+                && n.0.sqrt() < t.support
+            {
+                edge = meet(s.quadric, t.quadric, at);
+                break;
+            }
+        }
+    }
+    Placed { at: if astray { p } else { at }, normal, sample: best, moved, edge, outlier: astray }
+}
+
+/// Where two sheets meet, near a point: alternating steps onto both.
+fn meet(a: super::Quadric, b: super::Quadric, p: DVec3) -> Option<DVec3> {
+    let mut x = p;
+    for _ in 0..6 {
+        let ((d, n), (e, m)) = (a.distance(x), b.distance(x));
+        // The least step that satisfies both to first order.
+        let c = n.dot(m);
+        let det = 1.0 - c * c;
+        if !(det > 1e-6) {
+            return None;
+        }
+        let (s, t) = ((d - c * e) / det, (e - c * d) / det);
+        x -= s * n + t * m;
+    }
+    x.is_finite().then_some(x)
+}
+
+/// Joins thinned feature points: every point to the nearest one on each of two sides.
+fn feature_lines(placed: &[Placed], gap: f64) -> Vec<Vec<DVec3>> {
+    let all: Vec<DVec3> = placed.iter().filter_map(|p| p.edge).collect();
+    if all.len() < 2 || !(gap > 0.0) {
+        return Vec::new();
+    }
+    let tree = KdTree::new(&all);
+    let sorted: Vec<DVec3> = tree.order().iter().map(|&i| all[i as usize]).collect();
+    let sorted_tree = KdTree::new(&sorted);
+    let points: Vec<DVec3> = cover(&sorted, &sorted_tree, |_| gap).into_iter().map(|i| sorted[i as usize]).collect();
+    let tree = KdTree::new(&points);
+    let mut near = Vec::new();
+    let mut links: Vec<Vec<u32>> = vec![Vec::new(); points.len()];
+    for (i, &p) in points.iter().enumerate() {
+        tree.nearest_within(p, 7, 2.0 * gap, &mut near);
+        let mut first: Option<DVec3> = None;
+        for n in near.iter().filter(|n| n.1 as usize != i) {
+            let way = (points[n.1 as usize] - p).normalize_or_zero();
+            match first {
+                None => first = Some(way),
+                // The second neighbour lies on the other side.
+                Some(f) if f.dot(way) < -0.3 => {
+                    links[i].push(n.1);
+                    break;
+                }
+                Some(_) => continue,
+            }
+            links[i].push(n.1);
+        }
+    }
+    // Both ends must want a link.
+    let mutual: Vec<Vec<u32>> = (0..points.len())
+        .map(|i| links[i].iter().copied().filter(|&j| links[j as usize].contains(&(i as u32))).collect())
+        .collect();
+    let mut seen = vec![false; points.len()];
+    let mut lines = Vec::new();
+    // Open lines from their ends, then loops.
+    for loops in [false, true] {
+        for start in 0..points.len() {
+            if seen[start] || mutual[start].is_empty() || (!loops && mutual[start].len() != 1) {
+                continue;
+            }
+            let mut line = vec![points[start]];
+            seen[start] = true;
+            let mut at = start;
+            while let Some(&next) = mutual[at].iter().find(|&&j| !seen[j as usize]) {
+                seen[next as usize] = true;
+                line.push(points[next as usize]);
+                at = next as usize;
+            }
+            if loops && mutual[at].contains(&(start as u32)) && line.len() > 2 {
+                line.push(points[start]);
+            }
+            if line.len() > 2 {
+                lines.push(line);
+            }
+        }
+    }
+    lines
+}

@@ -1,0 +1,166 @@
+//! Where fits are made: as dense as the surface needs, not as dense as the points are.
+//!
+//! A fit of radius R says the same a little aside, so fits stand a fixed share of R apart. Every point belongs to the
+//! nearest site; together the sites own all points.
+
+use super::survey::{Prior, Scratch, Survey, survey};
+use crate::geom::KdTree;
+use crate::observe::Observer;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Distance between sites over the radius of the fits: the blend then meets about eight fits everywhere.
+const APART: f64 = 0.42;
+/// Sites stand no closer than for this share of the usual radius: creases have narrow balls, not finer shapes.
+const USUAL: f64 = 0.8;
+/// One point in this many is surveyed to learn the radii.
+const SCOUT: usize = 24;
+/// A fit may be this much wider than the scouts around saw.
+const REACH: f64 = 1.7;
+/// Points per piece of parallel work between two looks at the observer.
+pub(super) const CHUNK: usize = 512;
+
+/// Sites and the points they own.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sites {
+    /// The point that each site stands on.
+    pub point: Vec<u32>,
+    /// The survey there.
+    pub survey: Vec<Survey>,
+    /// The region there.
+    pub prior: Vec<Prior>,
+    /// Distance that it keeps other sites away.
+    pub gap: Vec<f64>,
+    /// Owning site of each point; `u32::MAX` where no site is.
+    pub owner: Vec<u32>,
+}
+
+/// Runs `work` over `0..count` in parallel pieces, in order; `None` if cancelled.
+pub(super) fn in_pieces<T: Send>(
+    count: usize,
+    span: (f64, f64),
+    observer: &dyn Observer,
+    work: impl Fn(&mut Scratch, usize) -> T + Sync,
+) -> Option<Vec<T>> {
+    let mut all = Vec::with_capacity(count);
+    // Large pieces keep the threads busy, small ones keep the observer informed.
+    let piece = CHUNK * rayon::current_num_threads().max(1) * 2;
+    while all.len() < count {
+        if observer.cancelled() {
+            return None;
+        }
+        let range = all.len()..(all.len() + piece).min(count);
+        all.par_extend(range.into_par_iter().with_min_len(16).map_init(Scratch::default, &work));
+        observer.progress(span.0 + (span.1 - span.0) * all.len() as f64 / count as f64);
+    }
+    Some(all)
+}
+
+/// Chooses and surveys the sites of points in the order of their tree. `None` if cancelled.
+pub(super) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -> Option<Sites> {
+    let scouts: Vec<u32> = (0..points.len() as u32).step_by(SCOUT.min(points.len() / 8 + 1)).collect();
+    let blank = Prior { noise: 0.0 };
+    let first = in_pieces(scouts.len(), (0.0, 0.2), observer, |s, i| {
+        survey(tree, points[scouts[i] as usize], f64::INFINITY, blank, s)
+    })?;
+    // A narrow ball has little noise by chance; with the noise of those around the scouts look again.
+    let (known, places): (Vec<Survey>, Vec<DVec3>) =
+        first.iter().zip(&scouts).filter_map(|(s, &i)| Some(((*s)?, points[i as usize]))).unzip();
+    let priors = (!known.is_empty()).then(|| (known, KdTree::new(&places)));
+    let seen = match priors {
+        Some((known, scout_tree)) => {
+            let regions = regions(&scouts.iter().map(|&i| points[i as usize]).collect::<Vec<_>>(), &scout_tree, &known);
+            in_pieces(scouts.len(), (0.2, 0.4), observer, |s, i| {
+                survey(tree, points[scouts[i] as usize], f64::INFINITY, regions[i].2, s)
+            })?
+        }
+        None => first,
+    };
+    let (known, places): (Vec<Survey>, Vec<DVec3>) =
+        seen.into_iter().zip(&scouts).filter_map(|(s, &i)| Some((s?, points[i as usize]))).unzip();
+    if known.is_empty() {
+        return Some(Sites { owner: vec![u32::MAX; points.len()], ..Sites::default() });
+    }
+    let scout_tree = KdTree::new(&places);
+    let regions = regions(points, &scout_tree, &known);
+    let chosen = cover(points, tree, |i| APART * regions[i].0);
+    let surveys = in_pieces(chosen.len(), (0.4, 1.0), observer, |s, i| {
+        let at = chosen[i] as usize;
+        let (_, reach, prior) = regions[at];
+        Some((survey(tree, points[at], reach, prior, s)?, prior))
+    })?;
+    let (point, both): (Vec<u32>, Vec<(Survey, Prior)>) =
+        chosen.into_iter().zip(surveys).filter_map(|(p, s)| Some((p, s?))).unzip();
+    let gap = point.iter().map(|&i| APART * regions[i as usize].0).collect();
+    let (survey, prior) = both.into_iter().unzip();
+    let places: Vec<DVec3> = point.iter().map(|&i| points[i as usize]).collect();
+    let site_tree = KdTree::new(&places);
+    let owner = points.par_iter().map(|&p| site_tree.closest(p).unwrap_or(u32::MAX)).collect();
+    let mut sites = Sites { point, survey, prior, gap, owner };
+    sites.even(&places, &site_tree);
+    Some(sites)
+}
+
+/// For each point the least radius around, the farthest that a fit may reach, and the region: middles of the scouts.
+fn regions(points: &[DVec3], tree: &KdTree, known: &[Survey]) -> Vec<(f64, f64, Prior)> {
+    const SCOUTS: usize = 15;
+    points
+        .par_iter()
+        .map_init(
+            || (Vec::new(), Vec::new(), Vec::new()),
+            |(near, radii, noises), &p| {
+                tree.nearest(p, SCOUTS, near);
+                radii.clear();
+                noises.clear();
+                radii.extend(near.iter().map(|n| known[n.1 as usize].radius));
+                noises.extend(near.iter().map(|n| known[n.1 as usize].noise));
+                let least = radii.iter().take(3).copied().fold(f64::INFINITY, f64::min);
+                let most = radii.iter().copied().fold(0.0, f64::max);
+                radii.sort_unstable_by(f64::total_cmp);
+                noises.sort_unstable_by(f64::total_cmp);
+                let middle = radii[radii.len() / 2];
+                // A scout in a crease sees next to nothing; sites there stand as for half of the usual radius.
+                let prior = Prior { noise: noises[noises.len() / 2] };
+                (least.max(USUAL * middle), REACH * most, prior)
+            },
+        )
+        .collect()
+}
+
+/// Points in their order such that none is within `gap(point)` of an earlier one and all are within that of one.
+pub(super) fn cover(points: &[DVec3], tree: &KdTree, gap: impl Fn(usize) -> f64) -> Vec<u32> {
+    let mut covered = vec![false; points.len()];
+    let mut chosen = Vec::new();
+    for i in 0..points.len() {
+        if !covered[i] {
+            chosen.push(i as u32);
+            tree.within(points[i], gap(i), |j, _, _| covered[j as usize] = true);
+        }
+    }
+    chosen
+}
+
+impl Sites {
+    /// A radius is one draw of a noisy choice: it becomes the lower middle of those around, grown by the way there.
+    fn even(&mut self, places: &[DVec3], tree: &KdTree) {
+        const SLOPE: f64 = 0.5;
+        const QUANTILE: f64 = 0.4;
+        let radii: Vec<f64> = (0..places.len())
+            .into_par_iter()
+            .map(|i| {
+                let mut around = Vec::new();
+                tree.within(places[i], 0.8 * self.survey[i].radius, |j, _, d2| {
+                    around.push(self.survey[j as usize].radius + SLOPE * d2.sqrt());
+                });
+                around.sort_unstable_by(f64::total_cmp);
+                around[(QUANTILE * (around.len() - 1) as f64) as usize]
+            })
+            .collect();
+        for (s, r) in self.survey.iter_mut().zip(radii) {
+            // The error of a narrower fit grows as its points get fewer.
+            let ratio = (s.radius / r).powi(2).max(1.0);
+            s.error *= ratio;
+            s.radius = r;
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! The first pass: how far a single quadric holds around a point, and how noisy the points are.
+//!
+//! [X03] §6.1 asks for a feature size from the data; [M73] Mallows, *Some Comments on Cp*, 1973, is the rule here.
+//! 1. nested balls, each 1.3 times as wide, one sum of monomials each
+//! 2. the height field of each ball; its residuals averaged in sectors of equal area: what is left in the averages
+//!    beyond noise is bias, what is left inside the sectors is noise
+//! 3. the ball of least variance plus squared bias
+//!
+//! Departs from [X03]: no feature size is set by hand, and the noise is measured in every place by itself.
+
+use super::Quadric;
+use super::fit::{Frame, Height, framed_height};
+use super::moments::Moments;
+use crate::geom::KdTree;
+use glam::DVec3;
+
+/// Points in the smallest ball.
+const SMALLEST: usize = 18;
+/// Ratio of the radii of two balls, one after the other.
+const GROWTH: f64 = 1.3;
+/// Largest number of balls: 18 points become 1.69^11 = 320 times as many.
+const BALLS: usize = 12;
+/// Balls per query of neighbours.
+const STRIDE: usize = 3;
+/// A ball must be this many noise levels wide: below it the points fill a volume.
+const NOISE_RADII: f64 = 4.0;
+/// The search ends when the error has grown to this many times the least one.
+const HOPELESS: f64 = 6.0;
+/// Share of the noise of the region that every place has at least.
+const KNOWN: f64 = 0.8;
+/// Scatter above this many times the usual noise is more than noise: another sheet, or relief finer than the sectors.
+const THICKER: f64 = 1.15;
+/// Parameters of a height field: its error at the centre is about this times the noise over the points.
+const PARAMETERS: f64 = 6.0;
+
+/// What is known of the surface around a point after the first pass.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Survey {
+    /// Radius over which one quadric holds, world units.
+    pub radius: f64,
+    /// Standard deviation of the points, world units.
+    pub noise: f64,
+    /// Expected squared error of the fit, world units squared.
+    pub error: f64,
+    /// Local spacing of the points, world units.
+    pub spacing: f64,
+    /// The height field.
+    pub quadric: Quadric,
+}
+
+/// Buffers of one thread.
+#[derive(Default)]
+pub(super) struct Scratch {
+    near: Vec<(f64, u32)>,
+    y: Vec<DVec3>,
+    shell: Vec<u8>,
+}
+
+/// What is known around a place before it is surveyed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prior {
+    /// Noise of the region, world units; 0 where nothing is known.
+    pub noise: f64,
+}
+
+/// Surveys the surface near one point.
+///
+/// * `reach` - bounds the radius, world units
+/// * `prior` - the region; a ball narrower than its noise would take the noise for a surface
+///
+/// `None` where no ball determines a surface.
+pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch: &mut Scratch) -> Option<Survey> {
+    tree.nearest(p, SMALLEST, &mut scratch.near);
+    let mut r0 = scratch.near.last()?.0.sqrt();
+    if !(r0 > 0.0) || scratch.near.len() < SMALLEST {
+        return None;
+    }
+    let floor = KNOWN * prior.noise;
+    let mut p = p;
+    if NOISE_RADII * floor > r0 {
+        // A point aside of the surface sees one side of the noise; the search begins on the plane of its ball.
+        r0 = NOISE_RADII * floor;
+        for _ in 0..2 {
+            let mut m = Moments::ZERO;
+            tree.within(p, r0, |_, q, _| m.add((q - p) / r0, 1.0));
+            if m.weight() >= SMALLEST as f64 {
+                let n = Frame::of_moments(&m).n;
+                p += r0 * n * m.mean().dot(n);
+            }
+        }
+    }
+    let radius = |j: usize| r0 * GROWTH.powi(j as i32);
+    let mut sums = Moments::ZERO;
+    let (mut best, mut least): (Option<Survey>, f64) = (None, f64::INFINITY);
+    scratch.y.clear();
+    let mut done = 0.0;
+    // The noise of the region, or the least of the balls so far.
+    let mut usual = if prior.noise > 0.0 { prior.noise / r0 } else { f64::INFINITY };
+    'rounds: for first in (0..BALLS).step_by(STRIDE) {
+        let last = first + STRIDE - 1;
+        let limits: [f64; STRIDE] = std::array::from_fn(|k| GROWTH.powi(2 * (first + k) as i32));
+        let mut fresh: [Vec<DVec3>; STRIDE] = Default::default();
+        scratch.shell.clear();
+        tree.within(p, radius(last) * (1.0 + 1e-12), |_, q, _| {
+            let y = (q - p) / r0;
+            let d2 = y.length_squared();
+            if d2 > done {
+                let k = limits.iter().position(|&l| d2 <= l * (1.0 + 1e-12)).unwrap_or(STRIDE - 1);
+                fresh[k].push(y);
+            }
+        });
+        done = limits[STRIDE - 1] * (1.0 + 1e-12);
+        for (k, points) in fresh.iter().enumerate() {
+            for &y in points {
+                sums.add(y, 1.0);
+            }
+            scratch.y.extend_from_slice(points);
+            let j = first + k;
+            if j > 0 && radius(j) > reach {
+                break 'rounds;
+            }
+            let Some(height) = framed_height(&sums.matrix(), Frame::of_moments(&sums)) else { continue };
+            let ball = GROWTH.powi(j as i32);
+            let (noise, excess) = bias(&height, &scratch.y, ball);
+            let noise = noise.max(floor / r0);
+            let count = scratch.y.len();
+            if ball < NOISE_RADII * noise {
+                continue;
+            }
+            usual = usual.min(noise);
+            // Two standard deviations of a noise level from this many points pass as chance.
+            let chance = THICKER + (2.0 / count as f64).sqrt();
+            let thick = (noise * noise - (chance * usual).powi(2)).max(0.0);
+            let error = noise * noise * (PARAMETERS + excess) / count as f64 + thick;
+            if error < least {
+                least = error;
+                best = Some(Survey {
+                    radius: radius(j),
+                    noise: noise * r0,
+                    error: error * r0 * r0,
+                    spacing: radius(j) * (std::f64::consts::PI / count as f64).sqrt(),
+                    quadric: Quadric { center: p, scale: r0, a: height.implicit() },
+                });
+            } else if error > HOPELESS * least {
+                break 'rounds;
+            }
+        }
+    }
+    best
+}
+
+/// Noise inside the sectors and what the averages of the sectors hold beyond it, in units of the squared noise.
+pub(super) fn bias(height: &Height, points: &[DVec3], ball: f64) -> (f64, f64) {
+    const SECTORS: usize = 16;
+    // Two rings of equal area want five points in each part.
+    let rings = points.len() >= 5 * SECTORS;
+    let half = ball * ball / 2.0;
+    let mut sums = [(0.0, 0.0); SECTORS];
+    let mut squares = 0.0;
+    for &y in points {
+        let (u, v) = (height.frame.u.dot(y), height.frame.v.dot(y));
+        let r = height.residual(y);
+        let mut at = usize::from(u > 0.0) | usize::from(v > 0.0) << 1 | usize::from(u.abs() > v.abs()) << 2;
+        if rings && u * u + v * v > half {
+            at |= 8;
+        }
+        sums[at].0 += 1.0;
+        sums[at].1 += r;
+        squares += r * r;
+    }
+    let parts = sums.iter().filter(|s| s.0 > 0.0).count() as f64;
+    let between: f64 = sums.iter().filter(|s| s.0 > 0.0).map(|s| s.1 * s.1 / s.0).sum();
+    let n = points.len() as f64;
+    let within = ((squares - between) / (n - parts).max(1.0)).max(0.0);
+    // The averages can take up this many of the six parameters, so the fit has removed their share.
+    let freedom = (parts - if rings { 5.0 } else { 4.0 }).max(1.0);
+    let excess = if within > 0.0 { (between / within - freedom).max(0.0) } else { 0.0 };
+    (within.sqrt(), excess)
+}

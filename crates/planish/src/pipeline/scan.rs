@@ -1,0 +1,200 @@
+//! From a scan to a mesh: samples, their field, its surface.
+
+use super::record::Figure;
+use super::{Quality, Warning};
+use crate::cloud::{self, CleanParams, Cloud, CloudError, Samples};
+use crate::contour::{self, ContourParams, Meshed, MeshingError, Sampling};
+use crate::field::{SampleField, Spacing};
+use crate::geom::Bvh;
+use crate::mesh::{FeatureTags, TriMesh};
+use crate::observe::Observer;
+use rayon::prelude::*;
+
+/// Why a scan gives no mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ScanError {
+    /// No samples.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
+    /// No surface.
+    #[error(transparent)]
+    Mesh(#[from] MeshingError),
+}
+
+/// How a scan is meshed.
+#[derive(Clone, Debug)]
+pub struct ScanParams {
+    /// The samples.
+    pub clean: CleanParams,
+    /// The extraction.
+    pub contour: ContourParams,
+    /// Edge of a cell, world units; from spacing and noise if `None`.
+    pub voxel: Option<f64>,
+    /// Cells along the longest side, if no edge is given.
+    pub resolution: Option<usize>,
+    /// Bytes that may be used.
+    pub memory: u64,
+    /// Close holes (`Some(true)`), leave them open (`Some(false)`), or as the scan is.
+    pub close: Option<bool>,
+}
+
+/// What [`mesh_scan`] makes.
+#[derive(Clone, Debug)]
+pub struct ScanMeshed {
+    /// The samples.
+    pub samples: Samples,
+    /// The mesh, without specks.
+    pub meshed: Meshed,
+    /// Specks that were left out.
+    pub specks: usize,
+    /// Whether holes were closed.
+    pub closed: bool,
+    /// Root mean square and mean distance of the raw points to the mesh, world units.
+    pub to_points: (f64, f64),
+}
+
+/// A cell is this many spacings wide: the samples say nothing finer.
+const CELL_SPACINGS: f64 = 1.6;
+/// A cell is this many noise levels wide.
+const CELL_NOISE: f64 = 1.0;
+/// Components below this share of the area of the largest are specks of noise.
+const SPECK: f64 = 0.005;
+/// Raw points that are measured against the mesh.
+const MEASURED: usize = 50_000;
+
+/// The edge of a cell that suits the samples.
+pub fn voxel_for(samples: &Samples) -> f64 {
+    (CELL_SPACINGS * samples.spacing).max(CELL_NOISE * samples.noise)
+}
+
+/// Meshes a scan.
+/// # Errors
+/// [`ScanError`].
+pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> Result<ScanMeshed, ScanError> {
+    let samples = cloud::clean(scan, &params.clean, &Share { observer, from: 0.0, to: 0.6 })?;
+    let closed = params.close.unwrap_or_else(|| samples.closed.first().copied().unwrap_or(false));
+    let field = SampleField::new(&samples, closed);
+    let spacing = match (params.voxel, params.resolution) {
+        (Some(h), _) => Spacing::Voxel(h),
+        (None, Some(n)) => Spacing::Resolution(n),
+        (None, None) => Spacing::Voxel(voxel_for(&samples)),
+    };
+    let sampling = Sampling { spacing, memory: params.memory };
+    let mut meshed = contour::from_field(&field, sampling, &params.contour, &Share { observer, from: 0.6, to: 0.95 })?;
+    let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags);
+    let to_points = distances(scan, &meshed.extracted.mesh);
+    observer.progress(1.0);
+    Ok(ScanMeshed { samples, meshed, specks, closed, to_points })
+}
+
+struct Share<'a> {
+    observer: &'a dyn Observer,
+    from: f64,
+    to: f64,
+}
+
+impl Observer for Share<'_> {
+    fn progress(&self, fraction: f64) {
+        self.observer.progress(self.from + (self.to - self.from) * fraction);
+    }
+    fn cancelled(&self) -> bool {
+        self.observer.cancelled()
+    }
+}
+
+/// Leaves out the components whose area is next to nothing; returns how many.
+fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags) -> usize {
+    let mut parent: Vec<u32> = (0..mesh.points.len() as u32).collect();
+    fn root(parent: &mut [u32], mut i: u32) -> u32 {
+        while parent[i as usize] != i {
+            parent[i as usize] = parent[parent[i as usize] as usize];
+            i = parent[i as usize];
+        }
+        i
+    }
+    for t in &mesh.triangles {
+        for k in 1..3 {
+            let (a, b) = (root(&mut parent, t[0]), root(&mut parent, t[k]));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let label: Vec<u32> = (0..mesh.points.len() as u32).map(|i| root(&mut parent, i)).collect();
+    let mut area = vec![0.0; mesh.points.len()];
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        area[label[triangle[0] as usize] as usize] += mesh.area(t);
+    }
+    let most = area.iter().copied().fold(0.0, f64::max);
+    let stays = |v: u32| area[label[v as usize] as usize] >= SPECK * most;
+    let specks = (0..label.len()).filter(|&i| label[i] == i as u32 && area[i] > 0.0 && !stays(i as u32)).count();
+    if specks == 0 {
+        return 0;
+    }
+    let mut fresh = vec![u32::MAX; mesh.points.len()];
+    let mut kept = Vec::new();
+    for v in 0..mesh.points.len() as u32 {
+        if stays(v) {
+            fresh[v as usize] = kept.len() as u32;
+            kept.push(v);
+        }
+    }
+    for a in &mut mesh.attributes {
+        let width = a.width;
+        a.values = kept.iter().flat_map(|&v| a.values[v as usize * width..(v as usize + 1) * width].to_vec()).collect();
+    }
+    mesh.points = kept.iter().map(|&v| mesh.points[v as usize]).collect();
+    mesh.triangles.retain(|t| fresh[t[0] as usize] != u32::MAX);
+    mesh.triangles.iter_mut().for_each(|t| *t = t.map(|v| fresh[v as usize]));
+    tags.edges.retain(|e| fresh[e[0] as usize] != u32::MAX);
+    tags.edges.iter_mut().for_each(|e| *e = e.map(|v| fresh[v as usize]));
+    tags.vertices = kept.iter().map(|&v| tags.vertices[v as usize]).collect();
+    specks
+}
+
+/// Root mean square and mean distance of raw points to a mesh.
+fn distances(scan: &Cloud, mesh: &TriMesh) -> (f64, f64) {
+    if mesh.triangles.is_empty() {
+        return (0.0, 0.0);
+    }
+    let bvh = Bvh::new(mesh);
+    let step = scan.points.len().div_ceil(MEASURED).max(1);
+    let finite: Vec<_> = scan.points.iter().step_by(step).filter(|p| p.is_finite()).collect();
+    let found: Vec<f64> = finite.par_iter().map(|p| bvh.closest(**p).distance).collect();
+    let n = found.len().max(1) as f64;
+    ((found.iter().map(|d| d * d).sum::<f64>() / n).sqrt(), found.iter().sum::<f64>() / n)
+}
+
+/// The figures and warnings of a scan that was meshed.
+pub fn scan_figures(made: &ScanMeshed, quality: &mut Quality, warnings: &mut Vec<Warning>) {
+    sample_figures(&made.samples, quality, warnings);
+    quality.insert("scan.specks".into(), Figure::Count(made.specks as u64));
+    quality.insert("scan.closed".into(), Figure::Flag(made.closed));
+    quality.insert("scan.to_mesh_rms".into(), Figure::Number(made.to_points.0));
+    quality.insert("scan.to_mesh_mean".into(), Figure::Number(made.to_points.1));
+}
+
+/// The figures of samples alone.
+pub fn sample_figures(samples: &Samples, quality: &mut Quality, warnings: &mut Vec<Warning>) {
+    let count = samples.samples.len().max(1) as f64;
+    let confidence = samples.samples.iter().map(|s| s.confidence).sum::<f64>() / count;
+    let numbers = [
+        ("scan.noise", samples.noise),
+        ("scan.noise_rel", samples.noise / samples.diagonal),
+        ("scan.spacing", samples.spacing),
+        ("scan.confidence", confidence),
+        ("scan.normal_noise_deg", samples.normal_noise_deg),
+    ];
+    quality.extend(numbers.map(|(key, x)| (key.to_owned(), Figure::Number(x))));
+    quality.insert("scan.samples".into(), Figure::Count(samples.samples.len() as u64));
+    quality.insert("scan.segments".into(), Figure::Count(samples.closed.len() as u64));
+    if confidence < UNSURE {
+        let text = format!(
+            "The orientation of the points is unsure: {:.1} % of the evidence agrees. Normals or scanner positions in the \
+             file would decide it.",
+            100.0 * confidence
+        );
+        warnings.push(Warning::new("unsure_orientation", text, ""));
+    }
+}
+
+/// Below this share of evidence that agrees the orientation is told to be unsure.
+const UNSURE: f64 = 0.95;

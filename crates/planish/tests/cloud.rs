@@ -1,0 +1,277 @@
+//! Scans to samples and fields: closed form first, then invariants, then input that is none.
+
+use glam::{DQuat, DVec3};
+use planish::Silent;
+use planish::cloud::{self, CleanParams, Cloud, CloudError, ProjectParams, Samples};
+use planish::contour::ContourParams;
+use planish::field::{Field, SampleField};
+use planish::geom::random;
+use planish::mesh::{TriMesh, diagnose, shapes};
+use planish::pipeline::{ScanParams, mesh_scan};
+
+/// A normally distributed number.
+fn normal(seed: u64, n: u64) -> f64 {
+    let (u, v) = (random::unit(seed, 2 * n), random::unit(seed, 2 * n + 1));
+    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+}
+
+/// Points of a mesh, evenly by area, with noise in all directions.
+fn scan_of(mesh: &TriMesh, count: u64, noise: f64, seed: u64) -> Vec<DVec3> {
+    let mut total = 0.0;
+    let sums: Vec<f64> = (0..mesh.triangles.len())
+        .map(|t| {
+            total += mesh.area(t);
+            total
+        })
+        .collect();
+    (0..count)
+        .map(|i| {
+            let [pick, r, s] = [0, 1, 2].map(|k| random::unit(seed, 3 * i + k));
+            let t = sums.partition_point(|&x| x <= pick * total).min(sums.len() - 1);
+            let [a, b, c] = mesh.corners(t);
+            let r = r.sqrt();
+            let p = a * (1.0 - r) + b * (r * (1.0 - s)) + c * (r * s);
+            p + noise * DVec3::from_array([0, 1, 2].map(|k| normal(seed + 1, 3 * i + k)))
+        })
+        .collect()
+}
+
+/// Points on the unit sphere, evenly spread.
+fn sphere(count: usize) -> Vec<DVec3> {
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    (0..count)
+        .map(|k| {
+            let z = 1.0 - (2 * k + 1) as f64 / count as f64;
+            let (s, c) = (k as f64 * golden).sin_cos();
+            let r = (1.0 - z * z).sqrt();
+            DVec3::new(r * c, r * s, z)
+        })
+        .collect()
+}
+
+fn clean(points: Vec<DVec3>) -> Samples {
+    cloud::clean(&Cloud::new(points), &CleanParams::default(), &Silent).unwrap()
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0.0), |(s, n), x| (s + x * x, n + 1.0));
+    f64::sqrt(sum / n)
+}
+
+#[test]
+fn a_noise_free_sphere_of_20_000_points_is_met_within_1e_6_and_its_curvatures_within_1e_3() {
+    let samples = clean(sphere(20_000));
+    assert!(samples.noise < 1e-4, "{}", samples.noise);
+    let off = samples.samples.iter().map(|s| (s.center.length() - 1.0).abs()).fold(0.0, f64::max);
+    assert!(off < 1e-6, "{off}");
+    for s in &samples.samples {
+        let (gauss, mean) = s.quadric.curvature(s.center);
+        assert!((mean - 1.0).abs() < 1e-3 && (gauss - 1.0).abs() < 2e-3, "{mean} {gauss}");
+        assert!(s.normal.dot(s.center) > 0.999_999);
+    }
+}
+
+#[test]
+fn noise_of_a_plane_and_a_sphere_is_estimated_within_8_percent() {
+    for noise in [0.002, 0.01] {
+        let points = scan_of(&shapes::sphere(1.0, 5), 30_000, noise, 3);
+        let estimated = clean(points).noise;
+        assert!((estimated / noise - 1.0).abs() < 0.08, "{estimated} for {noise}");
+    }
+}
+
+#[test]
+fn points_of_a_sphere_with_noise_of_half_the_spacing_are_moved_to_within_0_3_spacings_rms() {
+    let points = scan_of(&shapes::sphere(1.0, 6), 50_000, 0.5 * (4.0 * std::f64::consts::PI / 50_000.0f64).sqrt(), 5);
+    let samples = clean(points.clone());
+    let spacing = (4.0 * std::f64::consts::PI / 50_000.0f64).sqrt();
+    let made = cloud::project(&Cloud::new(points), &samples, 4.0, &ProjectParams::default(), &Silent).unwrap();
+    let off = rms(made.cloud.points.iter().map(|p| p.length() - 1.0)) / spacing;
+    assert!(off < 0.3, "{off} spacings");
+    assert_eq!(samples.closed, [true]);
+}
+
+#[test]
+fn all_samples_of_a_closed_shape_point_outward() {
+    for mesh in [shapes::sphere(1.0, 5), shapes::torus(1.0, 0.35, 96, 48)] {
+        let diagonal = mesh.bounds().diagonal();
+        let bvh = planish::geom::Bvh::new(&mesh);
+        let samples = clean(scan_of(&mesh, 30_000, 0.0025 * diagonal, 9));
+        let wrong = samples
+            .samples
+            .iter()
+            .filter(|s| s.normal.dot(mesh.normal(bvh.closest(s.center).place.face as usize)) < 0.0)
+            .count();
+        assert_eq!(wrong, 0, "of {}", samples.samples.len());
+    }
+}
+
+#[test]
+fn a_cavity_inside_a_ball_points_into_the_cavity() {
+    let outer = scan_of(&shapes::sphere(1.0, 5), 30_000, 0.002, 1);
+    let inner = scan_of(&shapes::sphere(0.5, 5), 8_000, 0.002, 2);
+    let samples = clean(outer.into_iter().chain(inner).collect());
+    assert_eq!(samples.closed.len(), 2);
+    for s in &samples.samples {
+        let along = s.normal.dot(s.center.normalize());
+        assert!(if s.center.length() > 0.75 { along > 0.9 } else { along < -0.9 }, "{along} at {}", s.center);
+    }
+}
+
+#[test]
+fn two_balls_a_radius_apart_are_two_segments_that_point_outward() {
+    let shape = shapes::sphere(1.0, 5);
+    let mut points = scan_of(&shape, 15_000, 0.004, 1);
+    points.extend(scan_of(&shape, 15_000, 0.004, 7).into_iter().map(|p| p + DVec3::X * 3.0));
+    let samples = clean(points);
+    assert_eq!(samples.closed, [true, true]);
+    for s in &samples.samples {
+        let center = if s.center.x < 1.5 { DVec3::ZERO } else { DVec3::X * 3.0 };
+        assert!(s.normal.dot(s.center - center) > 0.9);
+    }
+}
+
+#[test]
+fn a_terrain_points_up() {
+    let points: Vec<DVec3> = (0..20_000u64)
+        .map(|i| {
+            let (x, y) = (random::unit(1, 2 * i) * 10.0, random::unit(1, 2 * i + 1) * 10.0);
+            DVec3::new(x, y, 0.3 * (x * 0.9).sin() * (y * 0.7).cos() + 0.005 * normal(4, i))
+        })
+        .collect();
+    let samples = clean(points);
+    assert!(samples.samples.iter().all(|s| s.normal.z > 0.5));
+    assert_eq!(samples.closed, [false]);
+}
+
+#[test]
+fn one_scanner_decides_the_side_of_an_open_scan() {
+    let points: Vec<DVec3> = (0..8_000u64)
+        .map(|i| DVec3::new(random::unit(1, 2 * i), random::unit(1, 2 * i + 1), 0.001 * normal(4, i)))
+        .collect();
+    let scan = Cloud { scanners: vec![DVec3::new(0.5, 0.5, -3.0)], ..Cloud::new(points) };
+    let samples = cloud::clean(&scan, &CleanParams::default(), &Silent).unwrap();
+    assert!(samples.samples.iter().all(|s| s.normal.z < -0.9));
+}
+
+#[test]
+fn samples_do_not_depend_on_the_order_of_points_nor_on_the_number_of_threads() {
+    let points = scan_of(&shapes::cuboid(DVec3::new(1.0, 0.7, 0.5), 4), 12_000, 0.002, 1);
+    let all = clean(points.clone());
+    let turned = clean(points.iter().rev().copied().collect());
+    assert_eq!(all.samples, turned.samples);
+    for threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        assert_eq!(pool.install(|| clean(points.clone())).samples, all.samples, "{threads} threads");
+    }
+}
+
+#[test]
+fn estimates_scale_with_the_scan_and_stay_under_rigid_motion() {
+    let points = scan_of(&shapes::torus(1.0, 0.4, 64, 32), 15_000, 0.004, 1);
+    let base = clean(points.clone());
+    // A power of two changes no rounding.
+    let large = clean(points.iter().map(|p| *p * 1024.0).collect());
+    assert_eq!(large.samples.len(), base.samples.len());
+    assert!((large.noise / base.noise - 1024.0).abs() < 1e-6 * 1024.0);
+    let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.9);
+    let moved = clean(points.iter().map(|p| turn * *p + DVec3::new(3.0, -2.0, 1.0)).collect());
+    assert!((moved.noise / base.noise - 1.0).abs() < 0.02, "{} {}", moved.noise, base.noise);
+    assert!((moved.spacing / base.spacing - 1.0).abs() < 0.05);
+}
+
+#[test]
+fn a_box_with_noise_gives_one_watertight_manifold_mesh() {
+    let shape = shapes::cuboid(DVec3::new(1.0, 0.8, 0.6), 4);
+    let scan = Cloud::new(scan_of(&shape, 40_000, 0.0014, 1));
+    let params = ScanParams {
+        clean: CleanParams::default(),
+        contour: ContourParams::default(),
+        voxel: None,
+        resolution: Some(64),
+        memory: 1 << 30,
+        close: None,
+    };
+    let made = mesh_scan(&scan, &params, &Silent).unwrap();
+    let facts = diagnose(&made.meshed.extracted.mesh);
+    assert!(made.closed && facts.watertight && facts.manifold, "{facts:?}");
+    assert_eq!((facts.components, facts.euler), (1, 2));
+    let volume = facts.volume.unwrap();
+    assert!((volume / 0.48 - 1.0).abs() < 0.01, "{volume}");
+}
+
+#[test]
+fn outliers_are_flagged_and_left_out() {
+    let mut points = scan_of(&shapes::sphere(1.0, 5), 20_000, 0.003, 1);
+    let strays = 400;
+    points.extend((0..strays).map(|i| DVec3::from_array([0, 1, 2].map(|k| 2.4 * random::unit(5, 3 * i + k) - 1.2))));
+    let scan = Cloud::new(points);
+    let samples = cloud::clean(&scan, &CleanParams::default(), &Silent).unwrap();
+    let kept = cloud::project(&scan, &samples, 4.0, &ProjectParams::default(), &Silent).unwrap();
+    let far = kept.cloud.points.iter().filter(|p| (p.length() - 1.0).abs() > 0.05).count();
+    assert!(far < strays as usize / 50, "{far} strays are left");
+    assert!(kept.cloud.points.len() > 19_800, "{} points are kept", kept.cloud.points.len());
+}
+
+#[test]
+fn a_thinned_cloud_keeps_its_distance() {
+    let scan = Cloud::new(scan_of(&shapes::sphere(1.0, 5), 20_000, 0.003, 1));
+    let samples = cloud::clean(&scan, &CleanParams::default(), &Silent).unwrap();
+    let params = ProjectParams { spacing: 0.1, ..ProjectParams::default() };
+    let kept = cloud::project(&scan, &samples, 4.0, &params, &Silent).unwrap().cloud;
+    let tree = planish::geom::KdTree::new(&kept.points);
+    let mut near = Vec::new();
+    for &p in &kept.points {
+        tree.nearest(p, 2, &mut near);
+        assert!(near[1].0.sqrt() > 0.1);
+    }
+    assert!(kept.points.len() > 500, "{}", kept.points.len());
+}
+
+#[test]
+fn the_field_is_negative_inside_positive_outside_and_unknown_far_away() {
+    let samples = clean(scan_of(&shapes::sphere(1.0, 5), 20_000, 0.002, 1));
+    let field = SampleField::new(&samples, false);
+    assert!(field.value(DVec3::X * 0.98) < 0.0 && field.value(DVec3::X * 1.02) > 0.0);
+    assert!(field.value(DVec3::X * 3.0).is_nan() && field.value(DVec3::ZERO).is_nan());
+    let closed = SampleField::new(&samples, true);
+    assert!(closed.value(DVec3::ZERO) < 0.0 && closed.value(DVec3::X * 3.0) > 0.0);
+    assert!((field.value(DVec3::Y * 1.01) - 0.01).abs() < 2e-3);
+    assert!(field.gradient(DVec3::Y).dot(DVec3::Y) > 0.999);
+}
+
+#[test]
+fn input_that_is_no_surface_gives_a_clear_error_and_never_a_panic() {
+    let run = |points: Vec<DVec3>| cloud::clean(&Cloud::new(points), &CleanParams::default(), &Silent);
+    assert!(matches!(run(vec![]), Err(CloudError::TooFew { distinct: 0, .. })));
+    assert!(matches!(run(vec![DVec3::ONE; 5000]), Err(CloudError::TooFew { distinct: 1, .. })));
+    assert!(matches!(run(vec![DVec3::ZERO, DVec3::X, DVec3::Y]), Err(CloudError::TooFew { distinct: 3, .. })));
+    assert!(matches!(run(vec![DVec3::NAN; 100]), Err(CloudError::TooFew { distinct: 0, .. })));
+    let line = (0..500).map(|i| DVec3::new(1.0, 2.0, 3.0) * i as f64).collect();
+    assert!(matches!(run(line), Err(CloudError::Collinear { points: 500 })));
+    // Planes, repeats, some NaN and two scales are scans.
+    let mut plane: Vec<DVec3> =
+        (0..3000u64).map(|i| DVec3::new(random::unit(1, 2 * i), random::unit(1, 2 * i + 1), 0.0)).collect();
+    plane.extend_from_within(..500);
+    plane.push(DVec3::NAN);
+    plane.push(DVec3::new(f64::INFINITY, 0.0, 0.0));
+    let samples = run(plane).unwrap();
+    assert!(samples.samples.iter().all(|s| s.center.z.abs() < 1e-9 && s.normal.z > 0.999));
+    let mut mixed = sphere(8000);
+    mixed.extend(sphere(8000).into_iter().map(|p| p * 1e-3 + DVec3::X * 5.0));
+    let samples = run(mixed).unwrap();
+    assert_eq!(samples.closed.len(), 2);
+}
+
+#[test]
+fn a_cancelled_cleaning_ends_as_cancelled() {
+    struct Stop;
+    impl planish::Observer for Stop {
+        fn progress(&self, _: f64) {}
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    let result = cloud::clean(&Cloud::new(sphere(5000)), &CleanParams::default(), &Stop);
+    assert_eq!(result.unwrap_err(), CloudError::Cancelled);
+}
