@@ -17,6 +17,7 @@
 //! # Ok::<(), pipeline::PipelineError>(())
 //! ```
 
+pub mod curve;
 pub mod geom;
 pub mod grid;
 pub mod linalg;
