@@ -18,6 +18,17 @@ const PARALLEL_LENGTH: usize = 64;
 
 /// Slides `place` over the surface to a place from which `target` is nearest.
 pub fn slide_to(mesh: &TriMesh, adjacency: &Adjacency, place: FacePoint, target: DVec3) -> FacePoint {
+    slide_within(mesh, adjacency, place, target, 0.0)
+}
+
+/// As [`slide_to`], done when a slide is shorter than `tolerance` (world units).
+pub(crate) fn slide_within(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    place: FacePoint,
+    target: DVec3,
+    tolerance: f64,
+) -> FacePoint {
     let mut at = place;
     let mut p = at.position(mesh);
     let mut away = p.distance(target);
@@ -37,7 +48,7 @@ pub fn slide_to(mesh: &TriMesh, adjacency: &Adjacency, place: FacePoint, target:
         let Some((trial, q, d)) = better else { break };
         let moved = p.distance(q);
         (at, p, away) = (trial, q, d);
-        if moved <= SETTLED * away {
+        if moved <= (SETTLED * away).max(tolerance) {
             break;
         }
     }

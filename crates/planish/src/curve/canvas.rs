@@ -14,7 +14,15 @@ use std::collections::BinaryHeap;
 use std::sync::Mutex;
 
 /// Landmarks: the two ends of the shape along each of these directions.
-const DIRECTIONS: [DVec3; 3] = [DVec3::X, DVec3::Y, DVec3::Z];
+const DIRECTIONS: [DVec3; 7] = [
+    DVec3::X,
+    DVec3::Y,
+    DVec3::Z,
+    DVec3::new(1.0, 1.0, 1.0),
+    DVec3::new(1.0, 1.0, -1.0),
+    DVec3::new(1.0, -1.0, 1.0),
+    DVec3::new(-1.0, 1.0, 1.0),
+];
 /// Their number: one cache line of distances per vertex holds both ends of all directions.
 const LANDMARKS: usize = 2 * DIRECTIONS.len();
 /// Width of a bucket of the distance search, in mean edges.
@@ -31,8 +39,14 @@ pub struct Magnet {
     pub least_cost: f64,
 }
 
-/// Cost of the most drawing edges: a path may be this many times longer along a line than beside it.
-const LEAST_COST: f64 = 0.1;
+/// Cost of the most drawing edges: a path may be five times longer along a line than beside it.
+const LEAST_COST: f64 = 0.2;
+/// Shares of the vertices below the values of no pull and of full pull.
+const MIDDLE: f64 = 0.5;
+const HIGH: f64 = 0.95;
+/// A magnetic search looks ahead as if edges cost at least this: it may miss the cheapest path by as much as this is
+/// above the least cost, and looks at a small part of the mesh instead of most of it.
+const EAGER: f64 = 0.7;
 
 impl Magnet {
     /// Drawn to the marked half-edges (feature lines, creases).
@@ -45,9 +59,12 @@ impl Magnet {
         Magnet { pull, least_cost: LEAST_COST }
     }
 
-    /// Drawn to high values of a scalar.
+    /// Drawn to high values of a scalar: from its middle value (nothing) to the highest twentieth (all).
     pub fn of_scalar(field: &ScalarField) -> Magnet {
-        let (low, high) = field.range();
+        let mut sorted: Vec<f64> = field.values.iter().copied().filter(|s| s.is_finite()).collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| sorted.get((share * sorted.len() as f64) as usize).copied().unwrap_or(0.0);
+        let (low, high) = (at(MIDDLE), at(HIGH));
         let scale = if high > low { 1.0 / (high - low) } else { 0.0 };
         let pull = field.values.iter().map(|s| ((s - low) * scale).clamp(0.0, 1.0) as f32).collect();
         Magnet { pull, least_cost: LEAST_COST }
@@ -209,7 +226,7 @@ impl<'m> Canvas<'m> {
         };
         let goal = points[to as usize];
         let goal_marks = self.landmarks[to as usize];
-        let least = magnet.map_or(1.0, |m| m.least_cost);
+        let least = magnet.map_or(1.0, |m| m.least_cost.max(EAGER));
         // Infinite where a landmark tells that the two lie on different pieces.
         let ahead = |v: u32| {
             let mut bound = points[v as usize].distance(goal);

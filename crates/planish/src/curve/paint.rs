@@ -10,7 +10,6 @@ use super::curve::{SurfaceCurve, sample, without_repeats};
 use super::strip::{nearest_corner, no_way, straighten};
 use super::{CurveError, attract};
 use crate::mesh::{FacePoint, path};
-use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -186,6 +185,14 @@ pub fn way(
     }
 }
 
+/// A place of a straight piece that slides less than this share of the mean edge has arrived.
+const SLIDE: f64 = 0.02;
+/// A chain longer than this times the segment runs around something: the segment tells nothing of its course.
+const BULGE: f64 = 1.3;
+/// A straight piece whose neighbouring places come to lie this many times their mean distance apart is torn; the
+/// chain is then pulled to a geodesic instead.
+const TORN: f64 = 6.0;
+
 /// A chain of vertices sampled to places and drawn to the segment between its ends.
 fn straight(
     canvas: &Canvas,
@@ -203,9 +210,32 @@ fn straight(
         chain.windows(2).map(|w| mesh.points[w[0] as usize].distance(mesh.points[w[1] as usize])).sum();
     let count = (length / (spacing * canvas.edge)).round().clamp(2.0, 1e6) as usize + 1;
     let places = sample(mesh, adjacency, &rough, count);
-    let attractors: Vec<DVec3> = (0..count).map(|k| p.lerp(q, k as f64 / (count - 1) as f64)).collect();
-    let mut drawn = attract::attract(mesh, adjacency, &places, &attractors);
-    (drawn[0], drawn[count - 1]) = (from, to);
+    let segment = p.distance(q);
+    let geodesic = || straighten(mesh, adjacency, from, chain, to).ok_or_else(|| no_way(mesh, &from, &to));
+    if length > BULGE * segment + 2.0 * canvas.edge {
+        return geodesic();
+    }
+    let tolerance = SLIDE * canvas.edge;
+    let gap = TORN * length / (count - 1) as f64;
+    let mut drawn: Vec<FacePoint> = vec![from];
+    let mut last = p;
+    for (k, place) in places[1..count - 1].iter().enumerate() {
+        let attractor = p.lerp(q, (k + 1) as f64 / (count - 1) as f64);
+        // The place before has come down near this attractor already.
+        let before = drawn[drawn.len() - 1];
+        let start = if last.distance(attractor) < place.position(mesh).distance(attractor) { before } else { *place };
+        let to = attract::slide_within(mesh, adjacency, start, attractor, tolerance);
+        let at = to.position(mesh);
+        if at.distance(last) > gap {
+            return geodesic();
+        }
+        last = at;
+        drawn.push(to);
+    }
+    if last.distance(q) > gap {
+        return geodesic();
+    }
+    drawn.push(to);
     SurfaceCurve::open(drawn).trace(mesh, adjacency)
 }
 

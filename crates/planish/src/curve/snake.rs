@@ -21,6 +21,7 @@ use crate::observe::Observer;
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 
 /// Explicit steps go this far along the forces: below the bound for the highest frequency of all terms together.
 const EXPLICIT_STEP: f64 = 0.45;
@@ -34,12 +35,14 @@ const STALL: usize = 3;
 const COARSE_SWEEPS: usize = 24;
 /// Damping of the fine solve as a share of its mean diagonal: keeps stretches alone under no force in place.
 const DAMPING: f64 = 1e-9;
-/// Halvings of a fine step that would raise the energy.
-const HALVINGS: usize = 5;
+/// Shares of a fine step that are tried until one lowers the energy.
+const SHARES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
 /// Longest fine move, in mean spacings of the points: beyond, tangent planes tell little.
 const LONGEST_MOVE: f64 = 24.0;
 /// Longest step to the ridge of a scalar, in mean spacings.
 const RIDGE_STEP: f64 = 1.0;
+/// Points whose distances differ from even by more than this are put at equal distances after a relaxation.
+const UNEVEN: f64 = 0.05;
 /// "No slot", "no face".
 const NONE: u32 = u32::MAX;
 
@@ -153,6 +156,8 @@ pub struct Snake<'m> {
     at: Vec<DVec3>,
     /// For each point the face and its three vertex normals.
     normals: Vec<(u32, [DVec3; 3])>,
+    /// Vertex normals met so far.
+    vertex_normals: HashMap<u32, DVec3>,
     pinned: Vec<bool>,
     /// False outside the edit section.
     open: Vec<bool>,
@@ -178,6 +183,7 @@ impl<'m> Snake<'m> {
             points: curve.points.clone(),
             at: curve.positions(mesh),
             normals: vec![(NONE, [DVec3::ZERO; 3]); n],
+            vertex_normals: HashMap::new(),
             pinned: vec![false; n],
             open: vec![true; n],
             factors: vec![[1.0; 2]; n],
@@ -325,10 +331,12 @@ impl<'m> Snake<'m> {
     fn normal(&mut self, i: usize) -> DVec3 {
         let p = self.points[i];
         if self.normals[i].0 != p.face {
+            let (mesh, adjacency) = (self.mesh, self.adjacency);
             let of = |v: u32| -> DVec3 {
-                self.adjacency.fan(v).map(|h| self.mesh.area_vector(h as usize / 3)).sum::<DVec3>().normalize_or_zero()
+                adjacency.fan(v).map(|h| mesh.area_vector(h as usize / 3)).sum::<DVec3>().normalize_or_zero()
             };
-            self.normals[i] = (p.face, self.mesh.triangles[p.face as usize].map(of));
+            let corners = mesh.triangles[p.face as usize];
+            self.normals[i] = (p.face, corners.map(|v| *self.vertex_normals.entry(v).or_insert_with(|| of(v))));
         }
         let n = self.normals[i].1;
         (n[0] * p.bary[0] + n[1] * p.bary[1] + n[2] * p.bary[2]).normalize_or_zero()
@@ -365,6 +373,7 @@ impl<'m> Snake<'m> {
         let n = self.points.len();
         let mut moves = vec![DVec3::ZERO; n];
         let normals: Vec<DVec3> = (0..n).map(|i| self.normal(i)).collect();
+        let reach = self.reaches();
         for i in 0..n {
             if !self.moves(i) {
                 continue;
@@ -376,7 +385,10 @@ impl<'m> Snake<'m> {
             let mut step = 1usize;
             while step < n {
                 let s = step as isize;
-                let (Some(a), Some(b)) = (self.reach(i, -s), self.reach(i, s)) else { break };
+                if reach[i][0].min(reach[i][1]) < step {
+                    break;
+                }
+                let (Some(a), Some(b)) = (self.along(i, -s), self.along(i, s)) else { break };
                 let w = 1.0 / step as f64;
                 weights += w;
                 let c = mid(a, b, i);
@@ -409,13 +421,23 @@ impl<'m> Snake<'m> {
         self.apply(&moves)
     }
 
-    /// The neighbour `step` on, without passing a fixed point.
-    fn reach(&self, i: usize, step: isize) -> Option<usize> {
-        let way = step.signum();
-        if (1..step.abs()).any(|k| self.along(i, k * way).is_none_or(|j| !self.moves(j))) {
-            return None;
+    /// For each point how far its neighbours reach back and ahead without passing a fixed point.
+    fn reaches(&self) -> Vec<[usize; 2]> {
+        let n = self.points.len();
+        let mut reach = vec![[n; 2]; n];
+        // Two rounds carry the counts over the start of a closed curve.
+        for (side, forward) in [(0, true), (1, false)] {
+            let mut run = if self.closed { n } else { 0 };
+            for k in 0..2 * n {
+                let i = if forward { k % n } else { n - 1 - k % n };
+                if !self.closed && k % n == 0 {
+                    run = 0;
+                }
+                reach[i][side] = run.min(n);
+                run = if self.moves(i) { run + 1 } else { 1 };
+            }
         }
-        self.along(i, step)
+        reach
     }
 
     /// Moves every point over the surface; returns the largest move as asked for.
@@ -548,13 +570,16 @@ impl<'m> Snake<'m> {
         }
         let before = self.energy(params).total();
         let (points, at) = (self.points.clone(), self.at.clone());
-        for _ in 0..HALVINGS {
+        let mut taken = 1.0;
+        for share in SHARES {
+            moves.iter_mut().for_each(|m| *m *= share / taken);
+            taken = share;
             let largest = self.apply(&moves);
             if self.energy(params).total() < before {
                 return (largest, true);
             }
-            (self.points, self.at) = (points.clone(), at.clone());
-            moves.iter_mut().for_each(|m| *m /= 2.0);
+            self.points.copy_from_slice(&points);
+            self.at.copy_from_slice(&at);
         }
         (0.0, false)
     }
@@ -600,8 +625,44 @@ impl<'m> Snake<'m> {
             }
             observer.progress(out.sweeps as f64 / params.sweeps as f64);
         }
+        if params.arc_length > 0.0 {
+            self.even_out()?;
+        }
         out.energy[1] = self.energy(params);
         Ok(out)
+    }
+
+    /// Puts the moving points of every stretch between fixed ones at equal arc length along the curve, where they are
+    /// uneven: fairness pulls points of a rough surface together.
+    fn even_out(&mut self) -> Result<(), CurveError> {
+        let n = self.points.len();
+        let Some(start) = (0..n).find(|&i| !self.moves(i)) else {
+            if self.unevenness() > UNEVEN {
+                let even = self.curve().resampled(self.mesh, self.adjacency, n)?;
+                (0..n).for_each(|i| self.move_to(i, even.points[i]));
+            }
+            return Ok(());
+        };
+        let mut stretch = vec![start];
+        let segments = if self.closed { n } else { n - 1 - start };
+        for k in 1..=segments {
+            let i = (start + k) % n;
+            stretch.push(i);
+            if self.moves(i) {
+                continue;
+            }
+            let lengths: Vec<f64> = stretch.windows(2).map(|w| self.at[w[0]].distance(self.at[w[1]])).collect();
+            let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
+            if stretch.len() > 2 && lengths.iter().any(|l| (l / mean - 1.0).abs() > UNEVEN) {
+                let part = SurfaceCurve::open(stretch.iter().map(|&i| self.points[i]).collect());
+                let even = part.resampled(self.mesh, self.adjacency, stretch.len())?;
+                for (&i, &place) in stretch.iter().zip(&even.points).skip(1).take(stretch.len() - 2) {
+                    self.move_to(i, place);
+                }
+            }
+            stretch = vec![i];
+        }
+        Ok(())
     }
 }
 
