@@ -9,7 +9,7 @@ mod features;
 pub mod path;
 mod repair;
 mod rings;
-mod sets;
+pub(crate) mod sets;
 pub mod shapes;
 mod slivers;
 mod soup;

@@ -53,7 +53,8 @@ pub struct LayoutParams {
     /// Edges whose faces meet at more than this angle are sharp and become patch boundaries.
     #[schemars(range(min = 1.0, max = 180.0), extend("unit" = "deg"))]
     pub sharp_angle_deg: f64,
-    /// Connected sharp edges shorter together than this fraction of the diagonal are surface detail.
+    /// Sharp lines with a loose end that are shorter than this fraction of the diagonal are surface detail, and so
+    /// are closed ones half as long.
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "diagonal"))]
     pub feature_length: f64,
     /// Rounds of relaxing corners and curves.
@@ -63,7 +64,7 @@ pub struct LayoutParams {
 
 impl Default for LayoutParams {
     fn default() -> LayoutParams {
-        LayoutParams { patches: 120, sharp_angle_deg: 40.0, feature_length: 0.05, smoothing: 3 }
+        LayoutParams { patches: 120, sharp_angle_deg: 40.0, feature_length: 0.1, smoothing: 3 }
     }
 }
 

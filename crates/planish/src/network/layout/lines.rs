@@ -5,9 +5,11 @@
 //! and between the mean normals of the surface to its left and right.
 
 use super::LayoutParams;
-use crate::mesh::{Adjacency, TriMesh, next, sharp_edges};
+use crate::mesh::sets::Sets;
+use crate::mesh::{Adjacency, NONE, TriMesh, next, sharp_edges};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How far the mean normals reach, in mean edge lengths of the mesh.
 const REACH: f64 = 4.0;
@@ -16,8 +18,11 @@ const REACH: f64 = 4.0;
 /// edge may bend away from it.
 const WIDE_ANGLE: f64 = 0.75;
 
-/// Marks the half-edges on sharp edges that belong to a line worth keeping, and counts the sharp edges left
-/// out. Connected sharp edges shorter together than `feature_length` of the diagonal are surface detail.
+/// A line without loose ends is kept from this part of the length asked for: a closed line is rarely an accident.
+const CLOSED_SHARE: f64 = 0.5;
+
+/// Marks the half-edges on sharp edges that belong to a line worth keeping, and counts the sharp edges left out.
+/// Noise makes short lines with loose ends and small meshes of lines; a part's edges close or meet others.
 pub(super) fn feature_lines(mesh: &TriMesh, adjacency: &Adjacency, params: &LayoutParams) -> (Vec<bool>, usize) {
     let sharp = sharp_edges(mesh, adjacency, params.sharp_angle_deg);
     let found = sharp.iter().filter(|&&s| s).count();
@@ -41,7 +46,7 @@ pub(super) fn feature_lines(mesh: &TriMesh, adjacency: &Adjacency, params: &Layo
             kept[adjacency.opposite[h] as usize] = true;
         }
     }
-    drop_short(mesh, adjacency, params.feature_length * mesh.bounds().diagonal(), &mut kept);
+    drop_detail(mesh, adjacency, params.feature_length * mesh.bounds().diagonal(), &mut kept);
     let left = kept.iter().filter(|&&s| s).count();
     (kept, (found - left) / 2)
 }
@@ -66,7 +71,7 @@ fn mean_normal(mesh: &TriMesh, adjacency: &Adjacency, sharp: &[bool], h: u32, re
         sum += mesh.area_vector(f as usize);
         for g in 3 * f..3 * f + 3 {
             let o = adjacency.opposite[g as usize];
-            if o == crate::mesh::NONE || sharp[g as usize] || seen.contains(&(o / 3)) {
+            if o == NONE || sharp[g as usize] || seen.contains(&(o / 3)) {
                 continue;
             }
             let out = mesh.corners(o as usize / 3).into_iter().sum::<DVec3>() / 3.0 - middle;
@@ -78,31 +83,109 @@ fn mean_normal(mesh: &TriMesh, adjacency: &Adjacency, sharp: &[bool], h: u32, re
     sum.normalize_or_zero()
 }
 
-/// Clears connected lines shorter than `shortest`.
-fn drop_short(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut [bool]) {
-    let mut parent: Vec<u32> = (0..mesh.points.len() as u32).collect();
-    fn root(parent: &mut [u32], mut v: u32) -> u32 {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
+/// Clears what is surface detail: lines with a loose end that are shorter than `shortest`, the lines around regions
+/// smaller than a circle of half that length around, and connected lines shorter than half of it together.
+fn drop_detail(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut [bool]) {
+    let around = CLOSED_SHARE * shortest;
+    let smallest = around * around / (4.0 * std::f64::consts::PI);
+    while drop_loose(mesh, adjacency, shortest, sharp) | drop_regions(mesh, adjacency, smallest, sharp) {}
+    drop_short(mesh, adjacency, around, sharp);
+}
+
+fn clear(adjacency: &Adjacency, sharp: &mut [bool], h: u32) {
+    sharp[h as usize] = false;
+    sharp[adjacency.opposite[h as usize] as usize] = false;
+}
+
+/// Clears lines with a loose end, the shortest first: what is left of a fork is one longer line. True if there were
+/// any. An end on the boundary of the mesh is not loose.
+fn drop_loose(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut [bool]) -> bool {
+    let mut dropped = false;
+    loop {
+        let mut around: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
+            around.entry(mesh.origin(h)).or_default().push(h);
         }
-        v
+        let mut lines: Vec<(f64, Vec<u32>, u32)> = Vec::new();
+        for (&v, out) in &around {
+            if out.len() != 1 || adjacency.is_boundary_vertex(v) {
+                continue;
+            }
+            let (mut line, mut end) = (vec![out[0]], mesh.origin(next(out[0])));
+            while let [a, b] = around[&end][..]
+                && !adjacency.is_boundary_vertex(end)
+            {
+                let back = adjacency.opposite[line[line.len() - 1] as usize];
+                line.push(if a == back { b } else { a });
+                end = mesh.origin(next(line[line.len() - 1]));
+            }
+            let total = line.iter().map(|&h| length(mesh, h)).sum();
+            if total < shortest {
+                lines.push((total, line, end));
+            }
+        }
+        lines.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+        let mut changed: BTreeSet<u32> = BTreeSet::new();
+        for (_, line, end) in &lines {
+            if changed.insert(*end) {
+                line.iter().for_each(|&h| clear(adjacency, sharp, h));
+            }
+        }
+        if lines.is_empty() {
+            return dropped;
+        }
+        dropped = true;
     }
+}
+
+/// Joins every region between lines that is smaller than `smallest` to the neighbour it shares most of its rim with.
+/// True if there were any.
+fn drop_regions(mesh: &TriMesh, adjacency: &Adjacency, smallest: f64, sharp: &mut [bool]) -> bool {
+    let faces = mesh.triangles.len();
+    let mut sets = Sets::new(faces);
+    for h in 0..sharp.len() as u32 {
+        let o = adjacency.opposite[h as usize];
+        if o != NONE && !sharp[h as usize] {
+            sets.join(h / 3, o / 3);
+        }
+    }
+    let root: Vec<u32> = (0..faces as u32).map(|f| sets.root(f)).collect();
+    let mut area = vec![0.0; faces];
+    for f in 0..faces {
+        area[root[f] as usize] += mesh.area(f);
+    }
+    let mut rims: BTreeMap<u32, BTreeMap<u32, (f64, Vec<u32>)>> = BTreeMap::new();
+    for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
+        let (own, other) = (root[h as usize / 3], root[adjacency.opposite[h as usize] as usize / 3]);
+        if own != other && area[own as usize] < smallest {
+            let rim = rims.entry(own).or_default().entry(other).or_default();
+            rim.0 += length(mesh, h);
+            rim.1.push(h);
+        }
+    }
+    for neighbours in rims.values() {
+        let longest = neighbours.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0).then(b.0.cmp(a.0)));
+        let (_, (_, rim)) = longest.expect("a rim has another side");
+        rim.iter().for_each(|&h| clear(adjacency, sharp, h));
+    }
+    !rims.is_empty()
+}
+
+/// Clears connected lines shorter together than `shortest`.
+fn drop_short(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut [bool]) {
     let edges: Vec<u32> =
         (0..sharp.len() as u32).filter(|&h| sharp[h as usize] && h < adjacency.opposite[h as usize]).collect();
+    let mut sets = Sets::new(mesh.points.len());
     for &h in &edges {
-        let (a, b) = (root(&mut parent, mesh.origin(h)), root(&mut parent, mesh.origin(next(h))));
-        let (low, high) = (a.min(b), a.max(b));
-        parent[high as usize] = low;
+        sets.join(mesh.origin(h), mesh.origin(next(h)));
     }
     let mut total = vec![0.0; mesh.points.len()];
     for &h in &edges {
-        total[root(&mut parent, mesh.origin(h)) as usize] += length(mesh, h);
+        total[sets.root(mesh.origin(h)) as usize] += length(mesh, h);
     }
     for &h in &edges {
-        if total[root(&mut parent, mesh.origin(h)) as usize] < shortest {
-            sharp[h as usize] = false;
-            sharp[adjacency.opposite[h as usize] as usize] = false;
+        if total[sets.root(mesh.origin(h)) as usize] < shortest {
+            clear(adjacency, sharp, h);
         }
     }
 }
