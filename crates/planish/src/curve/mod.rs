@@ -28,6 +28,7 @@ pub use attract::{attract, slide_to};
 pub use canvas::{Canvas, Magnet};
 pub use curvature::{VertexCurvature, vertex_curvature};
 pub use curve::SurfaceCurve;
+pub(crate) use curve::between;
 pub use paint::{PaintMode, PaintParams, Snap, SnapTargets, Stroke, snap, way};
 pub use scalar::ScalarField;
 pub use snake::{Energy, Relaxed, Section, Snake, SnakeParams, Sweep};
