@@ -33,10 +33,16 @@ const STALL_FACTOR: f64 = 0.7;
 const STALL: usize = 3;
 /// Coarse-to-fine sweeps at most: an impulse crosses the curve in one.
 const COARSE_SWEEPS: usize = 24;
-/// Damping of the fine solve as a share of its mean diagonal: keeps stretches alone under no force in place.
+/// Least damping of the fine solve as a share of its mean diagonal; where it leads nowhere (a free loop slides along
+/// itself under no force at all, and bending surfaces are felt by the forces but not by the system) the damping grows
+/// by steps to the greatest, as of Levenberg and Marquardt.
 const DAMPING: f64 = 1e-9;
+const DAMPING_STEP: f64 = 1e3;
+const GREATEST_DAMPING: f64 = 1e2;
+/// Share by which the damping falls again after a sweep that went well.
+const RELIEF: f64 = 0.1;
 /// Shares of a fine step that are tried until one lowers the energy.
-const SHARES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
+const SHARES: [f64; 2] = [1.0, 0.3];
 /// Longest fine move, in mean spacings of the points: beyond, tangent planes tell little.
 const LONGEST_MOVE: f64 = 24.0;
 /// Longest step to the ridge of a scalar, in mean spacings.
@@ -163,6 +169,8 @@ pub struct Snake<'m> {
     open: Vec<bool>,
     /// Factors of fairness and curvature.
     factors: Vec<[f64; 2]>,
+    /// Damping of the next fine solve.
+    damping: f64,
 }
 
 impl<'m> Snake<'m> {
@@ -187,6 +195,7 @@ impl<'m> Snake<'m> {
             pinned: vec![false; n],
             open: vec![true; n],
             factors: vec![[1.0; 2]; n],
+            damping: DAMPING,
         };
         if !curve.closed {
             snake.pinned[0] = true;
@@ -552,34 +561,42 @@ impl<'m> Snake<'m> {
                 }
             }
         }
-        let Some(x) = system.solve() else { return (0.0, false) };
         let longest = LONGEST_MOVE * self.spacing();
-        let mut moves: Vec<DVec3> = (0..n)
-            .map(|i| match slot[i] {
-                NONE => DVec3::ZERO,
-                s => bases[i][0] * x[2 * s as usize] + bases[i][1] * x[2 * s as usize + 1],
-            })
-            .collect();
-        let reach = moves.iter().map(|m| m.length()).fold(0.0, f64::max);
-        if reach > longest {
-            moves.iter_mut().for_each(|m| *m *= longest / reach);
-        }
-        if pulled {
-            // The pull has no energy of its own to compare.
-            return (self.apply(&moves), true);
-        }
         let before = self.energy(params).total();
         let (points, at) = (self.points.clone(), self.at.clone());
-        let mut taken = 1.0;
-        for share in SHARES {
-            moves.iter_mut().for_each(|m| *m *= share / taken);
-            taken = share;
-            let largest = self.apply(&moves);
-            if self.energy(params).total() < before {
-                return (largest, true);
+        let mut damping = self.damping;
+        while damping <= GREATEST_DAMPING {
+            let Some(x) = system.solve(damping) else {
+                damping *= DAMPING_STEP;
+                continue;
+            };
+            let mut moves: Vec<DVec3> = (0..n)
+                .map(|i| match slot[i] {
+                    NONE => DVec3::ZERO,
+                    s => bases[i][0] * x[2 * s as usize] + bases[i][1] * x[2 * s as usize + 1],
+                })
+                .collect();
+            let reach = moves.iter().map(|m| m.length()).fold(0.0, f64::max);
+            if reach > longest {
+                moves.iter_mut().for_each(|m| *m *= longest / reach);
             }
-            self.points.copy_from_slice(&points);
-            self.at.copy_from_slice(&at);
+            if pulled {
+                // The pull has no energy of its own to compare.
+                return (self.apply(&moves), true);
+            }
+            let mut taken = 1.0;
+            for share in SHARES {
+                moves.iter_mut().for_each(|m| *m *= share / taken);
+                taken = share;
+                let largest = self.apply(&moves);
+                if self.energy(params).total() < before {
+                    self.damping = (damping * RELIEF).max(DAMPING);
+                    return (largest, true);
+                }
+                self.points.copy_from_slice(&points);
+                self.at.copy_from_slice(&at);
+            }
+            damping *= DAMPING_STEP;
         }
         (0.0, false)
     }
@@ -683,15 +700,15 @@ impl System {
         }
     }
 
-    fn solve(self) -> Option<Vec<f64>> {
-        let System { mut matrix, mut rhs } = self;
+    fn solve(&self, damping: f64) -> Option<Vec<f64>> {
+        let (mut matrix, mut rhs) = (self.matrix.clone(), self.rhs.clone());
         let n = matrix.len();
         let mean = (0..n).map(|i| matrix.get(i, i)).sum::<f64>() / n as f64;
         if !(mean > 0.0) {
             return None;
         }
         for i in 0..n {
-            matrix.add(i, i, DAMPING * mean);
+            matrix.add(i, i, damping * mean);
         }
         BandedCholesky::factor(matrix)?.solve(&mut rhs);
         rhs.iter().all(|x| x.is_finite()).then_some(rhs)

@@ -12,6 +12,7 @@
 
 mod chart;
 mod even;
+mod feature_curve;
 mod fold;
 mod locate;
 mod net;
@@ -22,6 +23,7 @@ mod sizes;
 mod springs;
 mod walk;
 
+pub use feature_curve::{Family, FeatureCurve, FeatureError, FeatureGrid, Sections, relax_with_features};
 pub use quality::{GridQuality, measure};
 pub use sizes::choose_sizes;
 

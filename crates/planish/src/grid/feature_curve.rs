@@ -1,0 +1,723 @@
+//! Feature curves: curves painted across a patch that become iso-curves of its grid.
+//!
+//! [K98] §5.10 and 5.11. A curve of the u family runs from side 3 to side 1, one of the v family from side 0 to
+//! side 2. Curves of different families cross once, in an anchor; curves of one family never.
+//! 1. the v curves are imprinted, the u curves traced over that: their crossings are anchors
+//! 2. the sub-patches between curves are exact disks of their own; every one gets its part of the grid  - §5.11.2
+//! 3. curve points lie at even arc length between anchors  - eq. 5.14
+//!
+//! Departs from [K98]: sub-patches are relaxed one by one with their sides fixed instead of all at once with curve
+//! points sliding; every curve point and anchor lies on its curve by construction, and no sub-patch can fold.
+//! Sections have their own numbers of points, so one is refined alone by giving it more.
+
+use super::{Grid, GridError, GridParams, relax, side};
+use crate::curve::SurfaceCurve;
+use crate::geom::tolerance;
+use crate::mesh::{Adjacency, FacePoint, TriMesh, next};
+use crate::network::imprint::{self, Place};
+use crate::network::{Corner, Curve, CurveKind, ImprintError, Network, Patch, PatchMesh, Side};
+use crate::observe::Observer;
+use glam::DVec3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Which iso-curves a feature curve is one of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Family {
+    /// Runs along u, from side 3 to side 1: `v` is constant on it.
+    U,
+    /// Runs along v, from side 0 to side 2: `u` is constant on it.
+    V,
+}
+
+/// A curve across a patch that its grid is to follow.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FeatureCurve {
+    /// The patch.
+    pub patch: u32,
+    /// Which iso-curves it is one of.
+    pub family: Family,
+    /// Places on the mesh, from side to side; ends are led on to the nearest place of their side.
+    pub points: Vec<FacePoint>,
+}
+
+/// Grid cells of every section between feature curves, from low to high; empty for a choice by length.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sections {
+    /// Cells along u of the sections between v curves.
+    pub u: Vec<usize>,
+    /// Cells along v of the sections between u curves.
+    pub v: Vec<usize>,
+}
+
+/// A grid with feature curves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FeatureGrid {
+    /// The grid.
+    pub grid: Grid,
+    /// For each feature curve, in the order given, its row (u family) or column (v family).
+    pub lines: Vec<usize>,
+    /// The curves as the grid follows them, on the input mesh.
+    pub curves: Vec<Vec<DVec3>>,
+    /// Anchors: row, column and position of every crossing.
+    pub anchors: Vec<(usize, usize, DVec3)>,
+}
+
+/// Why a patch cannot follow its feature curves.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FeatureError {
+    /// Two curves of one family cross or touch.
+    #[error(
+        "feature curves {a} and {b} of one family cross at ({:.6}, {:.6}, {:.6}) - hint: delete one or move it apart",
+        place.x, place.y, place.z
+    )]
+    Cross {
+        /// The first.
+        a: usize,
+        /// The second.
+        b: usize,
+        /// World position.
+        place: DVec3,
+    },
+    /// Two curves of different families cross more than once.
+    #[error(
+        "feature curves {a} and {b} meet {times} times, near ({:.6}, {:.6}, {:.6}), not once - hint: move one of them",
+        place.x, place.y, place.z
+    )]
+    MeetAgain {
+        /// The first.
+        a: usize,
+        /// The second.
+        b: usize,
+        /// Number of times.
+        times: usize,
+        /// World position of the last.
+        place: DVec3,
+    },
+    /// A curve has no place inside the patch, or leaves it.
+    #[error("feature curve {curve} does not run through the inside of its patch - hint: draw it from side to side")]
+    Outside {
+        /// The curve.
+        curve: usize,
+    },
+    /// A curve ends in a corner of the patch.
+    #[error("feature curve {curve} ends in a corner of its patch - hint: end it on the side between the corners")]
+    AtCorner {
+        /// The curve.
+        curve: usize,
+    },
+    /// The numbers of sections and curves do not agree.
+    #[error("{given} sections along {family} are given, {needed} are between the curves - hint: give one number each")]
+    SectionCount {
+        /// `u` or `v`.
+        family: &'static str,
+        /// Sections given.
+        given: usize,
+        /// Sections there are.
+        needed: usize,
+    },
+    /// Part of the patch cannot be resampled.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+    /// The curves cannot be imprinted.
+    #[error(transparent)]
+    Imprint(#[from] ImprintError),
+}
+
+/// Fewest cells of a section: with fewer its points would tell nothing of its shape.
+const FEWEST_CELLS: usize = 2;
+
+/// Resamples a patch so that its feature curves are iso-curves of the grid, exactly.
+/// * `patch` - exact sub-mesh of `input`
+/// * `curves` - those of this patch, in any order and direction
+/// * `size` - `(cols, rows)` of the whole grid, shared out by length where `sections` does not tell
+/// # Errors
+/// See [`FeatureError`]; curves are named by their index in `curves`.
+/// Source: [K98] §5.11.
+pub fn relax_with_features(
+    input: &TriMesh,
+    patch: &PatchMesh,
+    curves: &[FeatureCurve],
+    size: (usize, usize),
+    sections: &Sections,
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<FeatureGrid, FeatureError> {
+    let mesh = &patch.mesh;
+    let adjacency = Adjacency::new(mesh);
+    let pieces = Pieces::new(&patch.face_origin);
+    let mut strands: Vec<Strand> = Vec::with_capacity(curves.len());
+    for (k, curve) in curves.iter().enumerate() {
+        strands.push(strand(input, patch, &adjacency, &pieces, k, curve)?);
+    }
+    let sorted = |family: Family| {
+        let mut list: Vec<usize> = (0..curves.len()).filter(|&k| curves[k].family == family).collect();
+        list.sort_by(|&a, &b| strands[a].shares[0].total_cmp(&strands[b].shares[0]).then(a.cmp(&b)));
+        list
+    };
+    let (across, along) = (sorted(Family::V), sorted(Family::U));
+    // 1. The v curves become edges.
+    let chains: Vec<Vec<Place>> = across.iter().map(|&k| strands[k].places(mesh, &adjacency)).collect();
+    let first = cut_family(mesh, &adjacency, &chains, &across)?;
+    let ground = &first.mesh;
+    let ground_adjacency = Adjacency::new(ground);
+    let ground_pieces = Pieces::new(&first.parent);
+    let on_ground = |p: &FacePoint| ground_pieces.place(&first, mesh, &adjacency, p);
+    // 2. The u curves over them, split in anchors.
+    let mut lines: Vec<Vec<FacePoint>> = Vec::new();
+    for &k in &along {
+        let places: Option<Vec<FacePoint>> = strands[k].points.iter().map(on_ground).collect();
+        let chain = SurfaceCurve::open(places.ok_or(FeatureError::Outside { curve: k })?);
+        lines.push(chain.trace(ground, &ground_adjacency).map_err(|_| FeatureError::Outside { curve: k })?);
+    }
+    let line_places: Vec<Vec<Place>> = lines
+        .iter()
+        .map(|l| l.iter().map(|p| imprint::place_of(&ground_adjacency, &ground.triangles, p)).collect())
+        .collect();
+    cut_family(ground, &ground_adjacency, &line_places, &along)?;
+    let mut sketch = Sketch::new(ground, &ground_adjacency, patch, &first.chains);
+    for (place, share) in along.iter().flat_map(|&k| [0, 1].map(|e| (k, e))).filter_map(|(k, e)| {
+        on_ground(&strands[k].points[if e == 0 { 0 } else { strands[k].points.len() - 1 }]).map(|p| (p, e))
+    }) {
+        sketch.insert_on_side(if share == 0 { 3 } else { 1 }, place);
+    }
+    let network = sketch.network(&across, &along, &lines, &line_places)?;
+    // 3. Every sub-patch is resampled on its own; shared sides get the same points.
+    let sub = imprint::imprint(ground, &network)?;
+    let (nu, nv) = (across.len() + 1, along.len() + 1);
+    let lengths = |k: usize| -> Vec<f64> {
+        (0..sub.len()).map(|p| side_length(&sub[p], k).max(side_length(&sub[p], k + 2))).collect()
+    };
+    let (along_u, along_v) = (lengths(0), lengths(1));
+    let greatest = |list: &[f64], n: usize, of: &dyn Fn(usize) -> usize| -> Vec<f64> {
+        (0..n).map(|s| (0..list.len()).filter(|&p| of(p) == s).map(|p| list[p]).fold(0.0, f64::max)).collect()
+    };
+    let u = shared_out(&sections.u, "u", size.0, &greatest(&along_u, nu, &|p| p % nu))?;
+    let v = shared_out(&sections.v, "v", size.1, &greatest(&along_v, nv, &|p| p / nu))?;
+    let sizes: Vec<(usize, usize)> = (0..nu * nv).map(|p| (u[p % nu] + 1, v[p / nu] + 1)).collect();
+    let grids = relax(ground, &sub, &sizes, params, observer)?;
+    // 4. One grid of all.
+    let starts = |cells: &[usize]| -> Vec<usize> {
+        cells.iter().scan(0, |sum, c| Some(std::mem::replace(sum, *sum + c))).collect()
+    };
+    let (start_u, start_v) = (starts(&u), starts(&v));
+    let (cols, rows) = (u.iter().sum::<usize>() + 1, v.iter().sum::<usize>() + 1);
+    let mut grid = Grid {
+        rows,
+        cols,
+        points: vec![DVec3::ZERO; rows * cols],
+        places: vec![FacePoint::corner(0, 0); rows * cols],
+    };
+    for (p, part) in grids.iter().enumerate() {
+        for j in 0..part.rows {
+            for i in 0..part.cols {
+                let at = (start_v[p / nu] + j) * cols + start_u[p % nu] + i;
+                grid.points[at] = part.points[j * part.cols + i];
+                let place = part.places[j * part.cols + i];
+                grid.places[at] = to_input(input, patch, &to_patch(&first, mesh, &adjacency, &place));
+            }
+        }
+    }
+    let mut places_of = vec![0; curves.len()];
+    for (s, &k) in across.iter().enumerate() {
+        places_of[k] = start_u[s + 1];
+    }
+    for (s, &k) in along.iter().enumerate() {
+        places_of[k] = start_v[s + 1];
+    }
+    let anchors = (1..nv)
+        .flat_map(|j| (1..nu).map(move |i| (j, i)))
+        .map(|(j, i)| (start_v[j], start_u[i], grid.points[start_v[j] * cols + start_u[i]]))
+        .collect();
+    let followed = |k: usize| match curves[k].family {
+        Family::V => first.chains[across.iter().position(|&a| a == k).unwrap_or(0)]
+            .iter()
+            .map(|&v| ground.points[v as usize])
+            .collect(),
+        Family::U => lines[along.iter().position(|&a| a == k).unwrap_or(0)].iter().map(|p| p.position(ground)).collect(),
+    };
+    let curves = (0..curves.len()).map(followed).collect();
+    Ok(FeatureGrid { grid, lines: places_of, curves, anchors })
+}
+
+fn side_length(patch: &PatchMesh, k: usize) -> f64 {
+    let chain: Vec<DVec3> = patch.sides[k].iter().map(|&v| patch.mesh.points[v as usize]).collect();
+    side::length(&chain)
+}
+
+/// Cells of every section: as given, or `size - 1` of them by length.
+fn shared_out(
+    given: &[usize],
+    family: &'static str,
+    size: usize,
+    lengths: &[f64],
+) -> Result<Vec<usize>, FeatureError> {
+    if !given.is_empty() {
+        if given.len() != lengths.len() {
+            return Err(FeatureError::SectionCount { family, given: given.len(), needed: lengths.len() });
+        }
+        return Ok(given.iter().map(|&c| c.max(FEWEST_CELLS)).collect());
+    }
+    let total: f64 = lengths.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let cells = size.saturating_sub(1) as f64;
+    Ok(lengths.iter().map(|l| ((cells * l / total).round() as usize).max(FEWEST_CELLS)).collect())
+}
+
+/// A feature curve on the patch mesh.
+struct Strand {
+    points: Vec<FacePoint>,
+    /// Shares of the lengths of its two sides, each counted from the low end of the other parameter.
+    shares: [f64; 2],
+}
+
+impl Strand {
+    fn places(&self, mesh: &TriMesh, adjacency: &Adjacency) -> Vec<Place> {
+        self.points.iter().map(|p| imprint::place_of(adjacency, &mesh.triangles, p)).collect()
+    }
+}
+
+/// Brings a curve onto the patch mesh and leads its ends to their sides.
+fn strand(
+    input: &TriMesh,
+    patch: &PatchMesh,
+    adjacency: &Adjacency,
+    pieces: &Pieces,
+    index: usize,
+    curve: &FeatureCurve,
+) -> Result<Strand, FeatureError> {
+    let outside = FeatureError::Outside { curve: index };
+    let mesh = &patch.mesh;
+    let on_rim = |p: &FacePoint| match imprint::place_of(adjacency, &mesh.triangles, p) {
+        Place::Vertex(v) => adjacency.is_boundary_vertex(v),
+        Place::Edge(h, _) => adjacency.opposite[h as usize] == crate::mesh::NONE,
+        Place::Face(_) => false,
+    };
+    let mut inner: Vec<FacePoint> = curve
+        .points
+        .iter()
+        .filter_map(|p| pieces.in_patch(input, patch, p))
+        .filter(|p| !on_rim(p))
+        .collect();
+    if inner.is_empty() {
+        return Err(outside);
+    }
+    let sides = if curve.family == Family::V { [0, 2] } else { [3, 1] };
+    let ends = [inner[0], inner[inner.len() - 1]].map(|p| p.position(mesh));
+    let away = |side: usize, p: DVec3| nearest_on_side(patch, side, p).2;
+    if away(sides[0], ends[0]) + away(sides[1], ends[1]) > away(sides[0], ends[1]) + away(sides[1], ends[0]) {
+        inner.reverse();
+    }
+    let ends = [inner[0], inner[inner.len() - 1]].map(|p| p.position(mesh));
+    let mut shares = [0.0; 2];
+    let mut places = Vec::with_capacity(inner.len() + 2);
+    for e in 0..2 {
+        let (place, share, _) = nearest_on_side(patch, sides[e], ends[e]);
+        if !(share > 0.0 && share < 1.0) {
+            return Err(FeatureError::AtCorner { curve: index });
+        }
+        // Sides 2 and 3 run against their parameter.
+        shares[e] = if sides[e] >= 2 { 1.0 - share } else { share };
+        let h = adjacency.outgoing[patch.sides[sides[e]][place.0] as usize];
+        let mut bary = [0.0; 3];
+        bary[h as usize % 3] = 1.0 - place.1;
+        bary[next(h) as usize % 3] = place.1;
+        let end = FacePoint { face: h / 3, bary };
+        if e == 0 {
+            places.push(end);
+            places.append(&mut inner);
+        } else {
+            places.push(end);
+        }
+    }
+    let points = SurfaceCurve::open(places).trace(mesh, adjacency).map_err(|_| outside.clone())?;
+    if points.len() < 3 && points.iter().all(on_rim) || points[1..points.len() - 1].iter().any(on_rim) {
+        return Err(outside);
+    }
+    Ok(Strand { points, shares })
+}
+
+/// Nearest place of a side: segment and share of it, share of the side's length, distance.
+fn nearest_on_side(patch: &PatchMesh, side: usize, p: DVec3) -> ((usize, f64), f64, f64) {
+    let at: Vec<DVec3> = patch.sides[side].iter().map(|&v| patch.mesh.points[v as usize]).collect();
+    let (mut best, mut sum) = (((0, 0.0), 0.0, f64::INFINITY), 0.0);
+    for (k, w) in at.windows(2).enumerate() {
+        let d = w[1] - w[0];
+        let square = d.length_squared();
+        let s = if square > 0.0 { ((p - w[0]).dot(d) / square).clamp(0.0, 1.0) } else { 0.0 };
+        let away = p.distance(w[0] + d * s);
+        if away < best.2 {
+            // The start of a segment is the end of the one before it.
+            best = ((k, s), sum + d.length() * s, away);
+        }
+        sum += d.length();
+    }
+    (best.0, best.1 / sum.max(f64::MIN_POSITIVE), best.2)
+}
+
+/// Cuts along curves of one family; they must not meet.
+fn cut_family(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    chains: &[Vec<Place>],
+    names: &[usize],
+) -> Result<imprint::Cut, FeatureError> {
+    let borrowed: Vec<&[Place]> = chains.iter().map(|c| &c[..]).collect();
+    let cut = imprint::cut(mesh, adjacency, &borrowed).map_err(|e| match e {
+        ImprintError::Crossing { ref curves, x, y, z } if curves.len() > 1 => {
+            let mut two: Vec<usize> = curves.iter().map(|&c| names[c]).collect();
+            two.sort_unstable();
+            two.dedup();
+            match two[..] {
+                [a, b, ..] => FeatureError::Cross { a, b, place: DVec3::new(x, y, z) },
+                _ => e.into(),
+            }
+        }
+        other => other.into(),
+    })?;
+    let mut owner: BTreeMap<u32, usize> = BTreeMap::new();
+    for (c, chain) in cut.chains.iter().enumerate() {
+        for &v in chain {
+            if let Some(&other) = owner.get(&v)
+                && other != c
+            {
+                let (a, b) = (names[other].min(names[c]), names[other].max(names[c]));
+                return Err(FeatureError::Cross { a, b, place: cut.mesh.points[v as usize] });
+            }
+            owner.insert(v, c);
+        }
+    }
+    Ok(cut)
+}
+
+/// Triangles by the face that they are a part of.
+struct Pieces {
+    of: BTreeMap<u32, Vec<u32>>,
+}
+
+impl Pieces {
+    fn new(parent: &[u32]) -> Pieces {
+        let mut of: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for (t, &f) in parent.iter().enumerate() {
+            of.entry(f).or_default().push(t as u32);
+        }
+        Pieces { of }
+    }
+
+    /// A place of the input on the patch mesh, if it is there.
+    fn in_patch(&self, input: &TriMesh, patch: &PatchMesh, p: &FacePoint) -> Option<FacePoint> {
+        // A place of an edge or vertex may be named on a face that the patch does not have.
+        let own = self.of.get(&p.face).into_iter().flatten().copied();
+        let weights = |t: u32| {
+            let corners = patch.mesh.triangles[t as usize]
+                .map(|v| weights_on(input, &patch.origin[v as usize], patch.face_origin[t as usize]));
+            inside(corners, p.bary)
+        };
+        own.map(|t| (t, weights(t)))
+            .max_by(|a, b| least(&a.1).total_cmp(&least(&b.1)).then(b.0.cmp(&a.0)))
+            .filter(|(_, w)| least(w) > -SLACK)
+            .map(|(face, w)| FacePoint { face, bary: snapped(w) })
+    }
+
+    /// A place of the uncut mesh on the cut one.
+    fn place(
+        &self,
+        cut: &imprint::Cut,
+        mesh: &TriMesh,
+        adjacency: &Adjacency,
+        p: &FacePoint,
+    ) -> Option<FacePoint> {
+        let weights = |t: u32| {
+            let corners = cut.mesh.triangles[t as usize].map(|v| {
+                cut.origin[v as usize].on_face(adjacency, &mesh.triangles, p.face).map_or([0.0; 3], |q| q.bary)
+            });
+            inside(corners, p.bary)
+        };
+        let own = self.of.get(&p.face).into_iter().flatten().copied();
+        own.map(|t| (t, weights(t)))
+            .max_by(|a, b| least(&a.1).total_cmp(&least(&b.1)).then(b.0.cmp(&a.0)))
+            .filter(|(_, w)| least(w) > -SLACK)
+            .map(|(face, w)| FacePoint { face, bary: snapped(w) })
+    }
+}
+
+/// Weights this far below zero are rounding: the place is on the edge.
+const SLACK: f64 = 1e-7;
+
+fn least(w: &[f64; 3]) -> f64 {
+    w[0].min(w[1]).min(w[2])
+}
+
+/// Weights without rounding below zero, and exactly zero where they are next to it.
+fn snapped(w: [f64; 3]) -> [f64; 3] {
+    let w = w.map(|x| if x < tolerance::RELATIVE.sqrt() { 0.0 } else { x });
+    let sum: f64 = w.iter().sum();
+    w.map(|x| x / sum)
+}
+
+/// Barycentric coordinates of `p` in the triangle `corners`, all in the coordinates of one face; far outside for a
+/// triangle without area.
+fn inside(corners: [[f64; 3]; 3], p: [f64; 3]) -> [f64; 3] {
+    let flat = |w: [f64; 3]| glam::DVec2::new(w[1], w[2]);
+    let [a, b, c] = corners.map(flat);
+    let q = flat(p);
+    let area = (b - a).perp_dot(c - a);
+    if area == 0.0 {
+        return [-1.0; 3];
+    }
+    [(c - b).perp_dot(q - b) / area, (a - c).perp_dot(q - c) / area, (b - a).perp_dot(q - a) / area]
+}
+
+/// Weights of a place on a face that it lies on.
+fn weights_on(mesh: &TriMesh, p: &FacePoint, face: u32) -> [f64; 3] {
+    if p.face == face {
+        return p.bary;
+    }
+    let (from, to) = (mesh.triangles[p.face as usize], mesh.triangles[face as usize]);
+    let mut bary = [0.0; 3];
+    for k in 0..3 {
+        if let Some(j) = to.iter().position(|&v| v == from[k]) {
+            bary[j] += p.bary[k];
+        }
+    }
+    bary
+}
+
+/// A place of the cut mesh on the uncut one.
+fn to_patch(cut: &imprint::Cut, mesh: &TriMesh, adjacency: &Adjacency, p: &FacePoint) -> FacePoint {
+    let parent = cut.parent[p.face as usize];
+    let mut bary = [0.0; 3];
+    for (k, &v) in cut.mesh.triangles[p.face as usize].iter().enumerate() {
+        if let Some(q) = cut.origin[v as usize].on_face(adjacency, &mesh.triangles, parent) {
+            (0..3).for_each(|i| bary[i] += p.bary[k] * q.bary[i]);
+        }
+    }
+    normal(parent, bary)
+}
+
+/// A place of the patch mesh on the input.
+fn to_input(input: &TriMesh, patch: &PatchMesh, p: &FacePoint) -> FacePoint {
+    let face = patch.face_origin[p.face as usize];
+    let mut bary = [0.0; 3];
+    for (k, &v) in patch.mesh.triangles[p.face as usize].iter().enumerate() {
+        let w = weights_on(input, &patch.origin[v as usize], face);
+        (0..3).for_each(|i| bary[i] += p.bary[k] * w[i]);
+    }
+    normal(face, bary)
+}
+
+fn normal(face: u32, bary: [f64; 3]) -> FacePoint {
+    let sum: f64 = bary.iter().sum();
+    FacePoint { face, bary: bary.map(|b| b / sum) }
+}
+
+/// The sub-patches as a network on the mesh cut along the v curves.
+struct Sketch<'a> {
+    ground: &'a TriMesh,
+    adjacency: &'a Adjacency,
+    /// The four sides as places in the direction of the sides.
+    sides: [Vec<FacePoint>; 4],
+    /// The v curves as chains of vertices.
+    chains: &'a [Vec<u32>],
+}
+
+impl<'a> Sketch<'a> {
+    fn new(ground: &'a TriMesh, adjacency: &'a Adjacency, patch: &PatchMesh, chains: &'a [Vec<u32>]) -> Sketch<'a> {
+        // The boundary of the cut mesh from corner to corner: that of the patch with the ends of the v curves in it.
+        let sides = [0, 1, 2, 3].map(|k| {
+            let (first, last) = (patch.sides[k][0], patch.sides[k][patch.sides[k].len() - 1]);
+            let mut places = Vec::new();
+            let mut v = first;
+            loop {
+                let h = adjacency.outgoing[v as usize];
+                places.push(FacePoint::corner(h / 3, h as usize % 3));
+                v = ground.origin(next(h));
+                if v == last || places.len() > 3 * ground.triangles.len() {
+                    break;
+                }
+            }
+            let h = adjacency.outgoing[last as usize];
+            places.push(FacePoint::corner(h / 3, h as usize % 3));
+            places
+        });
+        Sketch { ground, adjacency, sides, chains }
+    }
+
+    fn place(&self, p: &FacePoint) -> Place {
+        imprint::place_of(self.adjacency, &self.ground.triangles, p)
+    }
+
+    /// Puts a place into the side that it lies on.
+    fn insert_on_side(&mut self, side: usize, place: FacePoint) {
+        let p = self.place(&place);
+        if self.sides[side].iter().any(|q| self.place(q) == p) {
+            return;
+        }
+        if let Place::Edge(h, _) = p {
+            let start = self.ground.origin(h);
+            let at = self.sides[side].iter().position(|q| self.place(q) == Place::Vertex(start));
+            // Several on one edge stay in order.
+            if let Some(mut at) = at {
+                while let Some(q) = self.sides[side].get(at + 1)
+                    && let (Place::Edge(g, t), Place::Edge(_, s)) = (self.place(q), p)
+                    && g == h
+                    && t < s
+                {
+                    at += 1;
+                }
+                self.sides[side].insert(at + 1, place);
+            }
+        }
+    }
+
+    /// Pieces of `chain` between the places of `stops`, which it passes in their order.
+    fn pieces(&self, chain: &[FacePoint], stops: &[Place]) -> Vec<Vec<FacePoint>> {
+        let mut out = vec![Vec::new()];
+        let mut ahead = stops.iter().peekable();
+        for p in chain {
+            let last = out.len() - 1;
+            out[last].push(*p);
+            if ahead.peek().is_some_and(|&s| *s == self.place(p)) {
+                ahead.next();
+                out.push(vec![*p]);
+            }
+        }
+        out
+    }
+
+    fn network(
+        &self,
+        across: &[usize],
+        along: &[usize],
+        lines: &[Vec<FacePoint>],
+        places: &[Vec<Place>],
+    ) -> Result<Network, FeatureError> {
+        let (nu, nv) = (across.len() + 1, along.len() + 1);
+        // Anchors: where each u curve meets each v curve.
+        let mut on_chain: BTreeMap<u32, usize> = BTreeMap::new();
+        let mut on_edge: BTreeMap<(u32, u32), usize> = BTreeMap::new();
+        for (c, chain) in self.chains.iter().enumerate() {
+            on_chain.extend(chain.iter().map(|&v| (v, c)));
+            on_edge.extend(chain.windows(2).map(|w| ((w[0].min(w[1]), w[0].max(w[1])), c)));
+        }
+        let mut anchors = vec![vec![None; across.len()]; along.len()];
+        for (l, list) in places.iter().enumerate() {
+            for p in list {
+                let met = match *p {
+                    Place::Vertex(v) => on_chain.get(&v),
+                    Place::Edge(h, _) => {
+                        let (a, b) = (self.ground.origin(h), self.ground.origin(next(h)));
+                        on_edge.get(&(a.min(b), a.max(b)))
+                    }
+                    Place::Face(_) => None,
+                };
+                if let Some(&c) = met {
+                    if anchors[l][c].is_some() {
+                        let place = p.position(self.ground);
+                        return Err(FeatureError::MeetAgain { a: across[c], b: along[l], times: 2, place });
+                    }
+                    anchors[l][c] = Some(*p);
+                }
+            }
+            if let Some(c) = anchors[l].iter().position(Option::is_none) {
+                let place = lines[l][0].position(self.ground);
+                return Err(FeatureError::MeetAgain { a: across[c], b: along[l], times: 0, place });
+            }
+        }
+        // u lines from low to high v: side 0, the u curves, side 2 turned round; each in nu pieces.
+        let ends = |c: usize, e: usize| {
+            let chain = &self.chains[c];
+            Place::Vertex(if e == 0 { chain[0] } else { chain[chain.len() - 1] })
+        };
+        let turned = |k: usize| self.sides[k].iter().rev().copied().collect::<Vec<_>>();
+        let mut rows = vec![self.pieces(&self.sides[0], &(0..nu - 1).map(|c| ends(c, 0)).collect::<Vec<_>>())];
+        for (l, line) in lines.iter().enumerate() {
+            rows.push(self.pieces(line, &anchors[l].iter().flatten().copied().collect::<Vec<_>>()));
+        }
+        rows.push(self.pieces(&turned(2), &(0..nu - 1).map(|c| ends(c, 1)).collect::<Vec<_>>()));
+        // v lines from low to high u: side 3 turned round, the v curves with their anchors, side 1.
+        let line_end = |l: usize, e: usize| {
+            let list = &places[l];
+            if e == 0 { list[0] } else { list[list.len() - 1] }
+        };
+        let mut cols = vec![self.pieces(&turned(3), &(0..nv - 1).map(|l| line_end(l, 0)).collect::<Vec<_>>())];
+        for (c, chain) in self.chains.iter().enumerate() {
+            let stops: Vec<Place> = (0..nv - 1).filter_map(|l| anchors[l][c]).collect();
+            cols.push(self.pieces(&self.with_anchors(chain, &stops), &stops));
+        }
+        cols.push(self.pieces(&self.sides[1], &(0..nv - 1).map(|l| line_end(l, 1)).collect::<Vec<_>>()));
+        for (list, wanted, names) in [(&rows, nu, along), (&cols, nv, across)] {
+            for (k, pieces) in list.iter().enumerate() {
+                if pieces.len() != wanted || pieces.iter().any(|p| p.len() < 2) {
+                    // Curves pass each other in the wrong order: they meet more than once.
+                    let at = names.get(k.saturating_sub(1)).or(across.first()).copied().unwrap_or(0);
+                    return Err(FeatureError::Outside { curve: at });
+                }
+            }
+        }
+        let mut network = Network::default();
+        let corner = |j: usize, i: usize| (j * (nu + 1) + i) as u32;
+        for j in 0..=nv {
+            for i in 0..=nu {
+                let place = if i < nu { rows[j][i][0] } else { rows[j][nu - 1][rows[j][nu - 1].len() - 1] };
+                network.corners.push(Corner { place });
+            }
+        }
+        for (j, pieces) in rows.into_iter().enumerate() {
+            for (i, points) in pieces.into_iter().enumerate() {
+                network.curves.push(Curve { corners: [corner(j, i), corner(j, i + 1)], kind: CurveKind::Smooth, points });
+            }
+        }
+        let upright = network.curves.len() as u32;
+        for (i, pieces) in cols.into_iter().enumerate() {
+            for (j, points) in pieces.into_iter().enumerate() {
+                network.curves.push(Curve { corners: [corner(j, i), corner(j + 1, i)], kind: CurveKind::Smooth, points });
+            }
+        }
+        for j in 0..nv as u32 {
+            for i in 0..nu as u32 {
+                let (nu, nv) = (nu as u32, nv as u32);
+                network.patches.push(Patch {
+                    sides: [
+                        Side { curve: j * nu + i, reversed: false },
+                        Side { curve: upright + (i + 1) * nv + j, reversed: false },
+                        Side { curve: (j + 1) * nu + i, reversed: true },
+                        Side { curve: upright + i * nv + j, reversed: true },
+                    ],
+                });
+            }
+        }
+        Ok(network)
+    }
+
+    /// A v curve as places, with the anchors that lie on its edges put in.
+    fn with_anchors(&self, chain: &[u32], stops: &[Place]) -> Vec<FacePoint> {
+        let vertex = |v: u32| {
+            let h = self.adjacency.outgoing[v as usize];
+            FacePoint::corner(h / 3, h as usize % 3)
+        };
+        let mut out = vec![vertex(chain[0])];
+        for w in chain.windows(2) {
+            let mut between: Vec<(f64, Place)> = stops
+                .iter()
+                .filter_map(|&p| match p {
+                    Place::Edge(h, t) => match (self.ground.origin(h), self.ground.origin(next(h))) {
+                        (a, b) if (a, b) == (w[0], w[1]) => Some((t, p)),
+                        (a, b) if (b, a) == (w[0], w[1]) => Some((1.0 - t, p)),
+                        _ => None,
+                    },
+                    _ => None,
+                })
+                .collect();
+            between.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for (_, p) in between {
+                let face = p.some_face(self.adjacency);
+                out.extend(p.on_face(self.adjacency, &self.ground.triangles, face));
+            }
+            out.push(vertex(w[1]));
+        }
+        out
+    }
+}
