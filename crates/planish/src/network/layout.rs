@@ -7,6 +7,7 @@
 //!    each drawn in a one-to-one map of that union ([`recut`]), so that nothing ever crosses or gets lost.
 
 mod complex;
+mod fill;
 mod improve;
 mod lines;
 mod outline;
@@ -14,7 +15,9 @@ mod partition;
 mod polygon;
 mod recut;
 mod refine;
+mod shape;
 mod slide;
+mod tips;
 
 use super::imprint::Shared;
 use super::{Corner, Curve, Network, Patch, Side, imprint};
@@ -134,6 +137,13 @@ pub(super) fn layout_around(
             {
                 // Features may force more patches than asked for; shape is not given up for the number.
                 let patches = params.patches.max((FORCED * bench.complex.live_cells().count() as f64) as usize);
+                improve::relax(&mut bench, 1, observer)?;
+                let work_sharp = carry(&work, &work_adjacency, &sharp);
+                let ground = partition::Ground::new(&work.mesh, &work_adjacency, &work_sharp);
+                let tips = tips::tips(&ground, side);
+                if std::env::var("DBGI").is_ok() { eprintln!("tips {}", tips.len()); }
+                tips::plant(&mut bench, &tips, patches);
+                if std::env::var("DBGI").is_ok() { eprintln!("planted {}", bench.complex.nodes.iter().filter(|n| n.stays).count()); }
                 improve::relax(&mut bench, 1, observer)?;
                 improve::improve(&mut bench, patches, observer)?;
                 improve::relax(&mut bench, params.smoothing, observer)?;

@@ -18,11 +18,11 @@ pub(super) struct Arc {
 }
 
 /// A node; all nodes are vertices of the working mesh.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     pub vertex: u32,
-    /// A corner of a feature line or of the boundary.
-    pub corner: bool,
+    /// It keeps its place: a corner of a feature line or of the boundary, or the tip of a limb.
+    pub stays: bool,
 }
 
 /// The complex. Arcs and cells that are gone are `None`.
@@ -118,7 +118,7 @@ impl Complex {
         let Arc { nodes, kind, chain, cells } = self.arcs[a as usize].take().expect("a live arc");
         let Place::Vertex(vertex) = chain[at] else { panic!("arcs are split at vertices") };
         let node = self.nodes.len() as u32;
-        self.nodes.push(Node { vertex, corner: false });
+        self.nodes.push(Node { vertex, stays: false });
         let second = self.arcs.len() as u32;
         let (head, tail) = (chain[..=at].to_vec(), chain[at..].to_vec());
         self.arcs[a as usize] = Some(Arc { nodes: [nodes[0], node], kind, chain: head, cells });

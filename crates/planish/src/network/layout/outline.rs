@@ -101,7 +101,7 @@ pub(super) fn outline(ground: &Ground, label: &[u32], count: usize, corner: &[bo
     let make = |v: u32, node: &mut [u32], complex: &mut Complex| {
         if node[v as usize] == NONE {
             node[v as usize] = complex.nodes.len() as u32;
-            complex.nodes.push(Node { vertex: v, corner: corner[v as usize] });
+            complex.nodes.push(Node { vertex: v, stays: corner[v as usize] });
         }
     };
     for v in 0..mesh.points.len() as u32 {

@@ -59,6 +59,21 @@ impl<'a> Ground<'a> {
         })
     }
 
+    /// Vertices next to a vertex.
+    pub fn around(&self, v: u32) -> impl Iterator<Item = u32> + '_ {
+        self.adjacency.fan(v).flat_map(|h| [self.mesh.origin(next(h)), self.mesh.origin(previous(h))])
+    }
+
+    /// True for a vertex on a feature line or on the boundary.
+    pub fn is_fixed(&self, v: u32) -> bool {
+        self.adjacency.is_boundary_vertex(v) || self.adjacency.fan(v).any(|h| self.sharp[h as usize])
+    }
+
+    /// Area that belongs to a vertex: a third of each face around.
+    pub fn share(&self, v: u32) -> f64 {
+        self.adjacency.fan(v).map(|h| self.area[h as usize / 3]).sum::<f64>() / 3.0
+    }
+
     /// Lowers `distance` by paths from `sources`, and names the faces reached after their source's label.
     fn grow(&self, sources: &[(u32, u32)], distance: &mut [f64], label: &mut [u32]) {
         let mut heap = BinaryHeap::new();

@@ -8,6 +8,7 @@
 
 use super::complex::Complex;
 use super::recut::Change;
+use super::shape::flat_cost;
 use crate::mesh::{Adjacency, NONE, TriMesh, previous};
 use crate::network::CurveKind;
 use crate::network::imprint::{Place, half_edge};
@@ -21,8 +22,8 @@ pub(super) const VALENCE_COST: f64 = 1.5;
 /// Cost of a cell corner of 180 degrees or more, where a patch has no normal of its own.
 const FLAT_COST: f64 = 16.0;
 
-/// A corner further off square than this makes a surface that is hard to fit, and costs steeply.
-const STEEP_DEG: f64 = 45.0;
+/// Cost of a quad that must not be, finite so that there is always a best choice.
+const IMPOSSIBLE: f64 = 1e6;
 
 /// Rounds over all cells; each sees the choices of its neighbours.
 const ROUNDS: usize = 6;
@@ -250,25 +251,8 @@ fn fixed_neighbours(complex: &Complex, v: u32) -> Vec<u32> {
     found
 }
 
-/// Badness of a quad with these corners; `normal` points out of the surface.
-pub(super) fn badness(corners: [DVec3; 4], normal: DVec3) -> f64 {
-    let mut sum = 0.0;
-    for k in 0..4 {
-        let (a, b) = (corners[(k + 1) % 4] - corners[k], corners[(k + 3) % 4] - corners[k]);
-        let mut angle = normal.dot(a.cross(b)).atan2(a.dot(b));
-        if angle < -0.5 {
-            angle += std::f64::consts::TAU;
-        }
-        let off = (angle.to_degrees() - 90.0).abs();
-        sum += (off / 45.0).powi(2) + ((off - STEEP_DEG).max(0.0) / 15.0).powi(2);
-    }
-    let side = |k: usize| corners[k].distance(corners[(k + 1) % 4]);
-    let aspect = ((side(0) + side(2)) / (side(1) + side(3)).max(f64::MIN_POSITIVE)).max(f64::MIN_POSITIVE).ln();
-    sum / 4.0 + aspect * aspect
-}
-
 /// Newell normal of a polygon.
-pub(super) fn polygon_normal(corners: &[DVec3]) -> DVec3 {
+fn polygon_normal(corners: &[DVec3]) -> DVec3 {
     let n = corners.len();
     (0..n).map(|i| corners[i].cross(corners[(i + 1) % n])).sum::<DVec3>().normalize_or_zero()
 }
@@ -306,14 +290,27 @@ fn part(mesh: &TriMesh, complex: &Complex, sides: &[u32], sectors: &Sectors) -> 
             sectors.cost(s, 1.0) - sectors.cost(s, 0.0)
         })
         .collect();
-    part_polygon(&at, &extra)
+    let normal = polygon_normal(&at);
+    let cost = |quad: [usize; 4]| {
+        if swallows(sides, quad) { IMPOSSIBLE } else { flat_cost(quad.map(|i| at[i]), normal) }
+    };
+    part_polygon(at.len(), cost, &extra)
 }
 
-/// The cheapest lines that part a polygon with an even number of corners into quads; `extra` is what another
-/// cell at a corner costs.
-pub(super) fn part_polygon(at: &[DVec3], extra: &[f64]) -> Vec<(usize, usize)> {
-    let n = at.len();
-    let normal = polygon_normal(at);
+/// True if a quad between corners of an outline has both sides of one arc: the arc would end inside it.
+pub(super) fn swallows(outline: &[u32], quad: [usize; 4]) -> bool {
+    let n = outline.len();
+    let next = |k: usize| quad[(k + 1) % 4];
+    let along = |k: usize| quad[k] < n && next(k) == (quad[k] + 1) % n;
+    (0..4).any(|k| {
+        let l = (k + 1) % 4;
+        along(k) && along(l) && outline[quad[k]] ^ 1 == outline[quad[l]]
+    })
+}
+
+/// The cheapest lines that part a polygon with an even number `n` of corners into quads; `quad` is what one costs,
+/// `extra` what another cell at a corner costs.
+pub(super) fn part_polygon(n: usize, quad: impl Fn([usize; 4]) -> f64, extra: &[f64]) -> Vec<(usize, usize)> {
     let mut best = vec![vec![(f64::INFINITY, 0, 0); n]; n];
     for (i, row) in best.iter_mut().enumerate().take(n - 1) {
         row[i + 1] = (0.0, 0, 0);
@@ -324,8 +321,7 @@ pub(super) fn part_polygon(at: &[DVec3], extra: &[f64]) -> Vec<(usize, usize)> {
             let mut least = (f64::INFINITY, 0, 0);
             for k in (i + 1..j).step_by(2) {
                 for l in (k + 1..j).step_by(2) {
-                    let mut cost =
-                        badness([at[i], at[k], at[l], at[j]], normal) + best[i][k].0 + best[k][l].0 + best[l][j].0;
+                    let mut cost = quad([i, k, l, j]).min(IMPOSSIBLE) + best[i][k].0 + best[k][l].0 + best[l][j].0;
                     for (a, b) in [(i, k), (k, l), (l, j)] {
                         if b > a + 1 {
                             cost += extra[a] + extra[b];

@@ -2,6 +2,7 @@
 //! straight lines of the map. New arcs can therefore neither cross nor leave the union.
 
 use super::complex::{Arc, Complex, Node};
+use super::shape::{Shape, Trace};
 use super::slide::Slide;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::CurveKind;
@@ -30,6 +31,8 @@ pub(super) struct Change {
     pub spokes: Vec<usize>,
     /// The node that the new one replaces, if any.
     pub center: Option<u32>,
+    /// The vertex of the working mesh where the new node must stand, if it has no choice.
+    pub pin: Option<u32>,
 }
 
 /// The complex cut into the working mesh.
@@ -42,6 +45,16 @@ pub(super) struct Embedding {
     first: Vec<u32>,
     /// Faces of each cell, sorted.
     pub members: Vec<Vec<u32>>,
+}
+
+/// The union of the cells of a change, mapped to the unit circle.
+pub(super) struct Union {
+    pub disk: Disk,
+    /// Half-arcs around it.
+    pub outline: Vec<u32>,
+    /// Where each of them starts in the boundary of the disk.
+    pub corners: Vec<usize>,
+    pub uv: Vec<DVec2>,
 }
 
 /// What a change comes to, once drawn.
@@ -100,6 +113,26 @@ impl Embedding {
         Ok(Embedding { cut, adjacency: cut_adjacency, half_arc, first, members })
     }
 
+    /// The union of a change in its map.
+    pub fn map(&self, complex: &Complex, change: &Change) -> Option<Union> {
+        let (disk, outline, corners) = self.union(complex, change)?;
+        let uv = disk.circle_map(&self.cut.mesh.points, &self.angles(&disk, &corners))?;
+        Some(Union { disk, outline, corners, uv })
+    }
+
+    /// The vertex of a union where its node inside stands: at `pin`, if given.
+    pub fn place_inside(&self, union: &Union, pin: Option<u32>) -> Option<u32> {
+        match pin {
+            Some(pin) => union.disk.vertices.iter().position(|&v| v == pin).map(|v| v as u32),
+            None => self.middle(&union.disk, &union.uv),
+        }
+    }
+
+    /// Position of a vertex of a union.
+    pub fn position(&self, union: &Union, v: u32) -> DVec3 {
+        self.cut.mesh.points[union.disk.vertices[v as usize] as usize]
+    }
+
     /// The union of a change as a disk, its outline and the position of each outline corner in the disk's
     /// boundary.
     fn union(&self, complex: &Complex, change: &Change) -> Option<(Disk, Vec<u32>, Vec<usize>)> {
@@ -123,19 +156,19 @@ impl Embedding {
 
     /// Draws a change; `None` if it cannot be.
     fn draw(&self, mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex, change: &Change) -> Option<Drawn> {
-        let (disk, outline, corners) = self.union(complex, change)?;
-        let uv = disk.circle_map(&self.cut.mesh.points, &self.angles(&disk, &corners))?;
-        let line = |a: u32, b: u32| self.line(mesh, adjacency, &disk, &uv, a, b);
+        let union = self.map(complex, change)?;
+        let Union { disk, corners, uv, .. } = &union;
+        let line = |a: u32, b: u32| self.line(mesh, adjacency, disk, uv, a, b);
         let corner = |i: usize| disk.boundary[corners[i]];
         let lines = change.lines.iter().map(|&(i, j)| line(corner(i), corner(j))).collect::<Option<Vec<_>>>()?;
         let (mut spokes, mut center) = (Vec::new(), NONE);
         if !change.spokes.is_empty() {
-            let v = self.middle(&disk, &uv)?;
+            let v = self.place_inside(&union, change.pin)?;
             let Place::Vertex(w) = self.cut.origin[disk.vertices[v as usize] as usize] else { return None };
             center = w;
             spokes = change.spokes.iter().map(|&i| line(v, corner(i))).collect::<Option<Vec<_>>>()?;
         }
-        Some(Drawn { outline, lines, spokes, center })
+        Some(Drawn { outline: union.outline, lines, spokes, center })
     }
 
     /// Angles of the boundary vertices on the circle; `corners` are positions in the boundary, rising from the
@@ -219,20 +252,41 @@ impl Embedding {
         Some(chains)
     }
 
-    /// Area and area centroid of every cell.
-    pub fn extents(&self) -> Vec<(f64, DVec3)> {
-        self.members
-            .par_iter()
-            .map(|faces| {
-                let (mut area, mut sum) = (0.0, DVec3::ZERO);
-                for &f in faces {
-                    let a = self.cut.mesh.area(f as usize);
-                    area += a;
-                    sum += self.cut.mesh.corners(f as usize).into_iter().sum::<DVec3>() / 3.0 * a;
-                }
-                (area, sum / area.max(f64::MIN_POSITIVE))
+    /// The cells around a vertex of the working mesh, ascending.
+    pub fn cells_at(&self, vertex: u32) -> Vec<u32> {
+        let faces: Vec<u32> = self.adjacency.fan(vertex).map(|h| h / 3).collect();
+        let holds = |&c: &u32| faces.iter().any(|f| self.members[c as usize].binary_search(f).is_ok());
+        (0..self.members.len() as u32).filter(holds).collect()
+    }
+
+    /// Shape of every cell; `None` for those that are gone or not four-sided.
+    pub fn shapes(&self, complex: &Complex) -> Vec<Option<Shape>> {
+        let shape = |c: u32| {
+            let sides: [u32; 4] = complex.cells[c as usize].as_deref()?.try_into().ok()?;
+            let members = &self.members[c as usize];
+            let start = |h: u32| {
+                let chain = &self.cut.chains[h as usize / 2];
+                if h.is_multiple_of(2) { chain[0] } else { chain[chain.len() - 1] }
+            };
+            let trace = |h: u32| {
+                let points: Vec<DVec3> =
+                    self.cut.chains[h as usize / 2].iter().map(|&v| self.cut.mesh.points[v as usize]).collect();
+                let trace = Trace::of(&points);
+                if h.is_multiple_of(2) { trace } else { trace.reversed() }
+            };
+            let normal = |h: u32| {
+                let around = self.adjacency.fan(start(h)).map(|g| g / 3);
+                let own = around.filter(|f| members.binary_search(f).is_ok());
+                own.map(|f| self.cut.mesh.area_vector(f as usize)).sum::<DVec3>().normalize_or_zero()
+            };
+            Some(Shape {
+                corners: sides.map(|h| self.cut.mesh.points[start(h) as usize]),
+                sides: sides.map(trace),
+                normals: sides.map(normal),
+                area: members.iter().map(|&f| self.cut.mesh.area(f as usize)).sum(),
             })
-            .collect()
+        };
+        (0..complex.cells.len() as u32).into_par_iter().map(shape).collect()
     }
 
     /// The vertex of the working mesh, inside the disk, nearest to the centroid of the disk's area.
@@ -376,6 +430,11 @@ impl<'a> Bench<'a> {
     pub fn new(mesh: &'a TriMesh, adjacency: &'a Adjacency, complex: Complex) -> Option<Bench<'a>> {
         let embedding = Embedding::new(mesh, adjacency, &complex).ok()?;
         Some(Bench { mesh, adjacency, complex, embedding })
+    }
+
+    /// Shape of every cell; `None` for those that are gone or not four-sided.
+    pub fn shapes(&self) -> Vec<Option<Shape>> {
+        self.embedding.shapes(&self.complex)
     }
 
     /// Makes `changes`, whose cells must be disjoint, each if it can be drawn. Returns how many were made; where
@@ -524,11 +583,11 @@ fn replace(complex: &mut Complex, change: &Change, drawn: &Drawn) -> Vec<u32> {
     if !change.spokes.is_empty() {
         let center = match change.center {
             Some(node) => {
-                complex.nodes[node as usize].vertex = drawn.center;
+                complex.nodes[node as usize] = Node { vertex: drawn.center, stays: change.pin.is_some() };
                 node
             }
             None => {
-                complex.nodes.push(Node { vertex: drawn.center, corner: false });
+                complex.nodes.push(Node { vertex: drawn.center, stays: change.pin.is_some() });
                 complex.nodes.len() as u32 - 1
             }
         };
@@ -539,15 +598,17 @@ fn replace(complex: &mut Complex, change: &Change, drawn: &Drawn) -> Vec<u32> {
             .map(|(&i, chain)| add_arc(complex, [center, corner[i]], chain.clone()))
             .collect();
         touched.extend_from_slice(&arcs);
-        let whole = faces.pop().expect("spokes go without lines");
+        let within = |f: &Vec<(usize, u32)>| change.spokes.iter().all(|&i| f.iter().any(|x| x.0 == i));
+        let k = faces.iter().position(within).expect("all spokes lie in one face");
+        let whole = faces.swap_remove(k);
         for (k, &i) in change.spokes.iter().enumerate() {
             let l = (k + 1) % arcs.len();
             let j = change.spokes[l];
             let mut face: Vec<(usize, u32)> = Vec::new();
-            let mut at = i;
-            while face.is_empty() || at != j {
+            let mut at = whole.iter().position(|x| x.0 == i).expect("found above");
+            while face.is_empty() || whole[at].0 != j {
                 face.push(whole[at]);
-                at = (at + 1) % n;
+                at = (at + 1) % whole.len();
             }
             face.push((j, 2 * arcs[l] + 1));
             face.push((n, 2 * arcs[k]));

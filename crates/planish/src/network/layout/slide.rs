@@ -66,7 +66,7 @@ pub(super) fn slide(bench: &mut Bench, nodes: &[u32], batches: usize) -> usize {
 /// Where the node of `star` should go; `None` if it is fixed or well placed.
 fn plan(mesh: &TriMesh, complex: &Complex, star: &[u32]) -> Option<Slide> {
     let node = complex.from(*star.first()?);
-    if complex.nodes[node as usize].corner {
+    if complex.nodes[node as usize].stays {
         return None;
     }
     let fixed: Vec<usize> = (0..star.len()).filter(|&i| complex.arc(star[i]).kind != CurveKind::Smooth).collect();

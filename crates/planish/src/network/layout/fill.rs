@@ -1,0 +1,280 @@
+//! The best way to fill the union of a few cells with quads: every filling is drawn in the map of the union, and
+//! what its cells cost is measured there.
+
+use super::polygon::{self, Sectors, VALENCE_COST};
+use super::recut::{Bench, Change, Union, outline_with_cells};
+use super::shape::{Shape, Trace};
+use crate::network::disk::Met;
+use glam::{DVec2, DVec3};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+/// Pressure on the number of patches: what one patch too many costs when there are a tenth too many.
+const COUNT_COST: f64 = 2.0;
+
+/// What the layout is measured by.
+pub(super) struct Scale<'a> {
+    pub bench: &'a Bench<'a>,
+    pub sectors: Sectors,
+    /// Cost of every cell as it is.
+    costs: Vec<f64>,
+    mean_area: f64,
+    /// What another patch costs.
+    another: f64,
+}
+
+/// A filling and what it gains over the cells as they are.
+pub(super) type Gain = (f64, Change);
+
+impl<'a> Scale<'a> {
+    pub fn new(bench: &'a Bench<'a>, patches: usize) -> Scale<'a> {
+        let shapes = bench.shapes();
+        let count = shapes.iter().flatten().count();
+        let mean_area = shapes.iter().flatten().map(|s| s.area).sum::<f64>() / patches.max(1) as f64;
+        let costs = shapes.iter().map(|s| s.as_ref().map_or(0.0, |s| s.cost(mean_area))).collect();
+        let sectors = Sectors::new(bench.mesh, bench.adjacency, &bench.complex);
+        let another = COUNT_COST * 10.0 * (count as f64 / patches.max(1) as f64).ln();
+        Scale { bench, sectors, costs, mean_area, another }
+    }
+
+    /// The best filling of the union of `change` (its lines and spokes do not matter), if any is better than what is
+    /// there. With a pin, it has a node there; otherwise it may have one or none.
+    pub fn best(&self, change: &Change) -> Option<Gain> {
+        let complex = &self.bench.complex;
+        let around = outline_with_cells(complex, change)?;
+        let n = around.len();
+        if n < 4 || n % 2 == 1 || change.cells.iter().any(|&c| complex.loop_of(c).len() != 4) {
+            return None;
+        }
+        let mut before: f64 = change.cells.iter().map(|&c| self.costs[c as usize]).sum();
+        before += self.another * change.cells.len() as f64;
+        if let Some(node) = change.center {
+            let half = complex.star(node)[0];
+            before += self.sectors.cost(self.sectors.of[half as usize], 0.0);
+        }
+        let pin_before = change.center.map(|node| complex.nodes[node as usize]).filter(|n| n.stays).map(|n| n.vertex);
+        let mut fill = Fill::new(self, change, &around)?;
+        let mut best: Option<Gain> = None;
+        for (lines, spokes) in fill.fillings(change) {
+            let as_it_is = lines.is_empty() && !spokes.is_empty() && spokes == change.spokes && change.pin == pin_before;
+            if let Some(cost) = fill.cost(&lines, &spokes).filter(|_| !as_it_is) {
+                let gain = before - cost;
+                if best.as_ref().is_none_or(|b| gain > b.0) {
+                    best = Some((gain, Change { lines, spokes, ..change.clone() }));
+                }
+            }
+        }
+        best
+    }
+
+    /// What the sectors at the outline cost more when corner `i` goes from `cells[i]` cells to `now[i]`.
+    fn sector_cost(&self, around: &[(u32, usize)], now: &[usize]) -> f64 {
+        let mut more: BTreeMap<u32, f64> = BTreeMap::new();
+        for (&(h, was), &now) in around.iter().zip(now) {
+            *more.entry(self.sectors.of[h as usize]).or_default() += now as f64 - was as f64;
+        }
+        more.iter().map(|(&s, &m)| self.sectors.cost(s, m) - self.sectors.cost(s, 0.0)).sum()
+    }
+}
+
+/// Lines between corners of an outline, and the corners joined to a node inside.
+type Filling = (Vec<(usize, usize)>, Vec<usize>);
+
+/// The union of a change, in which fillings are measured. Corners are numbered as in the outline; one past the last
+/// is the node inside.
+struct Fill<'a> {
+    scale: &'a Scale<'a>,
+    around: &'a [(u32, usize)],
+    union: Union,
+    /// Vertex of the disk of each corner; the node inside comes last.
+    vertex: Vec<u32>,
+    /// Middle in the map and area vector of every triangle.
+    triangles: Vec<(DVec2, DVec3)>,
+    traces: RefCell<BTreeMap<(usize, usize), Option<Trace>>>,
+    costs: RefCell<BTreeMap<[usize; 4], f64>>,
+}
+
+impl<'a> Fill<'a> {
+    fn new(scale: &'a Scale<'a>, change: &Change, around: &'a [(u32, usize)]) -> Option<Fill<'a>> {
+        let embedding = &scale.bench.embedding;
+        let union = embedding.map(&scale.bench.complex, change)?;
+        let mut vertex: Vec<u32> = union.corners.iter().map(|&i| union.disk.boundary[i]).collect();
+        vertex.extend(embedding.place_inside(&union, change.pin));
+        let triangles = union
+            .disk
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|v| embedding.position(&union, v));
+                (t.iter().map(|&v| union.uv[v as usize]).sum::<DVec2>() / 3.0, (b - a).cross(c - a) / 2.0)
+            })
+            .collect();
+        if change.pin.is_some() && vertex.len() == around.len() {
+            return None;
+        }
+        Some(Fill { scale, around, union, vertex, triangles, traces: RefCell::default(), costs: RefCell::default() })
+    }
+
+    /// The fillings worth a look: the best one without a node inside, and those with one node, joined to every
+    /// other corner of the outline, or of the outline less one quad.
+    fn fillings(&mut self, change: &Change) -> Vec<Filling> {
+        let n = self.around.len();
+        let mut found: Vec<Filling> = Vec::new();
+        if change.pin.is_none() {
+            let extra: Vec<f64> = self
+                .around
+                .iter()
+                .map(|&(h, was)| {
+                    let s = self.scale.sectors.of[h as usize];
+                    let base = 1.0 - was as f64;
+                    self.scale.sectors.cost(s, base + 1.0) - self.scale.sectors.cost(s, base)
+                })
+                .collect();
+            found.push((polygon::part_polygon(n, |quad| self.cell(quad), &extra), Vec::new()));
+        }
+        if n >= 6 && self.vertex.len() > n {
+            let whole: Vec<usize> = (0..n).collect();
+            for first in 0..2 {
+                found.push((Vec::new(), whole.iter().copied().skip(first).step_by(2).collect()));
+            }
+            for ear in (0..n).filter(|_| n >= 8) {
+                let rest: Vec<usize> =
+                    whole.iter().copied().filter(|&i| i != (ear + 1) % n && i != (ear + 2) % n).collect();
+                for first in 0..2 {
+                    found.push((
+                        vec![(ear.min((ear + 3) % n), ear.max((ear + 3) % n))],
+                        rest.iter().copied().skip(first).step_by(2).collect(),
+                    ));
+                }
+            }
+        }
+        found
+    }
+
+    /// What a filling costs; `None` if it cannot be drawn.
+    fn cost(&self, lines: &[(usize, usize)], spokes: &[usize]) -> Option<f64> {
+        let n = self.around.len();
+        let mut now = vec![1; n];
+        lines.iter().for_each(|&(i, j)| [i, j].into_iter().for_each(|i| now[i] += 1));
+        spokes.iter().for_each(|&i| now[i] += 1);
+        let mut faces: Vec<Vec<usize>> = vec![(0..n).collect()];
+        let uv = |i: usize| self.union.uv[self.vertex[i] as usize];
+        for &(i, j) in lines {
+            // The node inside must not lie in the quad cut off.
+            let side = |p: DVec2| (uv(j) - uv(i)).perp_dot(p - uv(i)) > 0.0;
+            if !spokes.is_empty() && side(uv(n)) != spokes.iter().any(|&k| k != i && k != j && side(uv(k))) {
+                return None;
+            }
+            let k = faces.iter().position(|f| f.contains(&i) && f.contains(&j))?;
+            let mut face = faces.swap_remove(k);
+            let start = face.iter().position(|&x| x == i)?;
+            face.rotate_left(start);
+            let mut rest = face.split_off(face.iter().position(|&x| x == j)?);
+            face.push(j);
+            rest.push(i);
+            faces.extend([face, rest]);
+        }
+        let mut sum = 0.0;
+        if !spokes.is_empty() {
+            let k = faces.iter().position(|f| spokes.iter().all(|i| f.contains(i)))?;
+            let face = faces.swap_remove(k);
+            let m = face.len();
+            let start = face.iter().position(|&x| x == spokes[0])?;
+            for k in (0..m).step_by(2) {
+                faces.push(vec![face[(start + k) % m], face[(start + k + 1) % m], face[(start + k + 2) % m], n]);
+            }
+            sum += VALENCE_COST * (spokes.len() as f64 - 4.0).powi(2);
+        }
+        sum += self.scale.another * faces.len() as f64;
+        for face in &faces {
+            let quad: [usize; 4] = face[..].try_into().ok()?;
+            sum += self.cell(quad);
+        }
+        sum.is_finite().then(|| sum + self.scale.sector_cost(self.around, &now))
+    }
+
+    /// What the quad between four corners costs; infinite if it cannot be drawn.
+    fn cell(&self, quad: [usize; 4]) -> f64 {
+        let least = (0..4).min_by_key(|&k| quad[k]).unwrap_or(0);
+        let quad = [0, 1, 2, 3].map(|k| quad[(least + k) % 4]);
+        if let Some(&known) = self.costs.borrow().get(&quad) {
+            return known;
+        }
+        let swallows = polygon::swallows(&self.union.outline, quad);
+        let cost = self.shape(quad).filter(|_| !swallows).map_or(f64::INFINITY, |s| s.cost(self.scale.mean_area));
+        self.costs.borrow_mut().insert(quad, cost);
+        cost
+    }
+
+    fn shape(&self, quad: [usize; 4]) -> Option<Shape> {
+        let n = self.around.len();
+        let next = |k: usize| quad[(k + 1) % 4];
+        let mut sides = [Trace::default(); 4];
+        let mut chords: Vec<(DVec2, DVec2)> = Vec::new();
+        let uv = |i: usize| self.union.uv[self.vertex[i] as usize];
+        for k in 0..4 {
+            sides[k] = self.trace(quad[k], next(k))?;
+            if quad[k] == n || next(k) == n || next(k) != (quad[k] + 1) % n {
+                chords.push((uv(quad[k]), uv(next(k))));
+            }
+        }
+        let left = |(a, b): (DVec2, DVec2), p: DVec2| (b - a).perp_dot(p - a) > 0.0;
+        // At the node inside the corner of a cell may be reflex: then one of its two sides is enough.
+        let spokes: Vec<_> = (0..4).filter(|&k| quad[k] == n).map(|k| (quad[(k + 3) % 4], next(k))).collect();
+        let reflex = spokes.iter().any(|&(before, after)| !left((uv(before), uv(n)), uv(after)));
+        let (at_node, others): (Vec<_>, Vec<_>) =
+            chords.into_iter().partition(|c| !spokes.is_empty() && (c.0 == uv(n) || c.1 == uv(n)));
+        let inside = |p: DVec2| {
+            let wedge = if reflex { at_node.iter().any(|&c| left(c, p)) } else { at_node.iter().all(|&c| left(c, p)) };
+            wedge && others.iter().all(|&c| left(c, p))
+        };
+        let area = self.triangles.iter().filter(|t| inside(t.0)).map(|t| t.1.length()).sum();
+        let normals = quad.map(|i| {
+            let (mut own, mut all) = (DVec3::ZERO, DVec3::ZERO);
+            for h in self.union.disk.adjacency.fan(self.vertex[i]) {
+                let (middle, vector) = self.triangles[h as usize / 3];
+                all += vector;
+                if inside(middle) {
+                    own += vector;
+                }
+            }
+            if own == DVec3::ZERO { all.normalize_or_zero() } else { own.normalize_or_zero() }
+        });
+        let corners = quad.map(|i| self.position(self.vertex[i]));
+        Some(Shape { corners, sides, normals, area })
+    }
+
+    fn position(&self, v: u32) -> DVec3 {
+        self.scale.bench.embedding.position(&self.union, v)
+    }
+
+    /// The way from corner `i` to corner `j`: along the outline or straight through the map.
+    fn trace(&self, i: usize, j: usize) -> Option<Trace> {
+        if let Some(&known) = self.traces.borrow().get(&(i, j)) {
+            return known;
+        }
+        let n = self.around.len();
+        let disk = &self.union.disk;
+        let trace = if i < n && j == (i + 1) % n {
+            let (from, to) = (self.union.corners[i], self.union.corners[j]);
+            let m = disk.boundary.len();
+            let count = (to + m - from - 1) % m + 1;
+            Some(Trace::of(&(0..=count).map(|k| self.position(disk.boundary[(from + k) % m])).collect::<Vec<_>>()))
+        } else if j < n && i == (j + 1) % n {
+            self.trace(j, i).map(Trace::reversed)
+        } else {
+            let (a, b) = (self.vertex[i], self.vertex[j]);
+            disk.straight(&self.union.uv, a, b).map(|met| {
+                let mut points = vec![self.position(a)];
+                points.extend(met.iter().map(|m| match *m {
+                    Met::Vertex(v) => self.position(v),
+                    Met::Edge(p, q, t) => self.position(p).lerp(self.position(q), t),
+                }));
+                points.push(self.position(b));
+                Trace::of(&points)
+            })
+        };
+        self.traces.borrow_mut().insert((i, j), trace);
+        trace
+    }
+}

@@ -1,0 +1,111 @@
+//! The shape of a cell and what it costs.
+
+use glam::DVec3;
+
+/// The direction of a curve at its end is taken at this part of its length: beyond the faces, before its bends.
+const HEAD: f64 = 0.2;
+
+/// A corner further off square than this makes a surface that is hard to fit, and costs steeply.
+const STEEP_DEG: f64 = 45.0;
+
+/// Weight of the squared logarithms of a pair of opposite sides, against corners that are all 45 degrees off.
+const TAPER_COST: f64 = 0.5;
+
+/// Weight of the squared logarithm of the area over the product of the sides: a cell with a limb inside has too
+/// much of it, a slanted or winding one too little.
+const SPREAD_COST: f64 = 2.0;
+
+/// Weight of the squared logarithm of a cell's area over the mean.
+const SIZE_COST: f64 = 0.4;
+
+/// A curve between two corners.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Trace {
+    pub length: f64,
+    /// The place a fifth of the way from the start, and from the end.
+    pub heads: [DVec3; 2],
+}
+
+impl Trace {
+    /// The trace of a polyline.
+    pub fn of(points: &[DVec3]) -> Trace {
+        let length: f64 = points.windows(2).map(|w| w[0].distance(w[1])).sum();
+        let at = |target: f64| {
+            let mut left = target;
+            for w in points.windows(2) {
+                let step = w[0].distance(w[1]);
+                if left <= step {
+                    return w[0].lerp(w[1], if step > 0.0 { left / step } else { 0.0 });
+                }
+                left -= step;
+            }
+            points[points.len() - 1]
+        };
+        Trace { length, heads: [at(HEAD * length), at((1.0 - HEAD) * length)] }
+    }
+
+    pub fn reversed(self) -> Trace {
+        Trace { heads: [self.heads[1], self.heads[0]], ..self }
+    }
+}
+
+/// A four-sided cell.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shape {
+    pub corners: [DVec3; 4],
+    /// From each corner to the next.
+    pub sides: [Trace; 4],
+    /// Normals of the surface within the cell at the corners.
+    pub normals: [DVec3; 4],
+    pub area: f64,
+}
+
+/// What an angle costs in place of a right one.
+fn angle_cost(angle: f64) -> f64 {
+    let off = (angle.to_degrees() - 90.0).abs();
+    (off / 45.0).powi(2) + ((off - STEEP_DEG).max(0.0) / 15.0).powi(2)
+}
+
+impl Shape {
+    /// What the cell costs where patches have `mean_area`.
+    pub fn cost(&self, mean_area: f64) -> f64 {
+        let mut corners = 0.0;
+        for k in 0..4 {
+            let p = self.corners[k];
+            let (a, b) = (self.sides[k].heads[0] - p, self.sides[(k + 3) % 4].heads[1] - p);
+            let mut angle = self.normals[k].dot(a.cross(b)).atan2(a.dot(b));
+            if angle < -0.5 {
+                angle += std::f64::consts::TAU;
+            }
+            corners += angle_cost(angle) / 4.0;
+        }
+        let tiny = 1e-6 * mean_area.sqrt();
+        let [a, b, c, d] = self.sides.map(|s| s.length.max(tiny));
+        let (along, across) = ((a + c) / 2.0, (b + d) / 2.0);
+        let taper = (a / c).ln().powi(2) + (b / d).ln().powi(2);
+        let area = self.area.max(tiny * tiny);
+        let size = area / mean_area;
+        // By area where a cell is too large, or parting it would never pay.
+        corners
+            + (along / across).ln().powi(2)
+            + TAPER_COST * taper
+            + SPREAD_COST * (area / (along * across)).ln().powi(2)
+            + SIZE_COST * size.max(1.0) * size.ln().powi(2)
+    }
+}
+
+/// Badness of the flat quad with these corners; `normal` points out of the surface.
+pub(super) fn flat_cost(corners: [DVec3; 4], normal: DVec3) -> f64 {
+    let mut sum = 0.0;
+    for k in 0..4 {
+        let (a, b) = (corners[(k + 1) % 4] - corners[k], corners[(k + 3) % 4] - corners[k]);
+        let mut angle = normal.dot(a.cross(b)).atan2(a.dot(b));
+        if angle < -0.5 {
+            angle += std::f64::consts::TAU;
+        }
+        sum += angle_cost(angle);
+    }
+    let side = |k: usize| corners[k].distance(corners[(k + 1) % 4]);
+    let aspect = ((side(0) + side(2)) / (side(1) + side(3)).max(f64::MIN_POSITIVE)).max(f64::MIN_POSITIVE).ln();
+    sum / 4.0 + aspect * aspect
+}
