@@ -89,14 +89,14 @@ fn help_shows_the_commands_in_the_order_of_the_pipeline() {
     assert_eq!(status(&output), 0);
     let text = stdout(&output);
     let at = |word: &str| text.find(&format!("\n  {word} ")).unwrap_or_else(|| panic!("no {word} in\n{text}"));
-    let places: Vec<usize> = ["demo", "run", "layout", "fit", "export", "compare", "info"].map(at).into();
+    let places: Vec<usize> = ["demo", "run", "layout", "fit", "edit", "export", "compare", "info"].map(at).into();
     assert!(places.is_sorted(), "{text}");
 }
 
 #[test]
 fn every_command_has_help_and_every_option_of_it_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
-    for command in ["demo", "run", "layout", "fit", "export", "compare", "info"] {
+    for command in ["demo", "run", "layout", "fit", "edit", "export", "compare", "info"] {
         let output = planish(&[command, "--help"], folder.path());
         assert_eq!(status(&output), 0, "{command}");
         let text = stdout(&output);

@@ -18,6 +18,7 @@
 //! ```
 
 pub mod curve;
+pub mod edit;
 pub mod geom;
 pub mod grid;
 pub mod linalg;

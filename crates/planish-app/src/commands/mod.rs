@@ -2,6 +2,7 @@
 
 mod compare;
 mod demo;
+mod edit;
 mod export;
 mod fit;
 mod info;
@@ -29,6 +30,7 @@ pub fn run(cli: Cli) -> Result<Status, Failure> {
         Command::Run(args) => run::run(&Session::new(&args.common)?, &args),
         Command::Layout(args) => layout::layout(&Session::new(&args.common)?, &args),
         Command::Fit(args) => fit::fit(&Session::new(&args.common)?, &args),
+        Command::Edit(args) => edit::edit(&Session::new(&args.common)?, &args),
         Command::Export(args) => export::export(&Session::new(&args.common)?, &args),
         Command::Compare(args) => compare::compare(&Session::new(&args.common)?, &args),
         Command::Info(args) => info::info(&Session::new(&args.common)?, &args),

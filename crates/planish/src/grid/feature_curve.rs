@@ -10,7 +10,7 @@
 //! points sliding; every curve point and anchor lies on its curve by construction, and no sub-patch can fold.
 //! Sections have their own numbers of points, so one is refined alone by giving it more.
 
-use super::{Grid, GridError, GridParams, relax, side};
+use super::{Grid, GridError, GridParams, SideStops, relax_at, rim_node, side};
 use crate::curve::SurfaceCurve;
 use crate::geom::tolerance;
 use crate::mesh::{Adjacency, FacePoint, TriMesh, next};
@@ -119,6 +119,42 @@ pub enum FeatureError {
         /// Sections there are.
         needed: usize,
     },
+    /// More curves than a grid has room for.
+    #[error("{curves} feature curves across {cells} cells along {family} are too many - hint: raise the density, or give sections")]
+    TooFine {
+        /// `u` or `v`.
+        family: &'static str,
+        /// Curves.
+        curves: usize,
+        /// Cells.
+        cells: usize,
+    },
+    /// Feature curves of neighbouring patches end on their common curve so that no nodes suit both.
+    #[error("feature curves on both sides of curve {curve} ask for its nodes in different orders - hint: end them at the same places, or give the sections of one patch")]
+    EndsClash {
+        /// The curve of the network.
+        curve: usize,
+    },
+    /// Sections of patches in one row ask for different numbers of cells.
+    #[error("patch {patch} is given {given} cells where its row of patches has {other} - hint: give the same sum, or sections for one patch alone")]
+    SumsDiffer {
+        /// The patch.
+        patch: usize,
+        /// Cells given.
+        given: usize,
+        /// Cells of the row.
+        other: usize,
+    },
+    /// A feature curve names a patch that is not there.
+    #[error("feature curve {curve} is in patch {patch}, there are {patches} - hint: delete it and draw it again")]
+    NoSuchPatch {
+        /// The curve.
+        curve: usize,
+        /// The patch named.
+        patch: u32,
+        /// Patches.
+        patches: usize,
+    },
     /// Part of the patch cannot be resampled.
     #[error(transparent)]
     Grid(#[from] GridError),
@@ -133,7 +169,7 @@ const FEWEST_CELLS: usize = 2;
 /// Resamples a patch so that its feature curves are iso-curves of the grid, exactly.
 /// * `patch` - exact sub-mesh of `input`
 /// * `curves` - those of this patch, in any order and direction
-/// * `size` - `(cols, rows)` of the whole grid, shared out by length where `sections` does not tell
+/// * `size` - `(cols, rows)` of the whole grid, divided by the ends of the curves where `sections` does not tell
 /// # Errors
 /// See [`FeatureError`]; curves are named by their index in `curves`.
 /// Source: [K98] §5.11.
@@ -146,30 +182,41 @@ pub fn relax_with_features(
     params: &GridParams,
     observer: &dyn Observer,
 ) -> Result<FeatureGrid, FeatureError> {
+    let strands = Strands::new(input, patch, curves)?;
+    let means = |list: &[usize]| list.iter().map(|&k| strands.mean_share(k)).collect::<Vec<_>>();
+    let cells = [
+        cells_between("u", &sections.u, &means(&strands.across), size.0.saturating_sub(1))?,
+        cells_between("v", &sections.v, &means(&strands.along), size.1.saturating_sub(1))?,
+    ];
+    let stops = [0, 1, 2, 3].map(|k| strands.stops(k, &cells));
+    relax_along(input, patch, &strands, &cells, &stops, params, observer)
+}
+
+/// The grid along strands that are there already, with the cells of every section and the stops of the sides, those
+/// of the strands among them.
+pub(super) fn relax_along(
+    input: &TriMesh,
+    patch: &PatchMesh,
+    strands: &Strands,
+    cells: &[Vec<usize>; 2],
+    stops: &SideStops,
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<FeatureGrid, FeatureError> {
     let mesh = &patch.mesh;
-    let adjacency = Adjacency::new(mesh);
-    let pieces = Pieces::new(&patch.face_origin);
-    let mut strands: Vec<Strand> = Vec::with_capacity(curves.len());
-    for (k, curve) in curves.iter().enumerate() {
-        strands.push(strand(input, patch, &adjacency, &pieces, k, curve)?);
-    }
-    let sorted = |family: Family| {
-        let mut list: Vec<usize> = (0..curves.len()).filter(|&k| curves[k].family == family).collect();
-        list.sort_by(|&a, &b| strands[a].shares[0].total_cmp(&strands[b].shares[0]).then(a.cmp(&b)));
-        list
-    };
-    let (across, along) = (sorted(Family::V), sorted(Family::U));
+    let adjacency = &strands.adjacency;
+    let (across, along) = (&strands.across, &strands.along);
     // 1. The v curves become edges.
-    let chains: Vec<Vec<Place>> = across.iter().map(|&k| strands[k].places(mesh, &adjacency)).collect();
-    let first = cut_family(mesh, &adjacency, &chains, &across)?;
+    let chains: Vec<Vec<Place>> = across.iter().map(|&k| strands.list[k].places(mesh, adjacency)).collect();
+    let first = cut_family(mesh, adjacency, &chains, across)?;
     let ground = &first.mesh;
     let ground_adjacency = Adjacency::new(ground);
     let ground_pieces = Pieces::new(&first.parent);
-    let on_ground = |p: &FacePoint| ground_pieces.place(&first, mesh, &adjacency, p);
+    let on_ground = |p: &FacePoint| ground_pieces.place(&first, mesh, adjacency, p);
     // 2. The u curves over them, split in anchors.
     let mut lines: Vec<Vec<FacePoint>> = Vec::new();
-    for &k in &along {
-        let places: Option<Vec<FacePoint>> = strands[k].points.iter().map(on_ground).collect();
+    for &k in along {
+        let places: Option<Vec<FacePoint>> = strands.list[k].points.iter().map(on_ground).collect();
         let chain = SurfaceCurve::open(places.ok_or(FeatureError::Outside { curve: k })?);
         lines.push(chain.trace(ground, &ground_adjacency).map_err(|_| FeatureError::Outside { curve: k })?);
     }
@@ -177,34 +224,40 @@ pub fn relax_with_features(
         .iter()
         .map(|l| l.iter().map(|p| imprint::place_of(&ground_adjacency, &ground.triangles, p)).collect())
         .collect();
-    cut_family(ground, &ground_adjacency, &line_places, &along)?;
+    cut_family(ground, &ground_adjacency, &line_places, along)?;
     let mut sketch = Sketch::new(ground, &ground_adjacency, patch, &first.chains);
-    for (place, share) in along.iter().flat_map(|&k| [0, 1].map(|e| (k, e))).filter_map(|(k, e)| {
-        on_ground(&strands[k].points[if e == 0 { 0 } else { strands[k].points.len() - 1 }]).map(|p| (p, e))
-    }) {
-        sketch.insert_on_side(if share == 0 { 3 } else { 1 }, place);
+    for line in &lines {
+        sketch.insert_on_side(3, line[0]);
+        sketch.insert_on_side(1, line[line.len() - 1]);
     }
-    let network = sketch.network(&across, &along, &lines, &line_places)?;
+    let network = sketch.network(across, along, &lines, &line_places)?;
     // 3. Every sub-patch is resampled on its own; shared sides get the same points.
     let sub = imprint::imprint(ground, &network)?;
-    let (nu, nv) = (across.len() + 1, along.len() + 1);
-    let lengths = |k: usize| -> Vec<f64> {
-        (0..sub.len()).map(|p| side_length(&sub[p], k).max(side_length(&sub[p], k + 2))).collect()
-    };
-    let (along_u, along_v) = (lengths(0), lengths(1));
-    let greatest = |list: &[f64], n: usize, of: &dyn Fn(usize) -> usize| -> Vec<f64> {
-        (0..n).map(|s| (0..list.len()).filter(|&p| of(p) == s).map(|p| list[p]).fold(0.0, f64::max)).collect()
-    };
-    let u = shared_out(&sections.u, "u", size.0, &greatest(&along_u, nu, &|p| p % nu))?;
-    let v = shared_out(&sections.v, "v", size.1, &greatest(&along_v, nv, &|p| p / nu))?;
-    let sizes: Vec<(usize, usize)> = (0..nu * nv).map(|p| (u[p % nu] + 1, v[p / nu] + 1)).collect();
-    let grids = relax(ground, &sub, &sizes, params, observer)?;
-    // 4. One grid of all.
+    let (u, v) = (&cells[0], &cells[1]);
+    let (nu, nv) = (u.len(), v.len());
     let starts = |cells: &[usize]| -> Vec<usize> {
         cells.iter().scan(0, |sum, c| Some(std::mem::replace(sum, *sum + c))).collect()
     };
-    let (start_u, start_v) = (starts(&u), starts(&v));
+    let (start_u, start_v) = (starts(u), starts(v));
     let (cols, rows) = (u.iter().sum::<usize>() + 1, v.iter().sum::<usize>() + 1);
+    let sizes: Vec<(usize, usize)> = (0..nu * nv).map(|p| (u[p % nu] + 1, v[p / nu] + 1)).collect();
+    let sub_stops: Vec<SideStops> = (0..nu * nv)
+        .map(|p| {
+            let (i, j) = (p % nu, p / nu);
+            let part = |side: usize, at_rim: bool, from: usize, count: usize| match at_rim {
+                true => part_of(&stops[side], from, from + count, if side % 2 == 0 { cols } else { rows }),
+                false => side::Stops::new(),
+            };
+            [
+                part(0, j == 0, start_u[i], u[i]),
+                part(1, i + 1 == nu, start_v[j], v[j]),
+                part(2, j + 1 == nv, cols - 1 - start_u[i] - u[i], u[i]),
+                part(3, i == 0, rows - 1 - start_v[j] - v[j], v[j]),
+            ]
+        })
+        .collect();
+    let grids = relax_at(ground, &sub, &sizes, &sub_stops, params, observer)?;
+    // 4. One grid of all.
     let mut grid = Grid {
         rows,
         cols,
@@ -217,53 +270,126 @@ pub fn relax_with_features(
                 let at = (start_v[p / nu] + j) * cols + start_u[p % nu] + i;
                 grid.points[at] = part.points[j * part.cols + i];
                 let place = part.places[j * part.cols + i];
-                grid.places[at] = to_input(input, patch, &to_patch(&first, mesh, &adjacency, &place));
+                grid.places[at] = to_input(input, patch, &to_patch(&first, mesh, adjacency, &place));
             }
         }
     }
-    let mut places_of = vec![0; curves.len()];
+    // The rim as the neighbours have it, bit for bit.
+    for (k, chain) in patch.sides.iter().enumerate() {
+        let count = if k % 2 == 0 { cols } else { rows };
+        let points: Vec<DVec3> = chain.iter().map(|&v| mesh.points[v as usize]).collect();
+        let samples = side::resample_at(&points, count, &stops[k]);
+        for n in 0..count {
+            let node = rim_node(k, n, cols, rows);
+            let h = adjacency.outgoing[chain[samples.segment[n] as usize] as usize];
+            let mut bary = [0.0; 3];
+            bary[h as usize % 3] = 1.0 - samples.fraction[n];
+            bary[next(h) as usize % 3] = samples.fraction[n];
+            grid.points[node] = samples.points[n];
+            grid.places[node] = to_input(input, patch, &FacePoint { face: h / 3, bary });
+        }
+    }
+    let count = across.len() + along.len();
+    let mut numbers = vec![0; count];
+    let mut followed = vec![Vec::new(); count];
     for (s, &k) in across.iter().enumerate() {
-        places_of[k] = start_u[s + 1];
+        numbers[k] = start_u[s + 1];
+        followed[k] = first.chains[s].iter().map(|&v| ground.points[v as usize]).collect();
     }
     for (s, &k) in along.iter().enumerate() {
-        places_of[k] = start_v[s + 1];
+        numbers[k] = start_v[s + 1];
+        followed[k] = lines[s].iter().map(|p| p.position(ground)).collect();
     }
     let anchors = (1..nv)
         .flat_map(|j| (1..nu).map(move |i| (j, i)))
         .map(|(j, i)| (start_v[j], start_u[i], grid.points[start_v[j] * cols + start_u[i]]))
         .collect();
-    let followed = |k: usize| match curves[k].family {
-        Family::V => first.chains[across.iter().position(|&a| a == k).unwrap_or(0)]
-            .iter()
-            .map(|&v| ground.points[v as usize])
-            .collect(),
-        Family::U => lines[along.iter().position(|&a| a == k).unwrap_or(0)].iter().map(|p| p.position(ground)).collect(),
+    Ok(FeatureGrid { grid, lines: numbers, curves: followed, anchors })
+}
+
+/// Stops of a side between two of its nodes, as those of that part alone.
+fn part_of(stops: &side::Stops, first: usize, last: usize, count: usize) -> side::Stops {
+    let share = |node: usize| match node {
+        0 => 0.0,
+        n if n + 1 == count => 1.0,
+        n => stops.iter().find(|s| s.1 == n).map_or(n as f64 / (count - 1) as f64, |s| s.0),
     };
-    let curves = (0..curves.len()).map(followed).collect();
-    Ok(FeatureGrid { grid, lines: places_of, curves, anchors })
+    let (low, high) = (share(first), share(last));
+    let inner = stops.iter().filter(|s| s.1 > first && s.1 < last);
+    inner.map(|&(s, k)| (((s - low) / (high - low)).clamp(0.0, 1.0), k - first)).collect()
 }
 
-fn side_length(patch: &PatchMesh, k: usize) -> f64 {
-    let chain: Vec<DVec3> = patch.sides[k].iter().map(|&v| patch.mesh.points[v as usize]).collect();
-    side::length(&chain)
-}
-
-/// Cells of every section: as given, or `size - 1` of them by length.
-fn shared_out(
-    given: &[usize],
+/// Cells of every section between curves at `means`, rising: as given, or `cells` of them by share.
+pub(super) fn cells_between(
     family: &'static str,
-    size: usize,
-    lengths: &[f64],
+    given: &[usize],
+    means: &[f64],
+    cells: usize,
 ) -> Result<Vec<usize>, FeatureError> {
+    let needed = means.len() + 1;
     if !given.is_empty() {
-        if given.len() != lengths.len() {
-            return Err(FeatureError::SectionCount { family, given: given.len(), needed: lengths.len() });
+        if given.len() != needed {
+            return Err(FeatureError::SectionCount { family, given: given.len(), needed });
         }
         return Ok(given.iter().map(|&c| c.max(FEWEST_CELLS)).collect());
     }
-    let total: f64 = lengths.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-    let cells = size.saturating_sub(1) as f64;
-    Ok(lengths.iter().map(|l| ((cells * l / total).round() as usize).max(FEWEST_CELLS)).collect())
+    if cells < FEWEST_CELLS * needed {
+        return Err(FeatureError::TooFine { family, curves: means.len(), cells });
+    }
+    let mut nodes = vec![0];
+    for (k, mean) in means.iter().enumerate() {
+        let wanted = (mean * cells as f64).round() as usize;
+        let most = cells - FEWEST_CELLS * (needed - 1 - k);
+        nodes.push(wanted.clamp(nodes[k] + FEWEST_CELLS, most));
+    }
+    nodes.push(cells);
+    Ok(nodes.windows(2).map(|w| w[1] - w[0]).collect())
+}
+
+/// The feature curves of one patch on its mesh.
+pub(super) struct Strands {
+    adjacency: Adjacency,
+    list: Vec<Strand>,
+    /// The v curves from low to high u, and the u curves from low to high v.
+    pub across: Vec<usize>,
+    pub along: Vec<usize>,
+}
+
+impl Strands {
+    pub fn new(input: &TriMesh, patch: &PatchMesh, curves: &[FeatureCurve]) -> Result<Strands, FeatureError> {
+        let adjacency = Adjacency::new(&patch.mesh);
+        let pieces = Pieces::new(&patch.face_origin);
+        let list = (curves.iter().enumerate())
+            .map(|(k, curve)| strand(input, patch, &adjacency, &pieces, k, curve))
+            .collect::<Result<Vec<_>, _>>()?;
+        let sorted = |family: Family| {
+            let mut own: Vec<usize> = (0..curves.len()).filter(|&k| curves[k].family == family).collect();
+            own.sort_by(|&a, &b| list[a].shares[0].total_cmp(&list[b].shares[0]).then(a.cmp(&b)));
+            own
+        };
+        let (across, along) = (sorted(Family::V), sorted(Family::U));
+        Ok(Strands { adjacency, list, across, along })
+    }
+
+    pub fn mean_share(&self, k: usize) -> f64 {
+        (self.list[k].shares[0] + self.list[k].shares[1]) / 2.0
+    }
+
+    /// Stops that the curves put into side `k`, in its direction.
+    pub fn stops(&self, k: usize, cells: &[Vec<usize>; 2]) -> side::Stops {
+        let (own, cells) = if k % 2 == 0 { (&self.across, &cells[0]) } else { (&self.along, &cells[1]) };
+        let total: usize = cells.iter().sum();
+        // The low ends of v curves lie on side 0, those of u curves on side 3.
+        let end = if matches!(k, 0 | 3) { 0 } else { 1 };
+        let mut node = 0;
+        let rising: side::Stops = (own.iter().zip(cells))
+            .map(|(&c, n)| {
+                node += n;
+                (side::stop_share(self.list[c].shares[end]), node)
+            })
+            .collect();
+        if k >= 2 { side::turned(&rising, total + 1) } else { rising }
+    }
 }
 
 /// A feature curve on the patch mesh.

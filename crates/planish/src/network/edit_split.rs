@@ -43,6 +43,24 @@ impl Editor<'_> {
         Ok(self.network.curves.len() - before)
     }
 
+    /// Number of the region with curves around it that a place lies in, as [`super::diagnose()`] numbers them.
+    /// # Errors
+    /// `Imprint` if the curves are not in order, `NoSuchPart` in a part of the mesh without curves.
+    pub fn region_at(&self, place: &FacePoint) -> Result<u32, EditError> {
+        let found = regions(self.mesh, self.adjacency, &self.network)?;
+        let p = place.position(self.mesh);
+        let cut = &found.drawn.cut;
+        let away = |f: u32| (cut.mesh.corners(f as usize).into_iter().sum::<glam::DVec3>() / 3.0).distance(p);
+        let bounded: Vec<&Vec<u32>> = found.parts.iter().filter(|p| !p.0.is_empty()).map(|p| &p.1).collect();
+        let near = bounded.iter().enumerate().flat_map(|(k, faces)| {
+            faces.iter().filter(|&&f| cut.parent[f as usize] == place.face).map(move |&f| (away(f), k as u32))
+        });
+        let count = bounded.len();
+        near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+            .map(|x| x.1)
+            .ok_or(EditError::NoSuchPart { what: "region", index: count as u32, count })
+    }
+
     /// Splits one region; returns the corners put into its sides.
     fn split_part(&mut self, found: &Regions, part: usize, from: usize) -> Result<Vec<u32>, EditError> {
         let canvas = Flat::new(found, part).ok_or(EditError::NoSplit { region: part as u32, sides: 0 })?;
