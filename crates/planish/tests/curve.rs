@@ -128,7 +128,7 @@ fn magnetic_painting_follows_the_rim_of_a_cylinder_where_geodesics_cut_across() 
     let params = PaintParams { mode: PaintMode::Magnetic, ..PaintParams::default() };
     let drawn = SurfaceCurve::open(way(&canvas, a, b, &params, Some(&magnet)).unwrap());
     // Edges of the rim run a two-thousandth inside the circle.
-    let on_rim = |p: &DVec3| (p.truncate().length() - 1.0).abs() < 6e-4 && (p.z - 2.0).abs() < 1e-6;
+    let on_rim = |p: &DVec3| (p.truncate().length() - 1.0).abs() < 6e-4 && (p.z - 2.0).abs() < 1e-5;
     let off: Vec<DVec3> = drawn.positions(&mesh).into_iter().filter(|p| !on_rim(p)).collect();
     assert!(off.is_empty(), "{off:?}");
     let direct = geodesic(&mesh, a.position(&mesh), b.position(&mesh));
@@ -184,7 +184,7 @@ fn attraction_to_a_painted_ring_recovers_its_centre_line_within_half_an_edge() {
     let mesh = shapes::sphere(1.0, 5);
     let adjacency = Adjacency::new(&mesh);
     let canvas = Canvas::new(&mesh);
-    let z = 0.35;
+    let z: f64 = 0.35;
     let ribbon = 3.0 * canvas.edge;
     let painted: Vec<f64> = mesh.points.iter().map(|p| ((p.z.asin() - z.asin()).abs() < ribbon) as u8 as f64).collect();
     let field = ScalarField::new(&mesh, painted).unwrap().smoothed(&mesh, &adjacency, 100);

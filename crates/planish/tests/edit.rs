@@ -185,20 +185,20 @@ fn regions_of_3_5_and_6_sides_are_split_into_four_sided_patches_and_neighbours_f
     assert!(found.faults[0].to_string().contains("hint: split it into three patches around its middle"));
     let mut guard = 0;
     while let Some(region) = editor.diagnose().regions.iter().position(|r| r.loops[0].len() == 3) {
-        editor.split_region(region as u32, 0).unwrap();
+        editor.split_region(region as u32, None).unwrap();
         guard += 1;
         assert!(guard <= 8);
     }
     // Sides with two corners of their neighbours in them are left for more splits: 4, 5 and 6 sides.
     while let Some(region) = editor.diagnose().regions.iter().position(|r| matches!(r.loops[0].len(), 5 | 6)) {
-        editor.split_region(region as u32, 0).unwrap();
+        editor.split_region(region as u32, None).unwrap();
         guard += 1;
         assert!(guard < 60);
     }
     let found = editor.diagnose();
     assert!(found.is_finished(), "{:?}", found.faults);
     assert!(imprint(&mesh, &editor.network).is_ok());
-    assert!(matches!(editor.split_region(0, 0), Err(EditError::NoSplit { sides: 4, .. })));
+    assert!(matches!(editor.split_region(0, None), Err(EditError::NoSplit { sides: 4, .. })));
 }
 
 #[test]

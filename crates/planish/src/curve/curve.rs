@@ -93,14 +93,45 @@ impl SurfaceCurve {
     }
 }
 
-/// Takes away places that repeat the one before.
-pub(crate) fn without_repeats(mesh: &TriMesh, chain: &mut Vec<FacePoint>) {
-    chain.dedup_by(|b, a| {
-        *a == *b || vertex_of(mesh, a).is_some_and(|v| vertex_of(mesh, b) == Some(v)) || {
-            // The same place of an edge, named on both faces.
-            a.position(mesh) == b.position(mesh) && a.face != b.face
+/// Two places of one edge nearer than this share of it are the same: rounding, seen from its two faces.
+const SAME_ON_EDGE: f64 = 1e-10;
+/// Weights below this are zero, as where curves are imprinted.
+const ON_EDGE: f64 = 1e-12;
+
+/// A place by what it lies on: a vertex, an edge by its vertices (lower first) with the share of the way, or a face.
+#[derive(Clone, Copy, Debug)]
+enum Lies {
+    Vertex(u32),
+    Edge(u32, u32, f64),
+    Face(FacePoint),
+}
+
+fn lies(mesh: &TriMesh, p: &FacePoint) -> Lies {
+    let t = mesh.triangles[p.face as usize];
+    let near: Vec<usize> = (0..3).filter(|&k| p.bary[k] > ON_EDGE).collect();
+    match near[..] {
+        [k] => Lies::Vertex(t[k]),
+        [i, j] => {
+            let (i, j) = if t[i] < t[j] { (i, j) } else { (j, i) };
+            Lies::Edge(t[i], t[j], p.bary[j] / (p.bary[i] + p.bary[j]))
         }
-    });
+        _ => Lies::Face(*p),
+    }
+}
+
+/// Takes away places that repeat the one before; the last place is kept.
+pub(crate) fn without_repeats(mesh: &TriMesh, chain: &mut Vec<FacePoint>) {
+    let same = |a: &FacePoint, b: &FacePoint| match (lies(mesh, a), lies(mesh, b)) {
+        (Lies::Vertex(v), Lies::Vertex(w)) => v == w,
+        (Lies::Edge(a, b, s), Lies::Edge(c, d, t)) => (a, b) == (c, d) && (s - t).abs() < SAME_ON_EDGE,
+        (Lies::Face(p), Lies::Face(q)) => p == q,
+        _ => false,
+    };
+    let last = chain.last().copied();
+    chain.dedup_by(|b, a| same(a, b));
+    if let (Some(last), Some(end)) = (last, chain.last_mut()) {
+        *end = last;
+    }
 }
 
 /// `count` places at equal arc length along a chain whose neighbours share a face; the ends are kept.

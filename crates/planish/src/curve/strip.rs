@@ -264,6 +264,13 @@ fn straightened(
     mut portals: Vec<u32>,
     to: FacePoint,
 ) -> Vec<FacePoint> {
+    let ends = [from, to];
+    let (from, to) = (beyond_its_edge(adjacency, from, &mut portals, true), beyond_its_edge(adjacency, to, &mut portals, false));
+    let finish = |mut places: Vec<FacePoint>| {
+        let last = places.len() - 1;
+        (places[0], places[last]) = (ends[0], ends[1]);
+        places
+    };
     let rounds = ROUNDS_PER_FACE * portals.len() + LEAST_ROUNDS;
     for _ in 0..rounds {
         let lay = lay_out(mesh, &from, &portals, &to);
@@ -289,14 +296,44 @@ fn straightened(
             }
         }
         if !changed {
-            return places(mesh, &from, &portals, &to, &lay, &bends);
+            return finish(places(mesh, &from, &portals, &to, &lay, &bends));
         }
         push_all(adjacency, &mut turned, &portals[done..]);
         portals = turned;
     }
     let lay = lay_out(mesh, &from, &portals, &to);
     let bends = funnel(&lay);
-    places(mesh, &from, &portals, &to, &lay, &bends)
+    finish(places(mesh, &from, &portals, &to, &lay, &bends))
+}
+
+/// Weights below this are zero: the place lies on the edge.
+const ON_EDGE: f64 = 1e-12;
+
+/// An end of a strip that lies on the first (or last) edge crossed, named on the face beyond; that edge is no longer
+/// crossed then, or the way would name the place twice.
+fn beyond_its_edge(adjacency: &Adjacency, place: FacePoint, portals: &mut Vec<u32>, first: bool) -> FacePoint {
+    let mut at = place;
+    let mut done = 0;
+    loop {
+        // The half-edge of the face that the place is named on, and the one beyond.
+        let left = portals.len() - done;
+        let h = match first {
+            _ if left == 0 => break,
+            true => portals[done],
+            false => adjacency.opposite[portals[left - 1] as usize],
+        };
+        if h / 3 != at.face || at.bary[previous(h) as usize % 3] > ON_EDGE {
+            break;
+        }
+        let g = adjacency.opposite[h as usize];
+        let mut bary = [0.0; 3];
+        let (a, b) = (at.bary[h as usize % 3], at.bary[next(h) as usize % 3]);
+        (bary[next(g) as usize % 3], bary[g as usize % 3]) = (a / (a + b), b / (a + b));
+        at = FacePoint { face: g / 3, bary };
+        done += 1;
+    }
+    if first { portals.drain(..done) } else { portals.drain(portals.len() - done..) };
+    at
 }
 
 /// The half-edges that pass the vertex of `bend` on its other side, if the surface opens by less than 180 degrees

@@ -274,9 +274,9 @@ pub enum Edit {
     SplitRegion {
         /// A place in the region.
         at: Spot,
-        /// Turns the split.
+        /// Turns the split; absent for the flattest corner.
         #[serde(default)]
-        from: usize,
+        from: Option<usize>,
     },
     /// Lays out everything that is not parted yet.
     Complete {

@@ -19,12 +19,13 @@ use std::f64::consts::TAU;
 const LONGEST_CHORD: usize = 10_000;
 
 impl Editor<'_> {
-    /// Splits region `region` (numbered as by [`super::diagnose()`]) of three, five or six sides into four-sided patches; `from` turns the
-    /// split: the first side for five, the first corner for six. Neighbours of four sides that get a corner into a
-    /// side are split across. Returns the number of curves added.
+    /// Splits region `region` (numbered as by [`super::diagnose()`]) of three, five or six sides into four-sided
+    /// patches. `from` turns the split: the side that is divided of five, a corner that the new curve starts in of six;
+    /// without it the new curve starts in the flattest corner. Neighbours of four sides that get a corner into a side
+    /// are split across. Returns the number of curves added.
     /// # Errors
     /// `NoSuchPart`, `NoSplit` for other regions, `Imprint` if the curves are not in order.
-    pub fn split_region(&mut self, region: u32, from: usize) -> Result<usize, EditError> {
+    pub fn split_region(&mut self, region: u32, from: Option<usize>) -> Result<usize, EditError> {
         let found = regions(self.mesh, self.adjacency, &self.network)?;
         let bounded: Vec<usize> = (0..found.parts.len()).filter(|&r| !found.parts[r].0.is_empty()).collect();
         let count = bounded.len();
@@ -62,7 +63,7 @@ impl Editor<'_> {
     }
 
     /// Splits one region; returns the corners put into its sides.
-    fn split_part(&mut self, found: &Regions, part: usize, from: usize) -> Result<Vec<u32>, EditError> {
+    fn split_part(&mut self, found: &Regions, part: usize, from: Option<usize>) -> Result<Vec<u32>, EditError> {
         let canvas = Flat::new(found, part).ok_or(EditError::NoSplit { region: part as u32, sides: 0 })?;
         let n = canvas.starts.len();
         let mut lines: Vec<(u32, u32)> = Vec::new();
@@ -75,11 +76,18 @@ impl Editor<'_> {
                 lines.extend((0..3).map(|k| (canvas.middle(k), center)));
             }
             5 => {
-                let k = from % 5;
+                // The side across from the flattest corner.
+                let flattest = (0..5).max_by(|&i, &j| canvas.flatness(found, i).total_cmp(&canvas.flatness(found, j)));
+                let k = from.unwrap_or(flattest.unwrap_or(0) + 2) % 5;
                 middles = vec![k];
                 lines.push((canvas.middle(k), corner(k + 3)));
             }
-            _ => lines.push((corner(from % 3), corner(from % 3 + 3))),
+            _ => {
+                let both = |i: usize| canvas.flatness(found, i) + canvas.flatness(found, i + 3);
+                let flattest = (0..3).max_by(|&i, &j| both(i).total_cmp(&both(j)));
+                let k = from.unwrap_or(flattest.unwrap_or(0)) % 3;
+                lines.push((corner(k), corner(k + 3)));
+            }
         }
         let drawn: Option<Vec<Vec<FacePoint>>> = lines.iter().map(|&(a, b)| canvas.line(self, found, a, b)).collect();
         let drawn = drawn.ok_or(EditError::NoSplit { region: part as u32, sides: n })?;
@@ -103,38 +111,38 @@ impl Editor<'_> {
         for _ in 0..LONGEST_CHORD {
             let Some(corner) = waiting.pop() else { break };
             let found = regions(self.mesh, self.adjacency, &self.network)?;
-            // The region of five sides that has the corner between two collinear ones.
+            // The region that has the corner between two pieces of a side.
             let ends = self.ends_at(corner);
-            let part = (0..found.parts.len()).find(|&r| {
+            let meets = |half: u32, end: u32| ends.contains(&(half / 2 * 2 + (half % 2 ^ end)));
+            let seat = (0..found.parts.len()).find_map(|r| {
                 let loops = &found.parts[r].0;
-                loops.len() == 1
-                    && loops[0].len() == 5
-                    && !found.open[r]
-                    && (0..5).any(|k| {
-                        let (a, b) = (loops[0][k], loops[0][(k + 1) % 5]);
-                        let meets = |half: u32, end: u32| half / 2 * 2 + (half % 2 ^ end);
-                        // Side a ends and side b begins in the corner, and no other curve ends there between them.
-                        ends.contains(&meets(a, 1)) && ends.contains(&meets(b, 0)) && ends.len() == 3
-                    })
+                let n = loops.first().map_or(0, Vec::len);
+                if loops.len() != 1 || found.open[r] || !matches!(n, 5 | 6) || ends.len() != 3 {
+                    return None;
+                }
+                let one = &loops[0];
+                (0..n).find(|&k| meets(one[k], 1) && meets(one[(k + 1) % n], 0)).map(|k| (r, (k + 1) % n))
             });
-            let Some(part) = part else { continue };
+            let Some((part, k)) = seat else { continue };
             let one = &found.parts[part].0[0];
-            let k = (0..5).find(|&k| {
-                let meets = |half: u32, end: u32| half / 2 * 2 + (half % 2 ^ end);
-                ends.contains(&meets(one[k], 1)) && ends.contains(&meets(one[(k + 1) % 5], 0))
-            });
-            let Some(k) = k else { continue };
-            // From the corner after side k to the middle of the side across: sides k + 1, k + 2, then k + 3.
-            let canvas = Flat::new(&found, part).ok_or(EditError::NoSplit { region: part as u32, sides: 5 })?;
-            let a = canvas.disk.boundary[canvas.starts[(k + 1) % 5]];
-            let across = (k + 3) % 5;
-            let b = canvas.middle(across);
-            let points = canvas.line(self, &found, a, b).ok_or(EditError::NoSplit { region: part as u32, sides: 5 })?;
-            let place = points[points.len() - 1];
-            let next_corner = self.split_curve_at_place(one[across] / 2, place)?;
-            let start = self.corner_at(points[0]);
-            self.network.curves.push(Curve { corners: [start, next_corner], kind: CurveKind::Smooth, points });
-            waiting.push(next_corner);
+            let n = one.len();
+            let no_split = EditError::NoSplit { region: part as u32, sides: n };
+            let canvas = Flat::new(&found, part).ok_or(no_split.clone())?;
+            let a = canvas.disk.boundary[canvas.starts[k]];
+            // Of five sides to the middle of the side across, of six to the corner across, which a split before has
+            // put there.
+            let b = if n == 5 { canvas.middle((k + 2) % 5) } else { canvas.disk.boundary[canvas.starts[(k + 3) % 6]] };
+            let points = canvas.line(self, &found, a, b).ok_or(no_split)?;
+            let (first, last) = (points[0], points[points.len() - 1]);
+            let end = if n == 5 {
+                let divided = self.split_curve_at_place(one[(k + 2) % 5] / 2, last)?;
+                waiting.push(divided);
+                divided
+            } else {
+                self.corner_at(last)
+            };
+            let start = self.corner_at(first);
+            self.network.curves.push(Curve { corners: [start, end], kind: CurveKind::Smooth, points });
         }
         Ok(())
     }
@@ -310,6 +318,18 @@ impl Flat {
             d(i).total_cmp(&d(j))
         });
         vertex(best.unwrap_or(first))
+    }
+
+    /// How straight the boundary runs on at corner `k`: -1 for a spike, 1 for no corner at all.
+    fn flatness(&self, found: &Regions, k: usize) -> f64 {
+        let n = self.disk.boundary.len();
+        let at = |i: usize| {
+            let v = self.disk.vertices[self.disk.boundary[i % n] as usize];
+            found.drawn.cut.mesh.points[v as usize]
+        };
+        let i = self.starts[k % self.starts.len()] + n;
+        let (before, after) = ((at(i) - at(i - 1)).normalize_or_zero(), (at(i + 1) - at(i)).normalize_or_zero());
+        before.dot(after)
     }
 
     /// The inner vertex nearest to the middle of the map.
