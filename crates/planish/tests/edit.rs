@@ -234,21 +234,23 @@ fn the_rest_of_a_network_is_completed_around_curves_that_stay_within_a_millionth
 
 /// A patch with a bump, and curves across it: `u` and `v` of each family.
 fn bumpy(u: usize, v: usize) -> (TriMesh, Network, Vec<FeatureCurve>) {
-    let mesh = shapes::sheet(60, 50, false, false, |s, t| {
+    let at = |s: f64, t: f64| {
         DVec3::new(2.0 * s, t, 0.3 * (-(9.0 * (s - 0.5).powi(2) + 12.0 * (t - 0.5).powi(2))).exp())
-    });
+    };
+    let mesh = shapes::sheet(60, 50, false, false, at);
+    let on_sheet = at;
     let network = one_patch(&mesh);
     let bvh = Bvh::new(&mesh);
     let wave = |x: f64, k: usize| 0.06 * (6.0 * x + k as f64).sin();
     let mut features = Vec::new();
     for k in 0..v {
         let at = (k + 1) as f64 / (v + 1) as f64;
-        let points = (1..40).map(|i| i as f64 / 40.0).map(|t| near(&bvh, DVec3::new(2.0 * (at + wave(t, k) * 0.5), t, 0.2)));
+        let points = (1..40).map(|i| i as f64 / 40.0).map(|t| near(&bvh, on_sheet(at + wave(t, k) * 0.5, t)));
         features.push(FeatureCurve { patch: 0, family: Family::V, points: points.collect() });
     }
     for k in 0..u {
         let at = (k + 1) as f64 / (u + 1) as f64;
-        let points = (1..40).map(|i| i as f64 / 40.0).map(|s| near(&bvh, DVec3::new(2.0 * s, at + wave(s, k) * 0.7, 0.2)));
+        let points = (1..40).map(|i| i as f64 / 40.0).map(|s| near(&bvh, on_sheet(s, at + wave(s, k) * 0.7)));
         // Against the direction of the grid: curves may be painted either way.
         let mut points: Vec<FacePoint> = points.collect();
         points.reverse();
@@ -291,7 +293,16 @@ fn grids_follow_1_to_4_feature_curves_of_both_families_exactly_without_a_fold() 
             assert_eq!(grid.points[j * grid.cols + i], *p);
         }
         let quality = grid::measure(grid, &patches[0]);
-        assert_eq!(quality.folds, 0, "{u} {v}");
+        let at = |i: usize, j: usize| grid.points[j * grid.cols + i];
+        let down: Vec<(usize, usize, DVec3)> = (0..grid.rows - 1)
+            .flat_map(|j| (0..grid.cols - 1).map(move |i| (i, j)))
+            .filter(|&(i, j)| {
+                let q = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                (0..4).any(|k| (q[(k + 1) % 4] - q[k]).cross(q[(k + 3) % 4] - q[k]).z <= 0.0)
+            })
+            .map(|(i, j)| (i, j, at(i, j)))
+            .collect();
+        assert!(quality.folds == 0 && down.is_empty(), "{u} {v}: {} {down:?} lines {:?}", quality.folds, made.lines);
         for (p, place) in grid.points.iter().zip(&grid.places) {
             assert!(place.position(&mesh).distance(*p) < 1e-9);
         }

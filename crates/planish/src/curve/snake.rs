@@ -13,7 +13,8 @@
 //! - the pull of a scalar is a step to its ridge along the normal of the curve, so that its weight does not depend
 //!   on the units of the scalar.
 
-use super::curve::SurfaceCurve;
+use super::curve::{SurfaceCurve, sample};
+use super::strip::connect;
 use super::{CurveError, ScalarField};
 use crate::linalg::{Banded, BandedCholesky};
 use crate::mesh::{Adjacency, FacePoint, TriMesh, move_point_on_surface};
@@ -649,6 +650,25 @@ impl<'m> Snake<'m> {
         Ok(out)
     }
 
+    /// Evens the inner points of a stretch, measured along the surface.
+    fn even_stretch(&mut self, stretch: &[usize]) -> Result<(), CurveError> {
+        let (mut chain, mut lengths) = (vec![self.points[stretch[0]]], Vec::with_capacity(stretch.len()));
+        for w in stretch.windows(2) {
+            let way = connect(self.mesh, self.adjacency, self.points[w[0]], self.points[w[1]])?;
+            let at: Vec<DVec3> = way.iter().map(|p| p.position(self.mesh)).collect();
+            lengths.push(at.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>());
+            chain.extend_from_slice(&way[1..]);
+        }
+        let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
+        if lengths.iter().any(|l| (l / mean - 1.0).abs() > UNEVEN) {
+            let even = sample(self.mesh, self.adjacency, &chain, stretch.len());
+            for (&i, &place) in stretch.iter().zip(&even).skip(1).take(stretch.len() - 2) {
+                self.move_to(i, place);
+            }
+        }
+        Ok(())
+    }
+
     /// Puts the moving points of every stretch between fixed ones at equal arc length along the curve, where they are
     /// uneven: fairness pulls points of a rough surface together.
     fn even_out(&mut self) -> Result<(), CurveError> {
@@ -668,14 +688,8 @@ impl<'m> Snake<'m> {
             if self.moves(i) {
                 continue;
             }
-            let lengths: Vec<f64> = stretch.windows(2).map(|w| self.at[w[0]].distance(self.at[w[1]])).collect();
-            let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
-            if stretch.len() > 2 && lengths.iter().any(|l| (l / mean - 1.0).abs() > UNEVEN) {
-                let part = SurfaceCurve::open(stretch.iter().map(|&i| self.points[i]).collect());
-                let even = part.resampled(self.mesh, self.adjacency, stretch.len())?;
-                for (&i, &place) in stretch.iter().zip(&even.points).skip(1).take(stretch.len() - 2) {
-                    self.move_to(i, place);
-                }
+            if stretch.len() > 2 {
+                self.even_stretch(&stretch)?;
             }
             stretch = vec![i];
         }

@@ -100,7 +100,7 @@ impl Editor<'_> {
         }
         for points in drawn {
             let ends = [points[0], points[points.len() - 1]].map(|p| self.corner_at(p));
-            self.network.curves.push(Curve { corners: ends, kind: CurveKind::Smooth, points });
+            self.push_line(ends, points);
         }
         Ok(added)
     }
@@ -142,9 +142,18 @@ impl Editor<'_> {
                 self.corner_at(last)
             };
             let start = self.corner_at(first);
-            self.network.curves.push(Curve { corners: [start, end], kind: CurveKind::Smooth, points });
+            self.push_line([start, end], points);
         }
         Ok(())
+    }
+
+    /// Adds a new curve whose ends are the places of its corners, to the bit: those of the line have gone through the
+    /// cut mesh and back.
+    fn push_line(&mut self, corners: [u32; 2], mut points: Vec<FacePoint>) {
+        let last = points.len() - 1;
+        points[0] = self.network.corners[corners[0] as usize].place;
+        points[last] = self.network.corners[corners[1] as usize].place;
+        self.network.curves.push(Curve { corners, kind: CurveKind::Smooth, points });
     }
 
     /// Splits a curve at the point of it that lies at `place`.
