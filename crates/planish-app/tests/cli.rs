@@ -348,7 +348,11 @@ fn a_script_draws_a_network_on_a_bare_mesh_and_the_history_goes_back_and_forth_i
     assert_eq!(status(&output), 0, "{}", stderr(&output));
     // The stroke divides the top in two patches and puts a corner into two edges: their other sides have five.
     let told = stderr(&output);
-    assert_eq!(told.lines().filter(|l| l.starts_with("warning: ") && l.contains("has 5 sides, not 4")).count(), 2, "{told}");
+    assert_eq!(
+        told.lines().filter(|l| l.starts_with("warning: ") && l.contains("has 5 sides, not 4")).count(),
+        2,
+        "{told}"
+    );
     assert!(stdout(&output).contains("not finished"));
     assert_eq!(names(&folder.path().join("seen")), ["01-feature_lines.png", "02-paint.png"]);
     // Split across the neighbours all the way round: finished, and fitted.
@@ -363,7 +367,10 @@ fn a_script_draws_a_network_on_a_bare_mesh_and_the_history_goes_back_and_forth_i
     script("again.toml", "[[step]]\nedit = \"redo\"\ncount = 2\n");
     let output = planish(&["edit", "plain.planish", "again.toml", "-o", "again.planish"], folder.path());
     assert_eq!(status(&output), 0, "{}", stderr(&output));
-    assert_eq!(fs::read(folder.path().join("box.planish")).unwrap(), fs::read(folder.path().join("again.planish")).unwrap());
+    assert_eq!(
+        fs::read(folder.path().join("box.planish")).unwrap(),
+        fs::read(folder.path().join("again.planish")).unwrap()
+    );
     // Nothing is left to make again.
     let output = planish(&["edit", "again.planish", "again.toml", "-o", "x.planish"], folder.path());
     assert_eq!(status(&output), 3);
@@ -383,7 +390,10 @@ fn a_script_that_cannot_be_told_its_line_and_a_wrong_edit_its_step() {
     };
     assert!(run("[[step]]\nedit = \"paint\"\npicks = 3\n").contains("s.toml"));
     assert!(run("[[step]]\nedit = \"fly\"\n").contains("fly"));
-    assert!(run("[[step]]\nedit = \"split_curve\"\ncurve = 4\nat = 0.5\n").contains("step 1 (split_curve): curve 4 is not there"));
+    assert!(
+        run("[[step]]\nedit = \"split_curve\"\ncurve = 4\nat = 0.5\n")
+            .contains("step 1 (split_curve): curve 4 is not there")
+    );
     let output = planish(&["edit", "box.ply", "s.toml"], folder.path());
     assert_eq!(status(&output), 2);
     assert!(error_line(&output).contains("--output"));

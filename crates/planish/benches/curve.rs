@@ -59,7 +59,10 @@ fn painting(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
     }
     let start = Instant::now();
     let canvas = Canvas::new(mesh);
-    tell(&format!("curve/paint/{name}"), &format!("{} triangles, set-up {:.0} ms", mesh.triangles.len(), milliseconds(start)));
+    tell(
+        &format!("curve/paint/{name}"),
+        &format!("{} triangles, set-up {:.0} ms", mesh.triangles.len(), milliseconds(start)),
+    );
     let pairs = picks(mesh, &canvas.adjacency);
     let field = ScalarField::maximum_curvature(mesh, &canvas.adjacency).smoothed(mesh, &canvas.adjacency, 4);
     let magnet = Magnet::of_scalar(&field);
@@ -86,7 +89,14 @@ fn painting(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
             ),
         );
     }
-    let chains: Vec<_> = pairs.iter().map(|p| canvas.path(mesh.triangles[p[0].face as usize][0], mesh.triangles[p[1].face as usize][0], None).expect("a way")).collect();
+    let chains: Vec<_> = pairs
+        .iter()
+        .map(|p| {
+            canvas
+                .path(mesh.triangles[p[0].face as usize][0], mesh.triangles[p[1].face as usize][0], None)
+                .expect("a way")
+        })
+        .collect();
     let start = Instant::now();
     for (pair, chain) in pairs.iter().zip(&chains) {
         let _ = std::hint::black_box(planish::curve::straighten(mesh, &canvas.adjacency, pair[0], chain, pair[1]));
@@ -97,9 +107,10 @@ fn painting(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
 /// The longest of the geodesics between picks, sampled.
 fn long_curve(canvas: &Canvas, count: usize) -> SurfaceCurve {
     let params = PaintParams { mode: PaintMode::Straight, ..PaintParams::default() };
-    let ways = picks(canvas.mesh, &canvas.adjacency).into_iter().take(20).filter_map(|p| {
-        way(canvas, p[0], p[1], &params, None).ok().map(SurfaceCurve::open)
-    });
+    let ways = picks(canvas.mesh, &canvas.adjacency)
+        .into_iter()
+        .take(20)
+        .filter_map(|p| way(canvas, p[0], p[1], &params, None).ok().map(SurfaceCurve::open));
     let longest = ways.max_by(|a, b| a.length(canvas.mesh).total_cmp(&b.length(canvas.mesh))).expect("a curve");
     longest.resampled(canvas.mesh, &canvas.adjacency, count).expect("a curve")
 }
@@ -147,14 +158,21 @@ fn snakes(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
     }
     let near = 0.1 * canvas.edge;
     let away = |snake: &Snake| {
-        let to_goal = |p: &DVec3| goal.windows(2).map(|w| {
-            let d = w[1] - w[0];
-            let s = ((*p - w[0]).dot(d) / d.length_squared()).clamp(0.0, 1.0);
-            p.distance(w[0] + d * s)
-        }).fold(f64::INFINITY, f64::min);
+        let to_goal = |p: &DVec3| {
+            goal.windows(2)
+                .map(|w| {
+                    let d = w[1] - w[0];
+                    let s = ((*p - w[0]).dot(d) / d.length_squared()).clamp(0.0, 1.0);
+                    p.distance(w[0] + d * s)
+                })
+                .fold(f64::INFINITY, f64::min)
+        };
         snake.positions().iter().step_by(10).map(to_goal).fold(0.0, f64::max)
     };
-    tell(&format!("curve/impulse/{name}"), &format!("{:.1} edges aside, {:.1} points per edge", away(&pulled) / canvas.edge, canvas.edge / rest.spacing()));
+    tell(
+        &format!("curve/impulse/{name}"),
+        &format!("{:.1} edges aside, {:.1} points per edge", away(&pulled) / canvas.edge, canvas.edge / rest.spacing()),
+    );
     for sweep in [Sweep::CoarseToFine, Sweep::Solve, Sweep::Single] {
         let mut snake = pulled.clone();
         let most = if sweep == Sweep::Single { 40_000 } else { 400 };
@@ -169,14 +187,20 @@ fn snakes(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
                 left = away(&snake);
             }
         }
-        let told = format!("{sweeps} sweeps to a tenth of an edge, {:.1} ms, {:.3} edges left", milliseconds(start), away(&snake) / canvas.edge);
+        let told = format!(
+            "{sweeps} sweeps to a tenth of an edge, {:.1} ms, {:.3} edges left",
+            milliseconds(start),
+            away(&snake) / canvas.edge
+        );
         tell(&format!("curve/converge_{sweep:?}/{name}").to_lowercase(), &told);
     }
     // Against the geodesic in the same course, with points a share of an edge apart.
     for pair in picks(mesh, &canvas.adjacency).iter().take(4) {
         let params = PaintParams { mode: PaintMode::Geodesic, ..PaintParams::default() };
         let geodesic = SurfaceCurve::open(way(&canvas, pair[0], pair[1], &params, None).expect("a way"));
-        for (share, curvature) in [(0.5, 0.0), (0.5, 2.0), (0.5, 10.0), (1.0, 0.0), (1.0, 1.0), (1.0, 4.0), (2.0, 0.0), (2.0, 1.0)] {
+        for (share, curvature) in
+            [(0.5, 0.0), (0.5, 2.0), (0.5, 10.0), (1.0, 0.0), (1.0, 1.0), (1.0, 4.0), (2.0, 0.0), (2.0, 1.0)]
+        {
             let rest_params = SnakeParams { curvature, ..rest_params.clone() };
             let even = geodesic.spaced(mesh, &canvas.adjacency, share * canvas.edge).expect("a curve");
             let mut snake = Snake::new(mesh, &canvas.adjacency, &even).expect("a snake");
@@ -205,7 +229,14 @@ fn drags(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
     let canvas = Canvas::new(mesh);
     let curve = long_curve(&canvas, 1000);
     let mut snake = Snake::new(mesh, &canvas.adjacency, &curve).expect("a snake");
-    let params = SnakeParams { fairness: 0.1, curvature: 1.0, sweeps: 6, settle: 0.05, sweep: Sweep::Solve, ..SnakeParams::default() };
+    let params = SnakeParams {
+        fairness: 0.1,
+        curvature: 1.0,
+        sweeps: 6,
+        settle: 0.05,
+        sweep: Sweep::Solve,
+        ..SnakeParams::default()
+    };
     snake.stiffen(&Section { first: 350, count: 300, fairness: 1.0, curvature: 1.0 }).expect("a section");
     let step = 4.0 * snake.spacing();
     let (mut times, mut sweeps) = (Vec::new(), 0);
@@ -221,7 +252,12 @@ fn drags(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
     }
     tell(
         &format!("curve/drag_300/{name}"),
-        &format!("median {:.2} ms, 95 % {:.2} ms, {:.1} sweeps", median(&mut times, 0.5), median(&mut times, 0.95), sweeps as f64 / 40.0),
+        &format!(
+            "median {:.2} ms, 95 % {:.2} ms, {:.1} sweeps",
+            median(&mut times, 0.5),
+            median(&mut times, 0.95),
+            sweeps as f64 / 40.0
+        ),
     );
 }
 

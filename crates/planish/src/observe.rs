@@ -20,3 +20,26 @@ impl Observer for Silent {
         false
     }
 }
+
+/// A part of a stage that is itself a long step: its progress runs over `share` of the stage's, from `start` on.
+pub struct Part<'a> {
+    whole: &'a dyn Observer,
+    start: f64,
+    share: f64,
+}
+
+impl<'a> Part<'a> {
+    /// The part of `whole` from `start` to `start + share`.
+    pub fn new(whole: &'a dyn Observer, start: f64, share: f64) -> Part<'a> {
+        Part { whole, start, share }
+    }
+}
+
+impl Observer for Part<'_> {
+    fn progress(&self, fraction: f64) {
+        self.whole.progress(self.start + self.share * fraction);
+    }
+    fn cancelled(&self) -> bool {
+        self.whole.cancelled()
+    }
+}

@@ -122,10 +122,9 @@ fn run(
         None => draw(&mesh, &params.layout, &mut clock)?,
     };
     let patches = clock.stage("imprint", |_| network::imprint(&mesh, &network), |p| [("patches", p.len())])?;
-    let sizes = grid::choose_sizes(&network, &patches, &params.grid);
     let grids = clock.stage(
         "grids",
-        |o| grid::relax(&mesh, &patches, &sizes, &params.grid, o),
+        |o| grid::resample(&mesh, &network, &patches, &params.grid, o),
         |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;
     let mut model = Model { mesh, network, grids, ..Model::default() };

@@ -4,11 +4,11 @@ mod common;
 
 use planish::curve::symmetry::Plane;
 use planish::curve::{
-    Canvas, CurveError, Magnet, PaintMode, PaintParams, ScalarField, Section, Snake, SnakeParams, SnapTargets, Snap,
+    Canvas, CurveError, Magnet, PaintMode, PaintParams, ScalarField, Section, Snake, SnakeParams, Snap, SnapTargets,
     SplineEdit, Stroke, SurfaceCurve, Sweep, carry, connect, section, snap, way,
 };
 use planish::geom::{Bvh, random};
-use planish::mesh::{Adjacency, FacePoint, TriMesh, sharp_edges, shapes};
+use planish::mesh::{Adjacency, FacePoint, TriMesh, shapes, sharp_edges};
 use planish::{DVec3, Silent};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -76,9 +76,7 @@ fn a_snake_on_a_sphere_of_80_thousand_triangles_comes_to_rest_on_a_great_circle_
 
 #[test]
 fn geodesics_and_snakes_on_a_cylinder_and_a_cone_have_the_length_of_the_unrolled_line_within_a_thousandth() {
-    let cylinder = shapes::sheet(160, 60, true, false, |s, t| {
-        DVec3::new((s * TAU).cos(), (s * TAU).sin(), 3.0 * t)
-    });
+    let cylinder = shapes::sheet(160, 60, true, false, |s, t| DVec3::new((s * TAU).cos(), (s * TAU).sin(), 3.0 * t));
     let on_cylinder = |a: f64, z: f64| DVec3::new(a.cos(), a.sin(), z);
     let (a, b) = ((0.3, 0.4), (2.1, 2.5));
     let straight = f64::hypot(b.0 - a.0, b.1 - a.1);
@@ -141,7 +139,8 @@ fn a_stroke_is_taken_back_pick_by_pick_to_the_same_places() {
     let canvas = Canvas::new(&mesh);
     let params = PaintParams { mode: PaintMode::Geodesic, ..PaintParams::default() };
     let faces = mesh.triangles.len() as u32;
-    let picks: Vec<FacePoint> = (0..5).map(|k| FacePoint { face: (k * 7919 + 11) % faces, bary: [0.3, 0.3, 0.4] }).collect();
+    let picks: Vec<FacePoint> =
+        (0..5).map(|k| FacePoint { face: (k * 7919 + 11) % faces, bary: [0.3, 0.3, 0.4] }).collect();
     let (mut stroke, mut past) = (Stroke::new(), vec![Stroke::new()]);
     for &p in &picks {
         stroke.add(&canvas, p, &params, None).unwrap();
@@ -265,7 +264,12 @@ fn a_stiff_section_is_tangent_continuous_at_its_ends_and_nothing_outside_it_chan
         let mut snake = Snake::new(&mesh, &adjacency, &curve).unwrap();
         snake.edit_section(100, 101).unwrap();
         snake.drag(150, DVec3::Y * 0.05).unwrap();
-        let params = SnakeParams { fairness: (curvature == 0.0) as u8 as f64, curvature, settle: 1e-8, ..SnakeParams::default() };
+        let params = SnakeParams {
+            fairness: (curvature == 0.0) as u8 as f64,
+            curvature,
+            settle: 1e-8,
+            ..SnakeParams::default()
+        };
         snake.relax(&params, &Silent).unwrap();
         let changed = (0..301).filter(|&k| snake.curve().points[k] != curve.points[k]);
         assert!(changed.into_iter().all(|k| (101..=199).contains(&k)));
@@ -357,7 +361,8 @@ fn a_projected_circle_on_a_sphere_keeps_its_distance_from_the_axis_within_a_hund
     let mesh = shapes::sphere(1.0, 5);
     let adjacency = Adjacency::new(&mesh);
     let bvh = Bvh::new(&mesh);
-    let circle: Vec<DVec3> = (0..=60).map(|k| k as f64 / 60.0 * TAU).map(|a| DVec3::new(0.4 * a.cos(), 0.4 * a.sin(), 3.0)).collect();
+    let circle: Vec<DVec3> =
+        (0..=60).map(|k| k as f64 / 60.0 * TAU).map(|a| DVec3::new(0.4 * a.cos(), 0.4 * a.sin(), 3.0)).collect();
     let curve = section::project(&mesh, &adjacency, &bvh, &circle, -DVec3::Z, 0.02).unwrap();
     for p in curve.positions(&mesh) {
         assert!((p.truncate().length() - 0.4).abs() < 0.01 && p.z > 0.0);
@@ -390,8 +395,9 @@ fn curves_of_a_sphere_carried_to_an_ellipsoid_by_8_landmarks_lie_where_the_map_t
     to.points.iter_mut().for_each(|p| *p = stretch(*p));
     let adjacency = Adjacency::new(&to);
     let bvh = Bvh::new(&to);
-    let marks: Vec<DVec3> =
-        (0..8).map(|k| DVec3::new([-1.0, 1.0][k & 1], [-1.0, 1.0][k >> 1 & 1], [-1.0, 1.0][k >> 2]).normalize()).collect();
+    let marks: Vec<DVec3> = (0..8)
+        .map(|k| DVec3::new([-1.0, 1.0][k & 1], [-1.0, 1.0][k >> 1 & 1], [-1.0, 1.0][k >> 2]).normalize())
+        .collect();
     let map = carry::LandmarkMap::new(&marks, &marks.iter().map(|p| stretch(*p)).collect::<Vec<_>>()).unwrap();
     let curve = geodesic(&from, DVec3::new(1.0, 0.2, 0.1), DVec3::new(-0.2, 0.5, 0.9));
     let even = curve.resampled(&from, &Adjacency::new(&from), 60).unwrap();

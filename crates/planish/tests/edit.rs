@@ -34,8 +34,15 @@ fn run(mesh: &TriMesh, start: Drawing, edits: &[&str]) -> Drawing {
 /// A sheet in one patch: its four sides.
 fn one_patch(mesh: &TriMesh) -> Network {
     let b = mesh.bounds();
-    let corner = |x: f64, y: f64| format!("{{\"edit\":\"add_corner\",\"at\":[{},{},0],\"snap\":0}}", b.min.x + x * (b.max.x - b.min.x), b.min.y + y * (b.max.y - b.min.y));
-    let edits = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0), "{\"edit\":\"boundaries\"}".into()];
+    let corner = |x: f64, y: f64| {
+        format!(
+            "{{\"edit\":\"add_corner\",\"at\":[{},{},0],\"snap\":0}}",
+            b.min.x + x * (b.max.x - b.min.x),
+            b.min.y + y * (b.max.y - b.min.y)
+        )
+    };
+    let edits =
+        [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0), "{\"edit\":\"boundaries\"}".into()];
     run(mesh, Drawing::default(), &edits.iter().map(|s| s.as_str()).collect::<Vec<_>>()).network
 }
 
@@ -81,7 +88,10 @@ fn two_planes_cut_a_sphere_into_patches_and_faults_are_told_on_the_way() {
     }
     let tops: Vec<DVec3> = editor.network.corners.iter().map(|c| c.place.position(&mesh)).collect();
     for (k, p) in tops.iter().enumerate().filter(|(_, p)| p.z > 0.0) {
-        let low = (0..tops.len()).filter(|&j| tops[j].z < 0.0).min_by(|&i, &j| tops[i].distance(*p).total_cmp(&tops[j].distance(*p))).unwrap();
+        let low = (0..tops.len())
+            .filter(|&j| tops[j].z < 0.0)
+            .min_by(|&i, &j| tops[i].distance(*p).total_cmp(&tops[j].distance(*p)))
+            .unwrap();
         let ends = [editor.network.corners[k].place, editor.network.corners[low].place];
         let points = planish::curve::connect(&mesh, &adjacency, ends[0], ends[1]).unwrap();
         editor.add_curve(&SurfaceCurve::open(points), CurveKind::Smooth, 1e-9).unwrap();
@@ -134,7 +144,11 @@ fn split_and_join_give_the_curve_back_and_deleting_takes_its_free_corners() {
     assert!(matches!(editor.delete_curve(999), Err(EditError::NoSuchPart { what: "curve", index: 999, .. })));
     // The two patches beside it are one region of six sides now.
     let found = editor.diagnose();
-    assert!(found.faults.iter().any(|f| matches!(f, Fault::NotFourSided { sides, .. } if sides.len() == 6)), "{:?}", found.faults);
+    assert!(
+        found.faults.iter().any(|f| matches!(f, Fault::NotFourSided { sides, .. } if sides.len() == 6)),
+        "{:?}",
+        found.faults
+    );
 }
 
 #[test]
@@ -171,7 +185,8 @@ fn regions_of_3_5_and_6_sides_are_split_into_four_sided_patches_and_neighbours_f
     let bvh = Bvh::new(&mesh);
     // An octahedron: eight regions of three sides.
     let mut editor = Editor::new(&mesh, &adjacency, Network::default());
-    let tips = [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z].map(|p| p + DVec3::new(0.011, 0.017, 0.013));
+    let tips =
+        [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z].map(|p| p + DVec3::new(0.011, 0.017, 0.013));
     for p in tips {
         editor.add_corner(near(&bvh, p), 0.0).unwrap();
     }
@@ -234,9 +249,8 @@ fn the_rest_of_a_network_is_completed_around_curves_that_stay_within_a_millionth
 
 /// A patch with a bump, and curves across it: `u` and `v` of each family.
 fn bumpy(u: usize, v: usize) -> (TriMesh, Network, Vec<FeatureCurve>) {
-    let at = |s: f64, t: f64| {
-        DVec3::new(2.0 * s, t, 0.3 * (-(9.0 * (s - 0.5).powi(2) + 12.0 * (t - 0.5).powi(2))).exp())
-    };
+    let at =
+        |s: f64, t: f64| DVec3::new(2.0 * s, t, 0.3 * (-(9.0 * (s - 0.5).powi(2) + 12.0 * (t - 0.5).powi(2))).exp());
     let mesh = shapes::sheet(60, 50, false, false, at);
     let on_sheet = at;
     let network = one_patch(&mesh);
@@ -260,11 +274,15 @@ fn bumpy(u: usize, v: usize) -> (TriMesh, Network, Vec<FeatureCurve>) {
 }
 
 fn distance_to(curve: &[DVec3], p: DVec3) -> f64 {
-    curve.windows(2).map(|w| {
-        let d = w[1] - w[0];
-        let s = if d.length_squared() > 0.0 { ((p - w[0]).dot(d) / d.length_squared()).clamp(0.0, 1.0) } else { 0.0 };
-        p.distance(w[0] + d * s)
-    }).fold(f64::INFINITY, f64::min)
+    curve
+        .windows(2)
+        .map(|w| {
+            let d = w[1] - w[0];
+            let s =
+                if d.length_squared() > 0.0 { ((p - w[0]).dot(d) / d.length_squared()).clamp(0.0, 1.0) } else { 0.0 };
+            p.distance(w[0] + d * s)
+        })
+        .fold(f64::INFINITY, f64::min)
 }
 
 #[test]
@@ -272,8 +290,16 @@ fn grids_follow_1_to_4_feature_curves_of_both_families_exactly_without_a_fold() 
     for (u, v) in [(1, 0), (0, 1), (1, 1), (2, 2), (3, 2), (4, 4)] {
         let (mesh, network, features) = bumpy(u, v);
         let patches = imprint(&mesh, &network).unwrap();
-        let made = relax_with_features(&mesh, &patches[0], &features, (81, 61), &Sections::default(), &GridParams::default(), &Silent)
-            .unwrap_or_else(|e| panic!("{u} {v}: {e}"));
+        let made = relax_with_features(
+            &mesh,
+            &patches[0],
+            &features,
+            (81, 61),
+            &Sections::default(),
+            &GridParams::default(),
+            &Silent,
+        )
+        .unwrap_or_else(|e| panic!("{u} {v}: {e}"));
         let grid = &made.grid;
         assert_eq!((grid.cols, grid.rows, made.anchors.len()), (81, 61, u * v));
         for (k, feature) in features.iter().enumerate() {
@@ -325,10 +351,14 @@ fn a_section_is_refined_alone_and_curves_of_one_family_that_cross_are_refused_wi
             assert_eq!(coarse.grid.points[j * 31 + 20 + i], fine.grid.points[j * 51 + 40 + i], "last section");
         }
     }
-    assert!(matches!(run(&features, &Sections { u: vec![10, 10], v: vec![] }), Err(FeatureError::SectionCount { needed: 3, .. })));
+    assert!(matches!(
+        run(&features, &Sections { u: vec![10, 10], v: vec![] }),
+        Err(FeatureError::SectionCount { needed: 3, .. })
+    ));
     // The second v curve leant over the first.
     let bvh = Bvh::new(&mesh);
-    features[1].points = (1..40).map(|i| i as f64 / 40.0).map(|t| near(&bvh, DVec3::new(1.5 - 1.1 * t, t, 0.2))).collect();
+    features[1].points =
+        (1..40).map(|i| i as f64 / 40.0).map(|t| near(&bvh, DVec3::new(1.5 - 1.1 * t, t, 0.2))).collect();
     let told = run(&features, &Sections::default()).unwrap_err();
     let FeatureError::Cross { a, b, place } = told else { panic!("{told}") };
     assert!((a, b) == (0, 1) && place.distance(near(&bvh, place).position(&mesh)) < 1e-9, "{place}");
@@ -370,7 +400,9 @@ fn patches_beside_a_feature_curve_share_its_nodes_and_the_model_has_no_gaps() {
     for (c, list) in uses.iter().enumerate() {
         let [(a, i), (b, j)] = list[..] else { panic!("curve {c}") };
         let mut other = side(b, j);
-        if model.network.patches[a as usize].sides[i as usize].reversed != model.network.patches[b as usize].sides[j as usize].reversed {
+        if model.network.patches[a as usize].sides[i as usize].reversed
+            != model.network.patches[b as usize].sides[j as usize].reversed
+        {
             other.reverse();
         }
         assert_eq!(side(a, i), other, "curve {c}");
@@ -388,13 +420,17 @@ fn patches_beside_a_feature_curve_share_its_nodes_and_the_model_has_no_gaps() {
 fn a_half_drawn_network_is_mirrored_across_the_plane_of_symmetry() {
     let mesh = shapes::sphere(1.0, 4);
     // A cap on one side, joined to the plane x = 0 by two curves.
-    let drawing = run(&mesh, Drawing::default(), &[
-        r#"{"edit":"symmetry","plane":{"point":[0,0,0],"normal":[1,0,0]}}"#,
-        r#"{"edit":"paint","picks":[[0.7,0.5,0.1],[0.7,-0.5,0.1]],"mode":"geodesic","snap":0}"#,
-        r#"{"edit":"paint","picks":[{"corner":0},[0,0.9,0.4]],"mode":"geodesic","snap":0.001}"#,
-        r#"{"edit":"paint","picks":[{"corner":1},[0,-0.9,0.4]],"mode":"geodesic","snap":0.001}"#,
-        r#"{"edit":"mirror"}"#,
-    ]);
+    let drawing = run(
+        &mesh,
+        Drawing::default(),
+        &[
+            r#"{"edit":"symmetry","plane":{"point":[0,0,0],"normal":[1,0,0]}}"#,
+            r#"{"edit":"paint","picks":[[0.7,0.5,0.1],[0.7,-0.5,0.1]],"mode":"geodesic","snap":0}"#,
+            r#"{"edit":"paint","picks":[{"corner":0},[0,0.9,0.4]],"mode":"geodesic","snap":0.001}"#,
+            r#"{"edit":"paint","picks":[{"corner":1},[0,-0.9,0.4]],"mode":"geodesic","snap":0.001}"#,
+            r#"{"edit":"mirror"}"#,
+        ],
+    );
     let network = &drawing.network;
     assert_eq!((network.curves.len(), network.corners.len()), (6, 6));
     let positions: Vec<DVec3> = network.corners.iter().map(|c| c.place.position(&mesh)).collect();

@@ -186,7 +186,9 @@ fn told(script: &Path, k: usize, edit: &Edit, wrong: Wrong) -> Failure {
     let name = edit.name();
     match wrong {
         Wrong::Apply(ApplyError::Cancelled) => Failure::interrupted(),
-        Wrong::Apply(e) => Failure::input(script, format!("step {} ({name}): {}", k + 1, super::with_hint(&e.to_string()))),
+        Wrong::Apply(e) => {
+            Failure::input(script, format!("step {} ({name}): {}", k + 1, super::with_hint(&e.to_string())))
+        }
         Wrong::Nothing(what) => {
             Failure::input(script, format!("step {} ({name}): {what}", k + 1)).hint("ask for fewer")
         }

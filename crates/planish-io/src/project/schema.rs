@@ -245,7 +245,12 @@ fn read_network(connection: &Connection, arrays: &mut Loaded, face_count: usize)
 }
 
 /// Places on the mesh out of their arrays.
-pub(super) fn places(arrays: &mut Loaded, faces: i64, weights: i64, count: usize) -> Result<Vec<FacePoint>, ProjectError> {
+pub(super) fn places(
+    arrays: &mut Loaded,
+    faces: i64,
+    weights: i64,
+    count: usize,
+) -> Result<Vec<FacePoint>, ProjectError> {
     let (f, w) = (arrays.u32(faces)?, arrays.f64(weights)?);
     if w.len() != 3 * f.len() || f.iter().any(|&f| f as usize >= count) || !w.iter().all(|w| w.is_finite()) {
         return Err(damaged("the places are not on the mesh".into(), "array", faces));

@@ -142,9 +142,8 @@ fn drawing(drawn: Drawn, chains: &[Vec<FacePoint>], faces: usize) -> Result<Draw
 
 /// Tells what is wrong with a sketch on a mesh of `faces` triangles.
 pub(super) fn check_sketch(sketch: &Sketch, faces: usize) -> Result<(), String> {
-    let wrong = |f: &FeatureCurve| {
-        f.points.iter().any(|p| p.face as usize >= faces || !p.bary.iter().all(|b| b.is_finite()))
-    };
+    let wrong =
+        |f: &FeatureCurve| f.points.iter().any(|p| p.face as usize >= faces || !p.bary.iter().all(|b| b.is_finite()));
     match sketch.features.iter().position(wrong) {
         Some(k) => Err(format!("feature curve {k} is not on the mesh")),
         None => Ok(()),

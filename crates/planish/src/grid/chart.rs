@@ -239,6 +239,12 @@ impl Chart {
         a * spot.bary[0] + b * spot.bary[1] + c * spot.bary[2]
     }
 
+    /// Unit normal of the surface at a spot; zero on a degenerate triangle.
+    pub fn normal(&self, spot: super::locate::Spot) -> DVec3 {
+        let [a, b, c] = self.triangles[spot.triangle as usize].map(|v| self.points[v as usize]);
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+
     /// A spot as a place on the input mesh.
     pub fn place(&self, spot: super::locate::Spot) -> FacePoint {
         let (face, corners) = self.frames[spot.triangle as usize];

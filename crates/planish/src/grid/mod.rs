@@ -4,12 +4,14 @@
 //! 1. sides resampled by arc length      - §5.4, [`side`]
 //! 2. start grid                         - §5.4, [`chart`]: a convex map of the patch to the unit square
 //! 3. relax, subdivide, relax            - §5.5 and 5.6, [`springs`]
-//! 4. number of points along every side  - §5.6, [`sizes`]
+//! 4. points moved onto missed detail      - beyond the paper, [`catch`]
+//! 5. number of points along every side  - §5.6, [`sizes`], and more where detail is missed, [`resample`]
 //!
 //! Departs from [K98]: the start is a convex map instead of crossings of shortest paths (those cross twice or run
 //! along a side on curved patches and fold the grid), and points move in that chart, where every step can be
 //! checked exactly for folds, instead of walking over the triangles.
 
+mod catch;
 mod chart;
 mod even;
 mod feature_curve;
@@ -18,6 +20,7 @@ mod fold;
 mod locate;
 mod net;
 mod quality;
+mod resample;
 mod settle;
 mod side;
 mod sizes;
@@ -27,6 +30,7 @@ mod walk;
 pub use feature_curve::{Family, FeatureCurve, FeatureError, FeatureGrid, Sections, relax_with_features};
 pub use feature_network::relax_network;
 pub use quality::{GridQuality, measure};
+pub use resample::resample;
 pub use sizes::choose_sizes;
 
 use crate::mesh::{FacePoint, TriMesh};
@@ -59,10 +63,12 @@ pub struct Grid {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GridParams {
-    /// Grid points per vertex of the patches, over the whole network. With the default the grids of a dense scan
-    /// stay within 0.2 % of the diagonal of its vertices, 0.01 % in the mean.
+    /// Grid points per vertex of the patches, over the whole network, to begin with.
     #[schemars(range(min = 0.01, max = 100.0), extend("unit" = "points per vertex"))]
     pub density: f64,
+    /// Grids that leave a vertex of the mesh further off than this are made finer, up to eight times.
+    #[schemars(range(min = 1e-6, max = 1.0), extend("unit" = "diagonal"))]
+    pub miss: f64,
     /// Least number of points along a side.
     #[schemars(range(min = 4, max = 1025))]
     pub min_side: usize,
@@ -85,7 +91,8 @@ pub struct GridParams {
 impl Default for GridParams {
     fn default() -> GridParams {
         GridParams {
-            density: 1.5,
+            density: 2.0,
+            miss: 1.5e-3,
             min_side: 17,
             max_side: 1025,
             max_points: 8_000_000,
@@ -201,22 +208,46 @@ fn relax_at(
     if patches.len() != sizes.len() {
         return Err(GridError::SizeCount { patches: patches.len(), sizes: sizes.len() });
     }
+<<<<<<< HEAD
     let none = SideStops::default();
     let total: usize = patches.iter().map(|p| p.mesh.triangles.len()).sum::<usize>().max(1);
+=======
+    let jobs: Vec<Job> = patches.iter().zip(sizes).enumerate().map(|(k, (patch, &size))| (k, patch, size)).collect();
+    relax_jobs(input, &jobs, params, observer)
+}
+
+/// Vertices that are missed by more than this part of what is allowed are caught.
+const CAUGHT: f64 = 0.3;
+
+/// Index of a patch, the patch, and the size of its grid.
+type Job<'a> = (usize, &'a PatchMesh, (usize, usize));
+
+fn relax_jobs(
+    input: &TriMesh,
+    jobs: &[Job],
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<Vec<Grid>, GridError> {
+    let caught = CAUGHT * params.miss * input.bounds().diagonal();
+    let total: usize = jobs.iter().map(|j| j.1.mesh.triangles.len()).sum::<usize>().max(1);
+>>>>>>> main
     let done = AtomicUsize::new(0);
-    let results: Vec<Result<Grid, GridError>> = (patches, sizes)
-        .into_par_iter()
-        .enumerate()
+    let results: Vec<Result<Grid, GridError>> = jobs
+        .par_iter()
         .with_max_len(1)
-        .map(|(k, (patch, &(cols, rows)))| {
+        .map(|&(k, patch, (cols, rows))| {
             if observer.cancelled() {
                 return Err(GridError::Cancelled);
             }
             if cols < 2 || rows < 2 {
                 return Err(GridError::TooSmall { patch: k, cols, rows });
             }
+<<<<<<< HEAD
             let stops = stops.get(k).unwrap_or(&none);
             let grid = relax_patch(input, patch, cols, rows, stops, params, observer).map_err(|f| f.of_patch(k))?;
+=======
+            let grid = relax_patch(input, patch, cols, rows, params, caught, observer).map_err(|f| f.of_patch(k))?;
+>>>>>>> main
             let size = patch.mesh.triangles.len();
             observer.progress((done.fetch_add(size, Ordering::Relaxed) + size) as f64 / total as f64);
             Ok(grid)
@@ -242,11 +273,17 @@ fn relax_patch(
     rows: usize,
     stops: &SideStops,
     params: &GridParams,
+    caught: f64,
     observer: &dyn Observer,
 ) -> Result<Grid, Fault> {
     let cancelled = || observer.cancelled();
+<<<<<<< HEAD
     let chart = chart::flatten(input, patch, stops, [cols, rows], &cancelled)?;
     let spots = springs::relax(&chart, cols, rows, params, &cancelled)?;
+=======
+    let chart = chart::flatten(input, patch, &cancelled)?;
+    let spots = springs::relax(&chart, cols, rows, params, caught, &cancelled)?;
+>>>>>>> main
     let mut grid = Grid {
         rows,
         cols,

@@ -1,13 +1,14 @@
 //! How good a grid is.
 
 use super::Grid;
-use super::fold::folded_cells;
+use super::fold::Sheet;
 use crate::geom::{Aabb, Bvh};
 use crate::mesh::TriMesh;
 use crate::network::PatchMesh;
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Measures of one grid, see [`measure`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -31,10 +32,10 @@ pub struct GridQuality {
 /// Measures `grid` against its `patch`.
 ///
 /// The grid's surface has two triangles per cell, divided along the shorter diagonal. A cell counts as a fold if one
-/// of its corner triangles points against the mean normal of the cells up to two away (but not the one at a corner
-/// of the patch, whose angle is given): rough relief tilts single cells, only a fold turns a corner right over. That
-/// the grid is one-to-one on the patch is a matter of construction: every cell is convex in the chart, by exact
-/// predicates.
+/// of its corner triangles points against the mean normal of the cells up to two away and against that of the patch at
+/// its corners (but not the triangle at a corner of the patch, whose angle is given): rough relief tilts single cells,
+/// only a fold turns a corner right over. That the grid is one-to-one on the patch is a matter of construction: every
+/// cell is convex in the chart, by exact predicates.
 pub fn measure(grid: &Grid, patch: &PatchMesh) -> GridQuality {
     let (rows, cols) = (grid.rows, grid.cols);
     let at = |i: usize, j: usize| grid.points[j * cols + i];
@@ -53,15 +54,23 @@ pub fn measure(grid: &Grid, patch: &PatchMesh) -> GridQuality {
         }
     }
     angles.sort_by(f64::total_cmp);
+    // Pieces of one face lie in its plane: any of them has its normal.
+    let mut normals: BTreeMap<u32, DVec3> = BTreeMap::new();
+    for (f, &face) in patch.face_origin.iter().enumerate() {
+        *normals.entry(face).or_default() += patch.mesh.area_vector(f);
+    }
+    let normal = |k: usize| normals.get(&grid.places[k].face).map_or(DVec3::ZERO, |n| n.normalize_or_zero());
+    let sheet = Sheet { points: &grid.points, normal: &normal, cols, rows };
     let (miss_max, miss_rms) = miss(grid, patch);
+    let diagonal = Aabb::of(&patch.mesh.points).diagonal().max(f64::MIN_POSITIVE);
     GridQuality {
-        folds: folded_cells(&grid.points, cols, rows).len(),
+        folds: sheet.folded_cells().len(),
         spacing_cv: variations.iter().sum::<f64>() / variations.len() as f64,
         spacing_cv_worst: variations.iter().copied().fold(0.0, f64::max),
         angle_p95_deg: angles[(angles.len() * 95 / 100).min(angles.len() - 1)],
         area_cv: variation(areas.into_iter()),
-        miss_max,
-        miss_rms,
+        miss_max: miss_max / diagonal,
+        miss_rms: miss_rms / diagonal,
     }
 }
 
@@ -78,15 +87,14 @@ fn variation(values: impl Iterator<Item = f64> + Clone) -> f64 {
     if mean > 0.0 { (square / count).sqrt() / mean } else { 0.0 }
 }
 
-/// Greatest and root mean square distance of the patch's vertices from the grid's surface, over the diagonal.
-fn miss(grid: &Grid, patch: &PatchMesh) -> (f64, f64) {
-    let cols = grid.cols as u32;
-    let mut triangles = Vec::with_capacity(2 * grid.points.len());
-    for j in 0..grid.rows as u32 - 1 {
-        for i in 0..cols - 1 {
-            let a = j * cols + i;
-            let [p, q, r, s] = [a, a + 1, a + 1 + cols, a + cols];
-            let at = |k: u32| grid.points[k as usize];
+/// The grid's surface: two triangles per cell, in the order of the cells, divided along the shorter diagonal.
+pub fn surface(points: &[DVec3], cols: usize, rows: usize) -> TriMesh {
+    let (stride, mut triangles) = (cols as u32, Vec::with_capacity(2 * points.len()));
+    for j in 0..rows as u32 - 1 {
+        for i in 0..stride - 1 {
+            let a = j * stride + i;
+            let [p, q, r, s] = [a, a + 1, a + 1 + stride, a + stride];
+            let at = |k: u32| points[k as usize];
             if at(p).distance_squared(at(r)) <= at(q).distance_squared(at(s)) {
                 triangles.extend([[p, q, r], [p, r, s]]);
             } else {
@@ -94,11 +102,15 @@ fn miss(grid: &Grid, patch: &PatchMesh) -> (f64, f64) {
             }
         }
     }
-    let surface = Bvh::new(&TriMesh::new(grid.points.clone(), triangles));
+    TriMesh::new(points.to_vec(), triangles)
+}
+
+/// Greatest and root mean square distance of the patch's vertices from the grid's surface.
+pub fn miss(grid: &Grid, patch: &PatchMesh) -> (f64, f64) {
+    let surface = Bvh::new(&surface(&grid.points, grid.cols, grid.rows));
     let points = &patch.mesh.points;
     let distances: Vec<f64> = points.par_iter().map(|&p| surface.closest(p).distance).collect();
-    let diagonal = Aabb::of(points).diagonal().max(f64::MIN_POSITIVE);
     let square: f64 = distances.iter().map(|d| d * d).sum();
     let greatest = distances.iter().copied().fold(0.0, f64::max);
-    (greatest / diagonal, (square / distances.len().max(1) as f64).sqrt() / diagonal)
+    (greatest, (square / distances.len().max(1) as f64).sqrt())
 }

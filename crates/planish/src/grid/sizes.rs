@@ -37,7 +37,7 @@ pub fn choose_sizes(network: &Network, patches: &[PatchMesh], params: &GridParam
     }
     let wanted: Vec<f64> =
         sums.iter().map(|&(s, n)| if n > 0.0 { (s / n).powf(1.0 / CHORD_POWER) } else { 0.0 }).collect();
-    let (least, most) = (params.min_side.max(2), params.max_side.max(params.min_side).max(2));
+    let [least, most] = bounds(params);
     let sizes = |scale: f64| -> Vec<(usize, usize)> {
         let count =
             |curve: u32| ((wanted[chords[curve as usize] as usize] * scale).round() as usize).clamp(least, most);
@@ -54,7 +54,12 @@ pub fn choose_sizes(network: &Network, patches: &[PatchMesh], params: &GridParam
     best
 }
 
+/// Least and greatest number of points along a side.
+pub fn bounds(params: &GridParams) -> [usize; 2] {
+    [params.min_side.max(2), params.max_side.max(params.min_side).max(2)]
+}
+
 /// Points of all grids together.
-fn total(sizes: &[(usize, usize)]) -> usize {
+pub fn total(sizes: &[(usize, usize)]) -> usize {
     sizes.iter().map(|(c, r)| c * r).sum()
 }

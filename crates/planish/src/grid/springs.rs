@@ -4,6 +4,7 @@
 //! holds it in a small spot, so the coarsest grid is first drawn into such parts by [`even`], which measures along
 //! the curves and not between their points. Then [`settle`] balances spacing against angles at every resolution.
 
+use super::catch::catch;
 use super::chart::Chart;
 use super::even::{even, unevenness};
 use super::fold::{folded_cells, open_folds};
@@ -27,12 +28,14 @@ const EVEN_ROUNDS: [usize; 3] = [12, 3, 0];
 const FOLD_COST: f64 = 5.0;
 const GOOD_SCORE: f64 = 0.0625;
 
-/// The spots of `cols x rows` grid points in `chart`, row-major.
+/// The spots of `cols x rows` grid points in `chart`, row-major; vertices that they miss by more than `caught` (world
+/// units) are caught.
 pub fn relax(
     chart: &Chart,
     cols: usize,
     rows: usize,
     params: &GridParams,
+    caught: f64,
     cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Spot>, Fault> {
     let mut levels = vec![(cols, rows)];
@@ -49,6 +52,7 @@ pub fn relax(
         net = settle(net, LATER_ROUNDS[k.min(LATER_ROUNDS.len() - 1)], params, cancelled)?;
     }
     open_folds(&mut net, cancelled)?;
+    catch(&mut net, caught, cancelled)?;
     Ok(net.spots)
 }
 
@@ -66,7 +70,7 @@ fn coarsest<'a>(
         let mut net = even(Net::regular(chart, cols, rows), rounds, cancelled)?;
         net = settle(net, FIRST_ROUNDS, params, cancelled)?;
         open_folds(&mut net, cancelled)?;
-        let folded = folded_cells(&net.points, cols, rows).len() as f64 / (net.points.len() as f64);
+        let folded = folded_cells(&net).len() as f64 / (net.points.len() as f64);
         let score = unevenness(&net) + FOLD_COST * folded;
         if best.as_ref().is_none_or(|(b, _)| score < *b) {
             best = Some((score, net));
@@ -90,7 +94,7 @@ mod tests {
         let bump = |s: f64, t: f64| (-30.0 * ((s - 0.6).powi(2) + (t - 0.45).powi(2))).exp();
         let chart = chart(|s, t| DVec3::new(s, t, 1.5 * bump(s, t)));
         for (cols, rows) in [(9, 9), (40, 71), (130, 100)] {
-            let spots = relax(&chart, cols, rows, &GridParams::default(), &|| false).expect("a grid");
+            let spots = relax(&chart, cols, rows, &GridParams::default(), 1e-3, &|| false).expect("a grid");
             let uv: Vec<_> = spots.iter().map(|&s| chart.uv_of(s)).collect();
             let turned = (0..(cols - 1) * (rows - 1)).filter(|&c| turns_over(&uv, cols, c)).count();
             assert_eq!(turned, 0, "{cols} x {rows}");

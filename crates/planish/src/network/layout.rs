@@ -141,9 +141,7 @@ pub(super) fn layout_around(
                 let work_sharp = carry(&work, &work_adjacency, &sharp);
                 let ground = partition::Ground::new(&work.mesh, &work_adjacency, &work_sharp);
                 let tips = tips::tips(&ground, side);
-                if std::env::var("DBGI").is_ok() { eprintln!("tips {}", tips.len()); }
                 tips::plant(&mut bench, &tips, patches);
-                if std::env::var("DBGI").is_ok() { eprintln!("planted {}", bench.complex.nodes.iter().filter(|n| n.stays).count()); }
                 improve::relax(&mut bench, 1, observer)?;
                 improve::improve(&mut bench, patches, observer)?;
                 improve::relax(&mut bench, params.smoothing, observer)?;

@@ -56,7 +56,8 @@ impl<'a> Scale<'a> {
         let mut fill = Fill::new(self, change, &around)?;
         let mut best: Option<Gain> = None;
         for (lines, spokes) in fill.fillings(change) {
-            let as_it_is = lines.is_empty() && !spokes.is_empty() && spokes == change.spokes && change.pin == pin_before;
+            let as_it_is =
+                lines.is_empty() && !spokes.is_empty() && spokes == change.spokes && change.pin == pin_before;
             if let Some(cost) = fill.cost(&lines, &spokes).filter(|_| !as_it_is) {
                 let gain = before - cost;
                 if best.as_ref().is_none_or(|b| gain > b.0) {

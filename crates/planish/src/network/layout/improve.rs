@@ -81,8 +81,7 @@ pub(super) fn improve(bench: &mut Bench, patches: usize, observer: &dyn Observer
             }
         }
         let before = bench.complex.nodes.len() as u32;
-        let made = bench.apply(&chosen);
-        if std::env::var("DBGI").is_ok() { eprintln!("round {round} chosen {} made {made} cells {}", chosen.len(), bench.complex.live_cells().count()); }
+        bench.apply(&chosen);
         nodes.extend(before..bench.complex.nodes.len() as u32);
         nodes.sort_unstable();
         nodes.dedup();

@@ -21,8 +21,9 @@ const SLENDER: f64 = 0.55;
 /// The outer part of the disc that is its rim.
 const RIM: f64 = 0.8;
 
-/// Candidates lie this far apart, and tips too, in radii.
-const APART: f64 = 0.3;
+/// Candidates lie this far apart, in radii, and tips that far: a blunt end has one.
+const CANDIDATES_APART: f64 = 0.3;
+const TIPS_APART: f64 = 0.8;
 
 /// Steps of climbing; two reach the end of any limb within the disc.
 const CLIMBS: usize = 3;
@@ -96,13 +97,15 @@ pub(super) fn tips(ground: &Ground, side: f64) -> Vec<u32> {
         for v in 0..covered.len() as u32 {
             if !covered[v as usize] {
                 starts.push(v);
-                disc(ground, &[v], APART * radius, None).into_iter().for_each(|(w, _)| covered[w as usize] = true);
+                disc(ground, &[v], CANDIDATES_APART * radius, None)
+                    .into_iter()
+                    .for_each(|(w, _)| covered[w as usize] = true);
             }
         }
         let mut found: Vec<(f64, u32)> = starts.into_par_iter().filter_map(|v| climb(ground, v, radius)).collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (_, v) in found {
-            if !disc(ground, &[v], APART * radius, None).iter().any(|(w, _)| tips.contains(w)) {
+            if !disc(ground, &[v], TIPS_APART * radius, None).iter().any(|(w, _)| tips.contains(w)) {
                 tips.push(v);
             }
         }

@@ -1,0 +1,81 @@
+//! Catching detail: a settled grid runs evenly over ridges and tips and cuts them off; where a vertex of the patch is
+//! missed, the nearest free point of the grid moves onto it, if no cell turns over.
+//!
+//! Goes beyond [K98], whose grids catch a ridge only by being finer.
+
+use super::Fault;
+use super::chart::Chart;
+use super::fold::{place, turns_around, worst_corner};
+use super::locate::Spot;
+use super::net::{Net, cell_corners};
+use super::quality::surface;
+use crate::geom::Bvh;
+use rayon::prelude::*;
+
+/// Sweeps over the missed vertices; each sees the points that the one before moved.
+const SWEEPS: usize = 3;
+
+/// Least sine of the corners of cells around a moved point, unless they were worse before.
+const LEAST_SINE: f64 = 0.15;
+
+/// Moves points of `net` onto vertices of its chart that lie further than `allowed` from the grid's surface.
+pub fn catch(net: &mut Net, allowed: f64, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<(), Fault> {
+    let spots = vertex_spots(net.chart);
+    let mut moved = vec![false; net.points.len()];
+    for _ in 0..SWEEPS {
+        if cancelled() {
+            return Err(Fault::Cancelled);
+        }
+        let bvh = Bvh::new(&surface(&net.points, net.cols, net.rows));
+        let points = &net.chart.points;
+        let mut missed: Vec<(f64, usize, usize)> = (0..points.len())
+            .into_par_iter()
+            .map(|v| {
+                let hit = bvh.closest(points[v]);
+                (hit.distance, v, hit.place.face as usize / 2)
+            })
+            .filter(|m| m.0 > allowed)
+            .collect();
+        missed.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut any = false;
+        for (_, v, cell) in missed {
+            let mut corners = cell_corners(net.cols, cell).map(|k| (net.points[k].distance(points[v]), k));
+            corners.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for (_, k) in corners {
+                if net.is_inner(k) && !moved[k] && put(net, k, spots[v]) {
+                    moved[k] = true;
+                    any = true;
+                    break;
+                }
+            }
+        }
+        if !any {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// A spot for every vertex of the chart.
+fn vertex_spots(chart: &Chart) -> Vec<Spot> {
+    let mut spots = vec![Spot { triangle: 0, bary: [1.0, 0.0, 0.0] }; chart.points.len()];
+    for (t, triangle) in chart.triangles.iter().enumerate() {
+        for (k, &v) in triangle.iter().enumerate() {
+            let mut bary = [0.0; 3];
+            bary[k] = 1.0;
+            spots[v as usize] = Spot { triangle: t as u32, bary };
+        }
+    }
+    spots
+}
+
+/// Moves point `k` to `spot` unless a cell turns over or gets much worse. True if it moved.
+fn put(net: &mut Net, k: usize, spot: Spot) -> bool {
+    let before = worst_corner(net, k);
+    let kept = place(net, k, spot);
+    let bad = turns_around(net, k) || worst_corner(net, k) < before.min(LEAST_SINE);
+    if bad {
+        place(net, k, kept);
+    }
+    !bad
+}

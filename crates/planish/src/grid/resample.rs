@@ -1,0 +1,112 @@
+//! Grids of a whole network: sizes chosen, patches relaxed, and grids that miss detail made finer.
+
+use super::quality::miss;
+use super::sizes::{bounds, total};
+use super::{Grid, GridError, GridParams, Job, choose_sizes, relax, relax_jobs};
+use crate::mesh::TriMesh;
+use crate::network::{Network, PatchMesh};
+use crate::observe::{Observer, Part};
+use rayon::prelude::*;
+
+/// Rounds of refinement; each may double a side.
+const ROUNDS: usize = 3;
+
+/// Least and greatest factor by which a side gets more points in a round. A grid misses a smooth bump by the square
+/// of its spacing, so the root of what is too much tells how much finer it must be.
+const FACTOR: [f64; 2] = [1.25, 2.0];
+
+/// Refinement may multiply the number of points by this ...
+const GROWTH: f64 = 3.0;
+/// ... and where it would do more, a miss must be this much greater to count, as often as needed.
+const LESS: f64 = 1.4;
+
+/// Both directions are refined if the greater bend is less than this part from the other.
+const EVEN_BEND: f64 = 0.7;
+
+/// Share of the first round in the time of all.
+const FIRST_SHARE: f64 = 0.6;
+
+/// Resamples every patch of `network`, with sides as [`choose_sizes`] gives them and more where a grid misses its
+/// patch by more than `params.miss` of the diagonal of `input`, up to `params.max_side` and `params.max_points`.
+///
+/// Where a grid still misses more after a few rounds, it is what is reached: [`super::measure`] tells.
+/// # Errors
+/// As [`relax`].
+pub fn resample(
+    input: &TriMesh,
+    network: &Network,
+    patches: &[PatchMesh],
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<Vec<Grid>, GridError> {
+    let mut sizes = choose_sizes(network, patches, params);
+    let mut grids = relax(input, patches, &sizes, params, &Part::new(observer, 0.0, FIRST_SHARE))?;
+    let allowed = params.miss * input.bounds().diagonal();
+    let chords = network.chords();
+    let [_, most] = bounds(params);
+    let budget = ((GROWTH * total(&sizes) as f64) as usize).min(params.max_points);
+    let mut suspects: Vec<usize> = (0..patches.len()).collect();
+    for round in 0..ROUNDS {
+        if observer.cancelled() {
+            return Err(GridError::Cancelled);
+        }
+        let misses: Vec<f64> = suspects.par_iter().map(|&p| miss(&grids[p], &patches[p]).0).collect();
+        // Long chords carry one patch's need far: where that asks for too many points, only the worst are heeded.
+        let (mut limit, mut wanted) = (allowed, finer(network, &chords, &grids, &suspects, &misses, allowed, most));
+        while total(&wanted) > budget && wanted != sizes {
+            limit *= LESS;
+            wanted = finer(network, &chords, &grids, &suspects, &misses, limit, most);
+        }
+        suspects = (0..patches.len()).filter(|&p| wanted[p] != sizes[p]).collect();
+        if suspects.is_empty() {
+            break;
+        }
+        let jobs: Vec<Job> = suspects.iter().map(|&p| (p, &patches[p], wanted[p])).collect();
+        let share = (1.0 - FIRST_SHARE) / ROUNDS as f64;
+        let part = Part::new(observer, FIRST_SHARE + share * round as f64, share);
+        for (&p, grid) in suspects.iter().zip(relax_jobs(input, &jobs, params, &part)?) {
+            grids[p] = grid;
+        }
+        sizes = wanted;
+    }
+    Ok(grids)
+}
+
+/// Sizes with more points along the chords of patches that miss more than `limit`.
+fn finer(
+    network: &Network,
+    chords: &[u32],
+    grids: &[Grid],
+    suspects: &[usize],
+    misses: &[f64],
+    limit: f64,
+    most: usize,
+) -> Vec<(usize, usize)> {
+    let mut factor = vec![1.0f64; chords.len()];
+    for (&p, &miss) in suspects.iter().zip(misses).filter(|(_, miss)| **miss > limit) {
+        for (side, coarse) in network.patches[p].sides.iter().zip(coarse(&grids[p])) {
+            let f = &mut factor[chords[side.curve as usize] as usize];
+            *f = if coarse { f.max((miss / limit).sqrt().clamp(FACTOR[0], FACTOR[1])) } else { *f };
+        }
+    }
+    let count = |count: usize, curve: u32| {
+        let f = factor[chords[curve as usize] as usize];
+        ((count as f64 * f).round() as usize).min(most).max(count)
+    };
+    let sized = network.patches.iter().zip(grids);
+    sized.map(|(p, g)| (count(g.cols, p.sides[0].curve), count(g.rows, p.sides[1].curve))).collect()
+}
+
+/// Whether a grid is too coarse along u and along v: where curves of one direction bend far less between their points
+/// than those of the other, more points along them would not help.
+fn coarse(grid: &Grid) -> [bool; 2] {
+    let (cols, rows) = (grid.cols, grid.rows);
+    let bend = |stride: usize, k: usize| {
+        let p = &grid.points;
+        (p[k - stride] + p[k + stride] - 2.0 * p[k]).length()
+    };
+    let greatest = |stride: usize, of: &mut dyn Iterator<Item = usize>| of.map(|k| bend(stride, k)).fold(0.0, f64::max);
+    let along = greatest(1, &mut (0..rows).flat_map(|j| (1..cols - 1).map(move |i| j * cols + i)));
+    let across = greatest(cols, &mut (1..rows - 1).flat_map(|j| (0..cols).map(move |i| j * cols + i)));
+    [along >= EVEN_BEND * across, across >= EVEN_BEND * along]
+}
