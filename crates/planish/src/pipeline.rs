@@ -202,7 +202,8 @@ pub fn rework(
     observer: &dyn PipelineObserver,
 ) -> Result<Assessed, PipelineError> {
     let mut clock = Clock::new(observer, &WEIGHTS);
-    let before = (std::mem::take(&mut model.grids), std::mem::take(&mut model.surfaces), std::mem::take(&mut model.reliefs));
+    let before =
+        (std::mem::take(&mut model.grids), std::mem::take(&mut model.surfaces), std::mem::take(&mut model.reliefs));
     let made = remade(model, params, &mut clock).map_err(|e| or_cancelled(e, observer));
     if made.is_err() {
         (model.grids, model.surfaces, model.reliefs) = before;
@@ -214,11 +215,18 @@ pub fn rework(
 fn remade(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Result<quality::Measured, PipelineError> {
     let (mesh, network) = (&model.mesh, &model.network);
     let patches = clock.stage("imprint", |_| network::imprint(mesh, network), |p| [("patches", p.len())])?;
-    let sizes = grid::choose_sizes(network, &patches, &params.grid);
     let drawn = (&model.sketch.features[..], &model.sketch.sections[..]);
     model.grids = clock.stage(
         "grids",
-        |o| grid::relax_network(mesh, network, &patches, &sizes, drawn, &params.grid, o),
+        |o| -> Result<_, PipelineError> {
+            let plain = grid::resample(mesh, network, &patches, &params.grid, o)?;
+            if drawn.0.is_empty() {
+                return Ok(plain);
+            }
+            // As fine as the patches want without the curves.
+            let sizes: Vec<(usize, usize)> = plain.iter().map(|g| (g.cols, g.rows)).collect();
+            Ok(grid::relax_network(mesh, network, &patches, &sizes, drawn, &params.grid, o)?)
+        },
         |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;
     surfaces(model, params, clock)?;

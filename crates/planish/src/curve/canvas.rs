@@ -220,10 +220,8 @@ impl<'m> Canvas<'m> {
     /// `NoWay` if there is none.
     pub fn path(&self, from: u32, to: u32, magnet: Option<&Magnet>) -> Result<Vec<u32>, CurveError> {
         let points = &self.mesh.points;
-        let no_way = || CurveError::NoWay {
-            from: points[from as usize].to_array(),
-            to: points[to as usize].to_array(),
-        };
+        let no_way =
+            || CurveError::NoWay { from: points[from as usize].to_array(), to: points[to as usize].to_array() };
         let goal = points[to as usize];
         let goal_marks = self.landmarks[to as usize];
         let least = magnet.map_or(1.0, |m| m.least_cost.max(EAGER));

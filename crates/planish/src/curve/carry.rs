@@ -133,9 +133,8 @@ mod tests {
 
     #[test]
     fn six_landmarks_go_where_they_are_told_and_an_affine_map_is_kept_within_1e_10() {
-        let from: Vec<DVec3> = (0..7)
-            .map(|k| DVec3::new((k * k % 5) as f64, (k * 3 % 7) as f64 / 2.0, (k % 3) as f64 - 0.4))
-            .collect();
+        let from: Vec<DVec3> =
+            (0..7).map(|k| DVec3::new((k * k % 5) as f64, (k * 3 % 7) as f64 / 2.0, (k % 3) as f64 - 0.4)).collect();
         let affine = |p: DVec3| DVec3::new(2.0 * p.x + p.z, p.y - 0.3 * p.x + 4.0, 1.5 * p.z + 0.2 * p.y);
         let to: Vec<DVec3> = from.iter().map(|&p| affine(p)).collect();
         let map = LandmarkMap::new(&from, &to).unwrap();

@@ -56,11 +56,7 @@ pub fn vertex_curvature(mesh: &TriMesh, adjacency: &Adjacency) -> Vec<VertexCurv
             let (mean, half) = ((e + g) / 2.0, (e - g) / 2.0);
             let root = half.hypot(f);
             let angle = f.atan2(half) / 2.0;
-            VertexCurvature {
-                most: mean + root,
-                least: mean - root,
-                direction: a * angle.cos() + b * angle.sin(),
-            }
+            VertexCurvature { most: mean + root, least: mean - root, direction: a * angle.cos() + b * angle.sin() }
         })
         .collect()
 }

@@ -1,7 +1,7 @@
 //! The surface curve itself.
 
-use super::strip::{connect, vertex_of};
 use super::CurveError;
+use super::strip::{connect, vertex_of};
 use crate::mesh::{Adjacency, FacePoint, TriMesh};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

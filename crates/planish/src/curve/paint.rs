@@ -206,8 +206,7 @@ fn straight(
     rough.extend(path::places(mesh, adjacency, chain));
     rough.push(to);
     let (p, q) = (from.position(mesh), to.position(mesh));
-    let length: f64 =
-        chain.windows(2).map(|w| mesh.points[w[0] as usize].distance(mesh.points[w[1] as usize])).sum();
+    let length: f64 = chain.windows(2).map(|w| mesh.points[w[0] as usize].distance(mesh.points[w[1] as usize])).sum();
     let count = (length / (spacing * canvas.edge)).round().clamp(2.0, 1e6) as usize + 1;
     let places = sample(mesh, adjacency, &rough, count);
     let segment = p.distance(q);

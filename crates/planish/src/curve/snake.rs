@@ -302,11 +302,7 @@ impl<'m> Snake<'m> {
     fn along(&self, i: usize, step: isize) -> Option<usize> {
         let n = self.points.len() as isize;
         let k = i as isize + step;
-        if self.closed {
-            Some(k.rem_euclid(n) as usize)
-        } else {
-            (0..n).contains(&k).then_some(k as usize)
-        }
+        if self.closed { Some(k.rem_euclid(n) as usize) } else { (0..n).contains(&k).then_some(k as usize) }
     }
 
     fn moves(&self, i: usize) -> bool {
@@ -404,9 +400,7 @@ impl<'m> Snake<'m> {
                 let c = mid(a, b, i);
                 force += c * (kf * w);
                 if kc > 0.0 {
-                    let side = |m: usize, t: isize| {
-                        self.along(m, t).map_or(DVec3::ZERO, |far| mid(i, far, m))
-                    };
+                    let side = |m: usize, t: isize| self.along(m, t).map_or(DVec3::ZERO, |far| mid(i, far, m));
                     force += (c * 2.0 - side(a, -s) - side(b, s)) * (kc * w);
                 }
                 if !coarse {
@@ -510,7 +504,9 @@ impl<'m> Snake<'m> {
         }
         let bases: Vec<[DVec3; 2]> = normals
             .iter()
-            .map(|&m| if m == DVec3::ZERO { [DVec3::X, DVec3::Y] } else { <[DVec3; 2]>::from(m.any_orthonormal_pair()) })
+            .map(
+                |&m| if m == DVec3::ZERO { [DVec3::X, DVec3::Y] } else { <[DVec3; 2]>::from(m.any_orthonormal_pair()) },
+            )
             .collect();
         let band = 2 * if whole { 5 } else { 2 } + 1;
         let mut system = System { matrix: Banded::zero(2 * count as usize, band), rhs: vec![0.0; 2 * count as usize] };
@@ -618,8 +614,7 @@ impl<'m> Snake<'m> {
     /// `Cancelled`.
     pub fn relax(&mut self, params: &SnakeParams, observer: &dyn Observer) -> Result<Relaxed, CurveError> {
         let first = self.energy(params);
-        let mut out =
-            Relaxed { sweeps: 0, solves: 0, energy: [first, first], last_move: 0.0, settled: false };
+        let mut out = Relaxed { sweeps: 0, solves: 0, energy: [first, first], last_move: 0.0, settled: false };
         let mut kind = params.sweep;
         let mut past: Vec<f64> = Vec::new();
         while out.sweeps < params.sweeps && !out.settled {

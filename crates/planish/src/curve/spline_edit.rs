@@ -4,9 +4,9 @@
 //! parameters by chord length); moved control vertices or edit points carry the surface curve along by CurveAttract.
 //! Departs from [K98]: the spline of an open curve is clamped and keeps its ends, since other curves meet there.
 
+use super::CurveError;
 use super::attract::{attract, sample_polyline};
 use super::curve::SurfaceCurve;
-use super::CurveError;
 use crate::linalg::solve_dense;
 use crate::mesh::{Adjacency, TriMesh};
 use glam::DVec3;

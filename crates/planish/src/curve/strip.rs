@@ -265,7 +265,8 @@ fn straightened(
     to: FacePoint,
 ) -> Vec<FacePoint> {
     let ends = [from, to];
-    let (from, to) = (beyond_its_edge(adjacency, from, &mut portals, true), beyond_its_edge(adjacency, to, &mut portals, false));
+    let (from, to) =
+        (beyond_its_edge(adjacency, from, &mut portals, true), beyond_its_edge(adjacency, to, &mut portals, false));
     let finish = |mut places: Vec<FacePoint>| {
         let last = places.len() - 1;
         (places[0], places[last]) = (ends[0], ends[1]);
@@ -332,7 +333,11 @@ fn beyond_its_edge(adjacency: &Adjacency, place: FacePoint, portals: &mut Vec<u3
         at = FacePoint { face: g / 3, bary };
         done += 1;
     }
-    if first { portals.drain(..done) } else { portals.drain(portals.len() - done..) };
+    if first {
+        portals.drain(..done)
+    } else {
+        portals.drain(portals.len() - done..)
+    };
     at
 }
 
@@ -363,7 +368,8 @@ fn other_side(
     let whole: f64 = adjacency
         .fan(w)
         .map(|h| {
-            let (e, f) = (mesh.points[mesh.origin(next(h)) as usize] - p, mesh.points[mesh.origin(previous(h)) as usize] - p);
+            let (e, f) =
+                (mesh.points[mesh.origin(next(h)) as usize] - p, mesh.points[mesh.origin(previous(h)) as usize] - p);
             e.cross(f).length().atan2(e.dot(f))
         })
         .sum();
@@ -532,9 +538,8 @@ mod tests {
         let mesh = shapes::cuboid(DVec3::ONE, 6);
         let adjacency = Adjacency::new(&mesh);
         let find = |p: DVec3| {
-            let v = (0..mesh.points.len()).min_by(|&a, &b| {
-                mesh.points[a].distance(p).total_cmp(&mesh.points[b].distance(p))
-            });
+            let v = (0..mesh.points.len())
+                .min_by(|&a, &b| mesh.points[a].distance(p).total_cmp(&mesh.points[b].distance(p)));
             let h = adjacency.outgoing[v.unwrap()];
             FacePoint::corner(h / 3, h as usize % 3)
         };
@@ -562,7 +567,9 @@ mod tests {
                     let t = mesh.triangles[x.face as usize];
                     match near[..] {
                         [i] => adjacency.fan(t[i]).map(|h| h / 3).collect(),
-                        [i, j] => (0..faces).filter(|&f| [t[i], t[j]].iter().all(|v| mesh.triangles[f as usize].contains(v))).collect(),
+                        [i, j] => (0..faces)
+                            .filter(|&f| [t[i], t[j]].iter().all(|v| mesh.triangles[f as usize].contains(v)))
+                            .collect(),
                         _ => vec![x.face],
                     }
                 };

@@ -229,9 +229,12 @@ mod tests {
         let mut mesh = shapes::sphere(1.0, 3);
         for p in &mut mesh.points {
             let bulge = |c: DVec3, s: f64| s * (-4.0 * p.distance_squared(c)).exp();
-            let b = bulge(DVec3::X, 1.5) + bulge(DVec3::new(0.0, 0.8, 0.6), 1.0) + bulge(DVec3::new(-0.3, 0.5, -0.8), 0.7);
+            let b =
+                bulge(DVec3::X, 1.5) + bulge(DVec3::new(0.0, 0.8, 0.6), 1.0) + bulge(DVec3::new(-0.3, 0.5, -0.8), 0.7);
             *p = *p * (1.0 + b) * DVec3::new(1.0, 1.3 + 0.3 * p.x, 0.7);
         }
-        assert!(matches!(find(&mesh, &Bvh::new(&mesh), &Silent), Err(CurveError::NotSymmetric { miss }) if miss > SYMMETRIC));
+        assert!(
+            matches!(find(&mesh, &Bvh::new(&mesh), &Silent), Err(CurveError::NotSymmetric { miss }) if miss > SYMMETRIC)
+        );
     }
 }

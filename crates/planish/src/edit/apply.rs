@@ -124,7 +124,10 @@ impl Work<'_, '_> {
     }
 
     /// Lets `change` work on the network.
-    fn edit<T, E>(&mut self, change: impl FnOnce(&mut Editor, f64, &dyn Observer) -> Result<T, E>) -> Result<T, ApplyError>
+    fn edit<T, E>(
+        &mut self,
+        change: impl FnOnce(&mut Editor, f64, &dyn Observer) -> Result<T, E>,
+    ) -> Result<T, ApplyError>
     where
         ApplyError: From<E>,
     {
@@ -330,8 +333,7 @@ impl Work<'_, '_> {
                 Ok(())
             }
             Edit::Carry { from, landmarks } => {
-                let (other, drawing) =
-                    others(from).map_err(|what| ApplyError::Other { name: from.clone(), what })?;
+                let (other, drawing) = others(from).map_err(|what| ApplyError::Other { name: from.clone(), what })?;
                 let [a, b] = [0, 1].map(|k| landmarks.iter().map(|l| DVec3::from_array(l[k])).collect::<Vec<_>>());
                 let map = LandmarkMap::new(&a, &b)?;
                 self.drawing.network = carry_network(&map, &other, &drawing.network, self.ground, self.observer)?;

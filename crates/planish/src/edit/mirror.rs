@@ -24,7 +24,8 @@ pub fn mirror_network(ground: &Ground, network: &Network, plane: &Plane) -> Resu
     let mut numbers: Vec<Option<[u32; 2]>> = vec![None; network.corners.len()];
     let mut kept = Vec::new();
     for (c, curve) in network.curves.iter().enumerate() {
-        let tops = curve.points.iter().map(height).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        let tops =
+            curve.points.iter().map(height).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
         if tops.1 < near && tops.0 < -near {
             continue;
         }

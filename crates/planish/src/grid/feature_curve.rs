@@ -120,7 +120,9 @@ pub enum FeatureError {
         needed: usize,
     },
     /// More curves than a grid has room for.
-    #[error("{curves} feature curves across {cells} cells along {family} are too many - hint: raise the density, or give sections")]
+    #[error(
+        "{curves} feature curves across {cells} cells along {family} are too many - hint: raise the density, or give sections"
+    )]
     TooFine {
         /// `u` or `v`.
         family: &'static str,
@@ -130,13 +132,17 @@ pub enum FeatureError {
         cells: usize,
     },
     /// Feature curves of neighbouring patches end on their common curve so that no nodes suit both.
-    #[error("feature curves on both sides of curve {curve} ask for its nodes in different orders - hint: end them at the same places, or give the sections of one patch")]
+    #[error(
+        "feature curves on both sides of curve {curve} ask for its nodes in different orders - hint: end them at the same places, or give the sections of one patch"
+    )]
     EndsClash {
         /// The curve of the network.
         curve: usize,
     },
     /// Sections of patches in one row ask for different numbers of cells.
-    #[error("patch {patch} is given {given} cells where its row of patches has {other} - hint: give the same sum, or sections for one patch alone")]
+    #[error(
+        "patch {patch} is given {given} cells where its row of patches has {other} - hint: give the same sum, or sections for one patch alone"
+    )]
     SumsDiffer {
         /// The patch.
         patch: usize,
@@ -258,12 +264,8 @@ pub(super) fn relax_along(
         .collect();
     let grids = relax_at(ground, &sub, &sizes, &sub_stops, params, observer)?;
     // 4. One grid of all.
-    let mut grid = Grid {
-        rows,
-        cols,
-        points: vec![DVec3::ZERO; rows * cols],
-        places: vec![FacePoint::corner(0, 0); rows * cols],
-    };
+    let mut grid =
+        Grid { rows, cols, points: vec![DVec3::ZERO; rows * cols], places: vec![FacePoint::corner(0, 0); rows * cols] };
     for (p, part) in grids.iter().enumerate() {
         for j in 0..part.rows {
             for i in 0..part.cols {
@@ -421,12 +423,8 @@ fn strand(
         Place::Edge(h, _) => adjacency.opposite[h as usize] == crate::mesh::NONE,
         Place::Face(_) => false,
     };
-    let mut inner: Vec<FacePoint> = curve
-        .points
-        .iter()
-        .filter_map(|p| pieces.in_patch(input, patch, p))
-        .filter(|p| !on_rim(p))
-        .collect();
+    let mut inner: Vec<FacePoint> =
+        curve.points.iter().filter_map(|p| pieces.in_patch(input, patch, p)).filter(|p| !on_rim(p)).collect();
     if inner.is_empty() {
         return Err(outside);
     }
@@ -548,13 +546,7 @@ impl Pieces {
     }
 
     /// A place of the uncut mesh on the cut one.
-    fn place(
-        &self,
-        cut: &imprint::Cut,
-        mesh: &TriMesh,
-        adjacency: &Adjacency,
-        p: &FacePoint,
-    ) -> Option<FacePoint> {
+    fn place(&self, cut: &imprint::Cut, mesh: &TriMesh, adjacency: &Adjacency, p: &FacePoint) -> Option<FacePoint> {
         let weights = |t: u32| {
             let corners = cut.mesh.triangles[t as usize].map(|v| {
                 cut.origin[v as usize].on_face(adjacency, &mesh.triangles, p.face).map_or([0.0; 3], |q| q.bary)
@@ -793,13 +785,21 @@ impl<'a> Sketch<'a> {
         }
         for (j, pieces) in rows.into_iter().enumerate() {
             for (i, points) in pieces.into_iter().enumerate() {
-                network.curves.push(Curve { corners: [corner(j, i), corner(j, i + 1)], kind: CurveKind::Smooth, points });
+                network.curves.push(Curve {
+                    corners: [corner(j, i), corner(j, i + 1)],
+                    kind: CurveKind::Smooth,
+                    points,
+                });
             }
         }
         let upright = network.curves.len() as u32;
         for (i, pieces) in cols.into_iter().enumerate() {
             for (j, points) in pieces.into_iter().enumerate() {
-                network.curves.push(Curve { corners: [corner(j, i), corner(j + 1, i)], kind: CurveKind::Smooth, points });
+                network.curves.push(Curve {
+                    corners: [corner(j, i), corner(j + 1, i)],
+                    kind: CurveKind::Smooth,
+                    points,
+                });
             }
         }
         for j in 0..nv as u32 {

@@ -7,28 +7,12 @@ use super::feature_curve::{FeatureCurve, FeatureError, Sections, Strands, cells_
 use super::{Grid, GridError, GridParams, SideStops, relax_at, side};
 use crate::mesh::TriMesh;
 use crate::network::{Network, PatchMesh};
-use crate::observe::Observer;
+use crate::observe::{Observer, Part};
 use std::collections::BTreeMap;
 
 /// Ends of two feature curves on one curve of the network nearer than this share of its length are the same place:
 /// one curve drawn on over several patches.
 const SAME_END: f64 = 1e-6;
-
-/// A part of the work as the whole sees it.
-struct Part<'a> {
-    observer: &'a dyn Observer,
-    before: f64,
-    share: f64,
-}
-
-impl Observer for Part<'_> {
-    fn progress(&self, fraction: f64) {
-        self.observer.progress(self.before + self.share * fraction);
-    }
-    fn cancelled(&self) -> bool {
-        self.observer.cancelled()
-    }
-}
 
 /// Resamples every patch of a network; those with feature curves follow them exactly.
 /// * `sizes` - as of [`super::choose_sizes`]; numbers given by `sections` go over them along their chord
@@ -93,11 +77,11 @@ pub fn relax_network(
     };
     let (some, some_sizes, some_stops) = pick(&plain);
     let each = 1.0 / patches.len() as f64;
-    let first = Part { observer, before: 0.0, share: plain.len() as f64 * each };
+    let first = Part::new(observer, 0.0, plain.len() as f64 * each);
     let made = relax_at(input, &some, &some_sizes, &some_stops, params, &first).map_err(|e| of_plain(e, &plain))?;
     let mut grids: BTreeMap<usize, Grid> = plain.into_iter().zip(made).collect();
     for (&p, (found, cells)) in &strands {
-        let part = Part { observer, before: grids.len() as f64 * each, share: each };
+        let part = Part::new(observer, grids.len() as f64 * each, each);
         let made = relax_along(input, &patches[p], found, cells, &stops[p], params, &part);
         grids.insert(p, made.map_err(|e| named(e, &of_patch[&p]))?.grid);
     }

@@ -208,12 +208,8 @@ fn relax_at(
     if patches.len() != sizes.len() {
         return Err(GridError::SizeCount { patches: patches.len(), sizes: sizes.len() });
     }
-<<<<<<< HEAD
-    let none = SideStops::default();
-    let total: usize = patches.iter().map(|p| p.mesh.triangles.len()).sum::<usize>().max(1);
-=======
     let jobs: Vec<Job> = patches.iter().zip(sizes).enumerate().map(|(k, (patch, &size))| (k, patch, size)).collect();
-    relax_jobs(input, &jobs, params, observer)
+    relax_jobs(input, &jobs, stops, params, observer)
 }
 
 /// Vertices that are missed by more than this part of what is allowed are caught.
@@ -225,12 +221,13 @@ type Job<'a> = (usize, &'a PatchMesh, (usize, usize));
 fn relax_jobs(
     input: &TriMesh,
     jobs: &[Job],
+    stops: &[SideStops],
     params: &GridParams,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, GridError> {
+    let none = SideStops::default();
     let caught = CAUGHT * params.miss * input.bounds().diagonal();
     let total: usize = jobs.iter().map(|j| j.1.mesh.triangles.len()).sum::<usize>().max(1);
->>>>>>> main
     let done = AtomicUsize::new(0);
     let results: Vec<Result<Grid, GridError>> = jobs
         .par_iter()
@@ -242,12 +239,9 @@ fn relax_jobs(
             if cols < 2 || rows < 2 {
                 return Err(GridError::TooSmall { patch: k, cols, rows });
             }
-<<<<<<< HEAD
             let stops = stops.get(k).unwrap_or(&none);
-            let grid = relax_patch(input, patch, cols, rows, stops, params, observer).map_err(|f| f.of_patch(k))?;
-=======
-            let grid = relax_patch(input, patch, cols, rows, params, caught, observer).map_err(|f| f.of_patch(k))?;
->>>>>>> main
+            let made = relax_patch(input, patch, (cols, rows), stops, params, caught, observer);
+            let grid = made.map_err(|f| f.of_patch(k))?;
             let size = patch.mesh.triangles.len();
             observer.progress((done.fetch_add(size, Ordering::Relaxed) + size) as f64 / total as f64);
             Ok(grid)
@@ -269,21 +263,15 @@ fn rim_node(k: usize, n: usize, cols: usize, rows: usize) -> usize {
 fn relax_patch(
     input: &TriMesh,
     patch: &PatchMesh,
-    cols: usize,
-    rows: usize,
+    (cols, rows): (usize, usize),
     stops: &SideStops,
     params: &GridParams,
     caught: f64,
     observer: &dyn Observer,
 ) -> Result<Grid, Fault> {
     let cancelled = || observer.cancelled();
-<<<<<<< HEAD
     let chart = chart::flatten(input, patch, stops, [cols, rows], &cancelled)?;
-    let spots = springs::relax(&chart, cols, rows, params, &cancelled)?;
-=======
-    let chart = chart::flatten(input, patch, &cancelled)?;
     let spots = springs::relax(&chart, cols, rows, params, caught, &cancelled)?;
->>>>>>> main
     let mut grid = Grid {
         rows,
         cols,

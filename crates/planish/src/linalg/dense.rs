@@ -52,8 +52,7 @@ mod tests {
     fn a_system_of_3_with_a_zero_pivot_and_2_right_sides_is_solved_within_1e_14() {
         let matrix = [0.0, 2.0, 1.0, 1.0, 1.0, 0.0, 3.0, 0.0, 1.0];
         let x = [1.0, -1.0, 2.0, 0.5, 3.0, 4.0];
-        let mut b: Vec<f64> =
-            (0..6).map(|r| (0..3).map(|k| matrix[r / 2 * 3 + k] * x[k * 2 + r % 2]).sum()).collect();
+        let mut b: Vec<f64> = (0..6).map(|r| (0..3).map(|k| matrix[r / 2 * 3 + k] * x[k * 2 + r % 2]).sum()).collect();
         assert!(solve_dense(&mut matrix.clone(), &mut b, 3, 2));
         assert!(b.iter().zip(x).all(|(a, b)| (a - b).abs() < 1e-14));
         assert!(!solve_dense(&mut [1.0, 2.0, 2.0, 4.0], &mut [1.0, 2.0], 2, 1));

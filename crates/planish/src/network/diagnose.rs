@@ -193,7 +193,11 @@ pub(super) fn draw(mesh: &TriMesh, adjacency: &Adjacency, chains: &[Vec<Place>])
 /// The places of all curves.
 /// # Errors
 /// `NoSuchFace`.
-pub(super) fn chains(mesh: &TriMesh, adjacency: &Adjacency, network: &Network) -> Result<Vec<Vec<Place>>, ImprintError> {
+pub(super) fn chains(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    network: &Network,
+) -> Result<Vec<Vec<Place>>, ImprintError> {
     let faces = mesh.triangles.len();
     network
         .curves

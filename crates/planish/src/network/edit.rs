@@ -112,7 +112,9 @@ impl<'m> Editor<'m> {
     pub fn ends_at(&self, corner: u32) -> Vec<u32> {
         let curves = self.network.curves.iter().enumerate();
         curves
-            .flat_map(|(c, curve)| (0..2).filter(move |&e| curve.corners[e] == corner).map(move |e| 2 * c as u32 + e as u32))
+            .flat_map(|(c, curve)| {
+                (0..2).filter(move |&e| curve.corners[e] == corner).map(move |e| 2 * c as u32 + e as u32)
+            })
             .collect()
     }
 
@@ -486,9 +488,8 @@ impl<'m> Editor<'m> {
         let mut added = Vec::new();
         for one in crate::mesh::boundary_loops(self.adjacency) {
             let on: std::collections::BTreeSet<u32> = one.iter().map(|&h| self.mesh.origin(h)).collect();
-            let vertex = |p: &FacePoint| {
-                (0..3).find(|&k| p.bary[k] == 1.0).map(|k| self.mesh.triangles[p.face as usize][k])
-            };
+            let vertex =
+                |p: &FacePoint| (0..3).find(|&k| p.bary[k] == 1.0).map(|k| self.mesh.triangles[p.face as usize][k]);
             let covered = self.network.curves.iter().any(|c| {
                 c.points.windows(2).any(|w| {
                     matches!((vertex(&w[0]), vertex(&w[1])), (Some(a), Some(b)) if on.contains(&a) && on.contains(&b))

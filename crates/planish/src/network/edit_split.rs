@@ -29,7 +29,8 @@ impl Editor<'_> {
         let found = regions(self.mesh, self.adjacency, &self.network)?;
         let bounded: Vec<usize> = (0..found.parts.len()).filter(|&r| !found.parts[r].0.is_empty()).collect();
         let count = bounded.len();
-        let &part = bounded.get(region as usize).ok_or(EditError::NoSuchPart { what: "region", index: region, count })?;
+        let &part =
+            bounded.get(region as usize).ok_or(EditError::NoSuchPart { what: "region", index: region, count })?;
         let sides = found.parts[part].0.iter().map(Vec::len).sum();
         if found.parts[part].0.len() != 1 || found.open[part] || !matches!(sides, 3 | 5 | 6) {
             return Err(EditError::NoSplit { region, sides });
@@ -57,9 +58,11 @@ impl Editor<'_> {
             faces.iter().filter(|&&f| cut.parent[f as usize] == place.face).map(move |&f| (away(f), k as u32))
         });
         let count = bounded.len();
-        near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
-            .map(|x| x.1)
-            .ok_or(EditError::NoSuchPart { what: "region", index: count as u32, count })
+        near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|x| x.1).ok_or(EditError::NoSuchPart {
+            what: "region",
+            index: count as u32,
+            count,
+        })
     }
 
     /// Splits one region; returns the corners put into its sides.
@@ -345,9 +348,8 @@ impl Flat {
     fn center(&self) -> u32 {
         let rim: std::collections::BTreeSet<u32> = self.disk.boundary.iter().copied().collect();
         let inner = (0..self.uv.len() as u32).filter(|v| !rim.contains(v));
-        let best = inner.min_by(|&i, &j| {
-            self.uv[i as usize].length().total_cmp(&self.uv[j as usize].length()).then(i.cmp(&j))
-        });
+        let best = inner
+            .min_by(|&i, &j| self.uv[i as usize].length().total_cmp(&self.uv[j as usize].length()).then(i.cmp(&j)));
         best.unwrap_or(0)
     }
 
@@ -369,9 +371,7 @@ impl Flat {
             points.push(match m {
                 Met::Vertex(v) => self.place(editor, found, v),
                 Met::Edge(p, q, t) => {
-                    let h = self.disk.adjacency.fan(p).find_map(|h| {
-                        (self.disk.from(next(h)) == q).then_some(h)
-                    });
+                    let h = self.disk.adjacency.fan(p).find_map(|h| (self.disk.from(next(h)) == q).then_some(h));
                     let (h, forward) = match h {
                         Some(h) => (h, true),
                         None => (self.disk.adjacency.fan(q).find(|&h| self.disk.from(next(h)) == p)?, false),
