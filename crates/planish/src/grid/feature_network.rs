@@ -3,7 +3,8 @@
 //! A feature curve ends on curves of the network; the grids on both sides of such a curve share their nodes, so the
 //! curve gets a stop there and the grid beyond it follows ([`super::side`]). Numbers of cells go along chords.
 
-use super::feature_curve::{FeatureCurve, FeatureError, Sections, Strands, cells_between, relax_along};
+use super::feature_curve::{FeatureCurve, FeatureError, Sections, cells_between, relax_along};
+use super::feature_strand::Strands;
 use super::{Grid, GridError, GridParams, SideStops, relax_at, side};
 use crate::mesh::TriMesh;
 use crate::network::{Network, PatchMesh};

@@ -16,6 +16,7 @@ mod chart;
 mod even;
 mod feature_curve;
 mod feature_network;
+mod feature_strand;
 mod fold;
 mod locate;
 mod net;
