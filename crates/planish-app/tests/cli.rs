@@ -359,6 +359,7 @@ fn a_script_draws_a_network_on_a_bare_mesh_and_the_history_goes_back_and_forth_i
     script("split.toml", "[[step]]\nedit = \"split_region\"\nat = [0.25, 0.0, 0.3]\n");
     let output = planish(&["edit", "box.planish", "split.toml", "--threads", "1"], folder.path());
     assert_eq!(status(&output), 0, "{}", stderr(&output));
+    assert!(stdout(&output).contains("10 patches, finished"), "{}{}", stdout(&output), stderr(&output));
     script("back.toml", "[[step]]\nedit = \"undo\"\ncount = 2\n");
     let output = planish(&["edit", "box.planish", "back.toml", "-o", "plain.planish", "--threads", "2"], folder.path());
     assert_eq!(status(&output), 0, "{}", stderr(&output));

@@ -28,7 +28,7 @@ pub use attract::{attract, slide_to};
 pub use canvas::{Canvas, Magnet};
 pub use curvature::{VertexCurvature, vertex_curvature};
 pub use curve::SurfaceCurve;
-pub(crate) use curve::between;
+pub(crate) use curve::{between, without_repeats};
 pub use paint::{PaintMode, PaintParams, Snap, SnapTargets, Stroke, snap, way};
 pub use scalar::ScalarField;
 pub use snake::{Energy, Relaxed, Section, Snake, SnakeParams, Sweep};

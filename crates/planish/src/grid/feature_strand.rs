@@ -294,4 +294,3 @@ fn normal(face: u32, bary: [f64; 3]) -> FacePoint {
     let sum: f64 = bary.iter().sum();
     FacePoint { face, bary: bary.map(|b| b / sum) }
 }
-

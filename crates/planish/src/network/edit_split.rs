@@ -11,6 +11,7 @@ use super::edit::{EditError, Editor};
 use super::imprint::Cut;
 use super::layout::layout_around;
 use super::{Corner, Curve, CurveKind, LayoutParams, Network};
+use crate::curve::without_repeats;
 use crate::mesh::{Adjacency, FacePoint, NONE, next};
 use crate::observe::Observer;
 use std::f64::consts::TAU;
@@ -384,6 +385,8 @@ impl Flat {
             });
         }
         points.push(self.place(editor, found, b));
-        Some(points)
+        // A line that grazes a vertex crosses several edges there within rounding.
+        without_repeats(editor.mesh, &mut points);
+        (points.len() > 1).then_some(points)
     }
 }
