@@ -231,7 +231,7 @@ fn remade(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Resu
     )?;
     surfaces(model, params, clock)?;
     let repairs = Repairs::default();
-    Ok(clock.stage("measure", |o| quality::measure(model, &patches, &repairs, o), |m| [("seams", m.seams.len())])?)
+    clock.stage("measure", |o| quality::measure(model, &patches, &repairs, o), |m| [("seams", m.seams.len())])
 }
 
 /// What [`assess`] finds.

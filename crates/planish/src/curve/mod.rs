@@ -14,8 +14,8 @@
 pub mod attract;
 mod canvas;
 pub mod carry;
+mod chain;
 mod curvature;
-mod curve;
 mod paint;
 mod scalar;
 pub mod section;
@@ -26,9 +26,9 @@ pub mod symmetry;
 
 pub use attract::{attract, slide_to};
 pub use canvas::{Canvas, Magnet};
+pub use chain::SurfaceCurve;
+pub(crate) use chain::{between, without_repeats};
 pub use curvature::{VertexCurvature, vertex_curvature};
-pub use curve::SurfaceCurve;
-pub(crate) use curve::{between, without_repeats};
 pub use paint::{PaintMode, PaintParams, Snap, SnapTargets, Stroke, snap, way};
 pub use scalar::ScalarField;
 pub use snake::{Energy, Relaxed, Section, Snake, SnakeParams, Sweep};

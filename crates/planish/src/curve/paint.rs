@@ -6,7 +6,7 @@
 //! also be a geodesic, or be drawn to lines or to a scalar.
 
 use super::canvas::{Canvas, Magnet};
-use super::curve::{SurfaceCurve, sample, without_repeats};
+use super::chain::{SurfaceCurve, sample, without_repeats};
 use super::strip::{nearest_corner, no_way, straighten};
 use super::{CurveError, attract};
 use crate::mesh::{FacePoint, path};

@@ -1,6 +1,6 @@
 //! Curves that are there without painting: cuts by a plane, projections, boundaries and feature lines.
 
-use super::curve::{SurfaceCurve, without_repeats};
+use super::chain::{SurfaceCurve, without_repeats};
 use super::{CurveError, attract::sample_polyline};
 use crate::geom::Bvh;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, boundary_loops, next, path, previous};

@@ -13,7 +13,7 @@
 //! - the pull of a scalar is a step to its ridge along the normal of the curve, so that its weight does not depend
 //!   on the units of the scalar.
 
-use super::curve::{SurfaceCurve, sample};
+use super::chain::{SurfaceCurve, sample};
 use super::strip::connect;
 use super::{CurveError, ScalarField};
 use crate::linalg::{Banded, BandedCholesky};

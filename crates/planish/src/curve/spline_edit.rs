@@ -6,7 +6,7 @@
 
 use super::CurveError;
 use super::attract::{attract, sample_polyline};
-use super::curve::SurfaceCurve;
+use super::chain::SurfaceCurve;
 use crate::linalg::solve_dense;
 use crate::mesh::{Adjacency, TriMesh};
 use glam::DVec3;

@@ -251,7 +251,7 @@ pub(super) fn relax_along(
         .map(|p| {
             let (i, j) = (p % nu, p / nu);
             let part = |side: usize, at_rim: bool, from: usize, count: usize| match at_rim {
-                true => part_of(&stops[side], from, from + count, if side % 2 == 0 { cols } else { rows }),
+                true => part_of(&stops[side], from, from + count, if side.is_multiple_of(2) { cols } else { rows }),
                 false => side::Stops::new(),
             };
             [

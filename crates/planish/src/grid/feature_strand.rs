@@ -43,7 +43,7 @@ impl Strands {
 
     /// Stops that the curves put into side `k`, in its direction.
     pub fn stops(&self, k: usize, cells: &[Vec<usize>; 2]) -> side::Stops {
-        let (own, cells) = if k % 2 == 0 { (&self.across, &cells[0]) } else { (&self.along, &cells[1]) };
+        let (own, cells) = if k.is_multiple_of(2) { (&self.across, &cells[0]) } else { (&self.along, &cells[1]) };
         let total: usize = cells.iter().sum();
         // The low ends of v curves lie on side 0, those of u curves on side 3.
         let end = if matches!(k, 0 | 3) { 0 } else { 1 };

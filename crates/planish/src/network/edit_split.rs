@@ -117,7 +117,7 @@ impl Editor<'_> {
             let found = regions(self.mesh, self.adjacency, &self.network)?;
             // The region that has the corner between two pieces of a side.
             let ends = self.ends_at(corner);
-            let meets = |half: u32, end: u32| ends.contains(&(half / 2 * 2 + (half % 2 ^ end)));
+            let meets = |half: u32, end: u32| ends.contains(&(half ^ end));
             let seat = (0..found.parts.len()).find_map(|r| {
                 let loops = &found.parts[r].0;
                 let n = loops.first().map_or(0, Vec::len);
@@ -372,7 +372,7 @@ impl Flat {
             points.push(match m {
                 Met::Vertex(v) => self.place(editor, found, v),
                 Met::Edge(p, q, t) => {
-                    let h = self.disk.adjacency.fan(p).find_map(|h| (self.disk.from(next(h)) == q).then_some(h));
+                    let h = self.disk.adjacency.fan(p).find(|&h| self.disk.from(next(h)) == q);
                     let (h, forward) = match h {
                         Some(h) => (h, true),
                         None => (self.disk.adjacency.fan(q).find(|&h| self.disk.from(next(h)) == p)?, false),
