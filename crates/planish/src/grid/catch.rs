@@ -79,3 +79,25 @@ fn put(net: &mut Net, k: usize, spot: Spot) -> bool {
     }
     !bad
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::DVec3;
+    use crate::grid::chart::tests::chart;
+
+    #[test]
+    fn a_ridge_between_the_points_of_a_grid_is_caught_without_folds() {
+        // The ridge runs along s = 0.45, a line of vertices of the chart and none of the grid.
+        let chart = chart(|s, t| DVec3::new(s, t, (0.1 - (s - 0.45).abs()).max(0.0)));
+        let mut net = Net::regular(&chart, 9, 9);
+        let missed = |net: &Net| {
+            let bvh = Bvh::new(&surface(&net.points, 9, 9));
+            chart.points.iter().filter(|&&p| bvh.closest(p).distance > 0.01).count()
+        };
+        let before = missed(&net);
+        catch(&mut net, 0.01, &|| false).expect("not cancelled");
+        assert!(3 * missed(&net) < before, "{} of {before}", missed(&net));
+        assert!((0..64).all(|c| !crate::grid::net::turns_over(&net.uv, 9, c)));
+    }
+}

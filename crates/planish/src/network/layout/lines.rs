@@ -189,3 +189,44 @@ fn drop_short(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut 
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    /// Marks the edges along a chain of places of a sheet.
+    fn mark(mesh: &TriMesh, adjacency: &Adjacency, sharp: &mut [bool], places: &[(f64, f64)]) {
+        let near = |p: &DVec3, q: (f64, f64)| p.truncate().distance(glam::DVec2::new(q.0, q.1)) < 1e-9;
+        let vertex = |q| mesh.points.iter().position(|p| near(p, q)).expect("a vertex there") as u32;
+        for w in places.windows(2) {
+            let (a, b) = (vertex(w[0]), vertex(w[1]));
+            for h in 0..sharp.len() as u32 {
+                let ends = (mesh.origin(h), mesh.origin(next(h)));
+                sharp[h as usize] |= (ends == (a, b) || ends == (b, a)) && adjacency.opposite[h as usize] != NONE;
+            }
+        }
+    }
+
+    #[test]
+    fn loose_lines_need_their_length_and_closed_ones_half_of_it() {
+        let mesh = shapes::rectangle(1.0, 1.0, 10, 10);
+        let corner = mesh.bounds().min;
+        let at = |i: usize, j: usize| (corner.x + i as f64 / 10.0, corner.y + j as f64 / 10.0);
+        let adjacency = Adjacency::new(&mesh);
+        for (places, shortest, kept) in [
+            ((2..=5).map(|i| at(i, 5)).collect::<Vec<_>>(), 0.4, 0),
+            ((2..=8).map(|i| at(i, 5)).collect(), 0.4, 6),
+            // From the boundary to nowhere, and from boundary to boundary.
+            ((0..=3).map(|i| at(i, 5)).collect(), 0.4, 0),
+            ((0..=10).map(|i| at(i, 5)).collect(), 0.4, 10),
+            (vec![at(4, 4), at(5, 4), at(5, 5), at(4, 5), at(4, 4)], 1.0, 0),
+            (vec![at(3, 3), at(4, 3), at(5, 3), at(5, 4), at(5, 5), at(4, 5), at(3, 5), at(3, 4), at(3, 3)], 1.0, 8),
+        ] {
+            let mut sharp = vec![false; adjacency.opposite.len()];
+            mark(&mesh, &adjacency, &mut sharp, &places);
+            drop_detail(&mesh, &adjacency, shortest, &mut sharp);
+            assert_eq!(sharp.iter().filter(|&&s| s).count() / 2, kept, "{places:?}");
+        }
+    }
+}

@@ -109,3 +109,33 @@ pub(super) fn flat_cost(corners: [DVec3; 4], normal: DVec3) -> f64 {
     let aspect = ((side(0) + side(2)) / (side(1) + side(3)).max(f64::MIN_POSITIVE)).max(f64::MIN_POSITIVE).ln();
     sum / 4.0 + aspect * aspect
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The flat quad between four corners, of which it takes `part` of the area.
+    fn quad(corners: [[f64; 2]; 4], part: f64) -> Shape {
+        let corners = corners.map(|[x, y]| DVec3::new(x, y, 0.0));
+        let area = (corners[2] - corners[0]).cross(corners[3] - corners[1]).length() / 2.0;
+        let sides = [0, 1, 2, 3].map(|k| Trace::of(&[corners[k], corners[(k + 1) % 4]]));
+        Shape { corners, sides, normals: [DVec3::Z; 4], area: part * area }
+    }
+
+    #[test]
+    fn a_square_costs_nothing_and_each_fault_more_than_0_1() {
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        assert!(quad(square, 1.0).cost(1.0).abs() < 1e-9);
+        for (fault, shape, mean) in [
+            ("long", quad([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]], 1.0), 2.0),
+            ("slanted", quad([[0.0, 0.0], [1.0, 0.0], [1.6, 0.8], [0.6, 0.8]], 1.0), 0.8),
+            ("with a limb inside", quad(square, 3.0), 3.0),
+            ("large", quad(square, 1.0), 0.4),
+            ("tapered", quad([[0.0, 0.0], [1.0, 0.0], [0.7, 1.0], [0.3, 1.0]], 1.0), 0.7),
+        ] {
+            assert!(shape.cost(mean) > 0.1, "{fault}: {}", shape.cost(mean));
+        }
+        let flat = quad([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.0, 1.0]], 1.0);
+        assert!(flat.cost(1.0) > 3.0, "{}", flat.cost(1.0));
+    }
+}

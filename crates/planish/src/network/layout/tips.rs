@@ -8,6 +8,7 @@ use super::fill::{Gain, Scale};
 use super::partition::Ground;
 use super::recut::{Bench, Change};
 use crate::network::CurveKind;
+use glam::DVec3;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -24,6 +25,9 @@ const RIM: f64 = 0.8;
 /// Candidates lie this far apart, in radii, and tips that far: a blunt end has one.
 const CANDIDATES_APART: f64 = 0.3;
 const TIPS_APART: f64 = 0.8;
+
+/// Vertices whose distance from the rim is this little less than the greatest are equally far out.
+const END: f64 = 0.1;
 
 /// Steps of climbing; two reach the end of any limb within the disc.
 const CLIMBS: usize = 3;
@@ -78,7 +82,7 @@ fn climb(ground: &Ground, start: u32, radius: f64) -> Option<(f64, u32)> {
         }
         let rim: Vec<u32> = around.iter().filter(|x| x.1 > RIM * radius).map(|x| x.0).collect();
         let inside: BTreeMap<u32, f64> = around.into_iter().collect();
-        let (end, _) = *disc(ground, &rim, f64::INFINITY, Some(&inside)).last()?;
+        let end = end(ground, &disc(ground, &rim, f64::INFINITY, Some(&inside)))?;
         if end == at {
             break;
         }
@@ -86,6 +90,17 @@ fn climb(ground: &Ground, start: u32, radius: f64) -> Option<(f64, u32)> {
     }
     let ratio = slenderness(ground, &disc(ground, &[at], radius, None), radius)?;
     (ratio < SLENDER).then_some((ratio, at))
+}
+
+/// The middle of the vertices furthest out in a search: lengths along edges do not tell them apart.
+fn end(ground: &Ground, found: &Disc) -> Option<u32> {
+    let furthest = found.last()?.1;
+    let at = |v: u32| ground.mesh.points[v as usize];
+    let far: Vec<u32> = found.iter().filter(|x| x.1 >= (1.0 - END) * furthest).map(|x| x.0).collect();
+    let mean = far.iter().map(|&v| at(v)).sum::<DVec3>() / far.len() as f64;
+    let nearer =
+        |a: &u32, b: &u32| at(*a).distance_squared(mean).total_cmp(&at(*b).distance_squared(mean)).then(a.cmp(b));
+    far.into_iter().min_by(nearer)
 }
 
 /// Tips of limbs, the most slender first; `side` is that of a patch.
@@ -154,4 +169,32 @@ fn best(bench: &Bench, scale: &Scale, tip: u32) -> Option<Gain> {
     unions.retain(|change| cells.iter().all(|c| change.cells.contains(c)));
     let found = unions.into_iter().filter_map(|change| scale.best(&Change { pin: Some(tip), ..change }));
     found.max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cells.cmp(&a.1.cells)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Adjacency, TriMesh, shapes};
+
+    fn tips_of(mesh: &TriMesh, side: f64) -> Vec<u32> {
+        let adjacency = Adjacency::new(mesh);
+        let sharp = vec![false; adjacency.opposite.len()];
+        tips(&Ground::new(mesh, &adjacency, &sharp), side)
+    }
+
+    #[test]
+    fn a_finger_of_four_radii_has_one_tip_within_0_7_radii_of_its_end() {
+        let mesh = shapes::snout(4.0, 4000);
+        let found = tips_of(&mesh, 4.0);
+        assert_eq!(found.len(), 1);
+        let end = mesh.points.iter().copied().max_by(|a, b| a.z.total_cmp(&b.z)).unwrap();
+        let off = mesh.points[found[0] as usize].distance(end);
+        assert!(off < 0.7, "{off} at {}", mesh.points[found[0] as usize]);
+    }
+
+    #[test]
+    fn spheres_and_tori_wider_than_a_patch_have_no_tips() {
+        assert!(tips_of(&shapes::sphere(1.0, 4), 0.5).is_empty());
+        assert!(tips_of(&shapes::torus(1.0, 0.4, 60, 30), 0.5).is_empty());
+    }
 }
