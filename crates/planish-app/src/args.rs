@@ -22,7 +22,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 The way of the data:
   mesh -> repair -> layout -> grids -> surfaces -> seams -> relief -> files
-  `run` goes all the way; `layout` stops at the network, so that it can be edited; `fit` goes on from there.
+  `run` goes all the way; `layout` stops at the network; `fit` goes on from there; `edit` changes the curves.
 
 Exit status:
   0 done   1 a demanded tolerance is missed (the result is written)   2 wrong usage   3 unusable input
@@ -54,6 +54,8 @@ pub enum Command {
     Layout(Layout),
     /// Mesh and network -> grids, surfaces, seams and relief in one model file
     Fit(Fit),
+    /// Model and script -> the model with curves, corners and feature curves edited
+    Edit(Edit),
     /// Model -> STEP, mesh or displacement maps; the format comes from the extension
     Export(Export),
     /// Distances and normal errors between any two meshes or models
@@ -310,6 +312,30 @@ pub struct Fit {
     pub stages: AllStages,
 }
 
+/// `planish edit`
+#[derive(Args, Debug)]
+pub struct Edit {
+    /// The model; or a mesh, to draw a network from nothing
+    #[arg(value_name = "MODEL.planish|MESH")]
+    pub input: PathBuf,
+    /// The edits, one after the other
+    #[arg(value_name = "SCRIPT.toml")]
+    pub script: PathBuf,
+    /// Where the edited model goes [default: over the input, if that is a model]
+    #[arg(short, long, value_name = "MODEL.planish")]
+    pub output: Option<PathBuf>,
+    /// Leave surfaces away even if the network is finished: `planish fit` makes them later
+    #[arg(long)]
+    pub no_fit: bool,
+    /// Folder for a picture after every edit; made if missing
+    #[arg(long, value_name = "DIR")]
+    pub pictures: Option<PathBuf>,
+    #[command(flatten)]
+    pub common: Common,
+    #[command(flatten)]
+    pub stages: AllStages,
+}
+
 /// `planish export`
 #[derive(Args, Debug)]
 pub struct Export {
@@ -401,6 +427,14 @@ impl AllStages {
         let fit = self.fit.params_over(stored.fit, seed)?;
         let stitch = self.stitch.params_over(stored.stitch, seed)?;
         Ok(PipelineParams { fit, stitch, ..stored })
+    }
+
+    /// True if no option of any stage is given.
+    pub fn none_given(&self) -> bool {
+        self.layout.first_given().is_none()
+            && self.grid.first_given().is_none()
+            && self.fit.first_given().is_none()
+            && self.stitch.first_given().is_none()
     }
 
     /// The fit tolerance if the user demanded one, as a fraction of the diagonal.

@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use planish::DVec3;
 use planish::geom::Bvh;
 use planish::mesh::TriMesh;
-use planish::model::Model;
+use planish::model::{Drawing, Model};
 use planish::network::CurveKind;
 use planish::pipeline;
 use planish::relief;
@@ -96,6 +96,75 @@ pub fn pictures(model: &Model, report: &Report, up: Up) -> Result<Vec<Picture>, 
         picture.scale = Some(Scale { colors: steps.collect(), labels: labels.into() });
     }
     Ok(pictures)
+}
+
+/// What a picture of a drawing shows.
+#[derive(Clone, Debug, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct View {
+    /// Direction from the shape towards the eye.
+    pub toward: [f64; 3],
+    /// The direction that is up.
+    pub up: [f64; 3],
+    /// Shows only what lies within a distance of a place: `[x, y, z, distance]`, world units.
+    pub around: Option<[f64; 4]>,
+}
+
+impl Default for View {
+    fn default() -> View {
+        View { toward: [0.62, 0.42, 1.0], up: [0.0, 1.0, 0.0], around: None }
+    }
+}
+
+const SMOOTH_COLOR: [u8; 3] = [24, 78, 160];
+const ISO_FEATURE_COLOR: [u8; 3] = [20, 140, 60];
+
+/// A drawing on its mesh: finished patches in colours, curves in blue, those on sharp edges and boundaries in red,
+/// feature curves in green, corners as dots.
+/// # Errors
+/// If the picture cannot be drawn.
+pub fn drawing(mesh: &TriMesh, drawing: &Drawing, view: &View) -> Result<Vec<u8>, Failure> {
+    let network = &drawing.network;
+    let toward = DVec3::from_array(view.toward);
+    let up = DVec3::from_array(view.up);
+    let camera = match view.around {
+        Some([x, y, z, r]) => {
+            let center = DVec3::new(x, y, z);
+            let near = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|a| [center - a * r, center + a * r]);
+            Camera::around(&near.collect::<Vec<_>>(), toward, up, ASPECT)
+        }
+        None => close_up(Camera::fit(&mesh.bounds(), toward, up, ASPECT), mesh),
+    };
+    let palette = render::even_colors(network.patches.len());
+    let cut = planish::network::imprint(mesh, network).ok();
+    let (mut all, mut colors) = (TriMesh::default(), Vec::new());
+    for (patch, color) in cut.iter().flatten().zip(&palette) {
+        let first = all.points.len() as u32;
+        all.points.extend(&patch.mesh.points);
+        all.triangles.extend(patch.mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+        colors.resize(all.triangles.len(), *color);
+    }
+    let mut lines: Vec<Line> = Vec::new();
+    let mut add = |places: &[planish::mesh::FacePoint], color: [u8; 3], width: f64| {
+        lines.push(Line { points: places.iter().map(|p| p.position(mesh)).collect(), color, width });
+    };
+    for curve in &network.curves {
+        let color = if curve.kind == CurveKind::Smooth { SMOOTH_COLOR } else { FEATURE_COLOR };
+        add(&curve.points, color, 2.4);
+    }
+    for feature in &drawing.sketch.features {
+        add(&feature.points, ISO_FEATURE_COLOR, 2.4);
+    }
+    for corner in &network.corners {
+        add(&[corner.place, corner.place], SEAM_COLOR, 6.0);
+    }
+    let (shown, paint) = match all.triangles.is_empty() {
+        true => (mesh, Paint::Plain(CLAY)),
+        false => (&all, Paint::PerTriangle(&colors)),
+    };
+    let look = Look { paint, lines, hollows: 0.6, background: Some(GROUND), ..Look::default() };
+    let image = render::render(shown, &look, &camera, SIZE.0, SIZE.1).map_err(Failure::fault)?;
+    png(&image)
 }
 
 /// `camera` moved so that `mesh` just fills the picture.

@@ -89,14 +89,14 @@ fn help_shows_the_commands_in_the_order_of_the_pipeline() {
     assert_eq!(status(&output), 0);
     let text = stdout(&output);
     let at = |word: &str| text.find(&format!("\n  {word} ")).unwrap_or_else(|| panic!("no {word} in\n{text}"));
-    let places: Vec<usize> = ["demo", "run", "layout", "fit", "export", "compare", "info"].map(at).into();
+    let places: Vec<usize> = ["demo", "run", "layout", "fit", "edit", "export", "compare", "info"].map(at).into();
     assert!(places.is_sorted(), "{text}");
 }
 
 #[test]
 fn every_command_has_help_and_every_option_of_it_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
-    for command in ["demo", "run", "layout", "fit", "export", "compare", "info"] {
+    for command in ["demo", "run", "layout", "fit", "edit", "export", "compare", "info"] {
         let output = planish(&[command, "--help"], folder.path());
         assert_eq!(status(&output), 0, "{command}");
         let text = stdout(&output);
@@ -321,4 +321,81 @@ fn ctrl_c_ends_within_1_s_with_status_130_and_no_partial_file() {
     assert_eq!(ended.code(), Some(130));
     assert!(took < Duration::from_millis(1500), "took {took:?}");
     assert!(names(folder.path()).is_empty(), "left {:?}", names(folder.path()));
+}
+
+/// Twelve edges of the box become curves, then one curve is bent and the bend taken back.
+const BOX_SCRIPT: &str = r#"
+[view]
+toward = [1.0, 0.7, 0.5]
+
+[[step]]
+edit = "feature_lines"
+angle_deg = 40.0
+
+[[step]]
+edit = "paint"
+picks = [[0.5, 0.0, 1.0], [0.5, 0.4, 1.0], [0.5, 1.0, 1.0]]
+mode = "geodesic"
+"#;
+
+#[test]
+fn a_script_draws_a_network_on_a_bare_mesh_and_the_history_goes_back_and_forth_in_later_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    write_box(&folder.path().join("box.ply"), 12);
+    let script = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    script("draw.toml", BOX_SCRIPT);
+    let output = planish(&["edit", "box.ply", "draw.toml", "-o", "box.planish", "--pictures", "seen"], folder.path());
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    // The stroke divides the top in two patches and puts a corner into two edges: their other sides have five.
+    let told = stderr(&output);
+    assert_eq!(
+        told.lines().filter(|l| l.starts_with("warning: ") && l.contains("has 5 sides, not 4")).count(),
+        2,
+        "{told}"
+    );
+    assert!(stdout(&output).contains("not finished"));
+    assert_eq!(names(&folder.path().join("seen")), ["01-feature_lines.png", "02-paint.png"]);
+    // Split across the neighbours all the way round: finished, and fitted.
+    script("split.toml", "[[step]]\nedit = \"split_region\"\nat = [0.25, 0.0, 0.3]\n");
+    let output = planish(&["edit", "box.planish", "split.toml", "--threads", "1"], folder.path());
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    assert!(stdout(&output).contains("10 patches, finished"), "{}{}", stdout(&output), stderr(&output));
+    script("back.toml", "[[step]]\nedit = \"undo\"\ncount = 2\n");
+    let output = planish(&["edit", "box.planish", "back.toml", "-o", "plain.planish", "--threads", "2"], folder.path());
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    let text = stdout(&output);
+    assert!(text.contains("6 patches, finished") && text.contains("1 to take back, 2 to make again"), "{text}");
+    script("again.toml", "[[step]]\nedit = \"redo\"\ncount = 2\n");
+    let output = planish(&["edit", "plain.planish", "again.toml", "-o", "again.planish"], folder.path());
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    assert_eq!(
+        fs::read(folder.path().join("box.planish")).unwrap(),
+        fs::read(folder.path().join("again.planish")).unwrap()
+    );
+    // Nothing is left to make again.
+    let output = planish(&["edit", "again.planish", "again.toml", "-o", "x.planish"], folder.path());
+    assert_eq!(status(&output), 3);
+    assert!(error_line(&output).contains("step 1 (redo): there is nothing left to make again"));
+    assert!(!folder.path().join("x.planish").exists());
+}
+
+#[test]
+fn a_script_that_cannot_be_told_its_line_and_a_wrong_edit_its_step() {
+    let folder = tempfile::tempdir().unwrap();
+    write_box(&folder.path().join("box.ply"), 4);
+    let run = |text: &str| {
+        fs::write(folder.path().join("s.toml"), text).unwrap();
+        let output = planish(&["edit", "box.ply", "s.toml", "-o", "box.planish"], folder.path());
+        assert_eq!(status(&output), 3, "{text}");
+        error_line(&output)
+    };
+    assert!(run("[[step]]\nedit = \"paint\"\npicks = 3\n").contains("s.toml"));
+    assert!(run("[[step]]\nedit = \"fly\"\n").contains("fly"));
+    assert!(
+        run("[[step]]\nedit = \"split_curve\"\ncurve = 4\nat = 0.5\n")
+            .contains("step 1 (split_curve): curve 4 is not there")
+    );
+    let output = planish(&["edit", "box.ply", "s.toml"], folder.path());
+    assert_eq!(status(&output), 2);
+    assert!(error_line(&output).contains("--output"));
 }

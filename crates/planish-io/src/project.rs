@@ -10,6 +10,7 @@
 
 mod array;
 mod schema;
+mod steps;
 
 use crate::atomic;
 use planish::Model;
@@ -20,7 +21,7 @@ use std::path::{Path, PathBuf};
 /// `plan` in ASCII: marks a SQLite database as a planish project.
 pub const APPLICATION_ID: u32 = 0x706C_616E;
 /// Version of the schema that is written, and the newest that is read.
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
 
 /// Why a project file could not be read or written. Shown as `what is wrong (where) - hint: what to do`.
 #[derive(Debug, thiserror::Error)]
@@ -139,7 +140,7 @@ pub fn read_model(path: impl AsRef<Path>) -> Result<Model, ProjectError> {
     if found > SCHEMA_VERSION {
         return Err(ProjectError::Newer { found });
     }
-    schema::read(&connection)
+    schema::read(&connection, found)
 }
 
 /// What SQLite keeps beside a database while it is open, and leaves there after a crash.

@@ -39,6 +39,7 @@ fn model(n: usize) -> Model {
         units: Units::In,
         params: "{\"layout\":{\"patches\":16}}".into(),
         history: vec![entry("layout"), entry("fit"), entry("move_corner")],
+        ..Model::default()
     }
 }
 
@@ -53,6 +54,38 @@ fn model_comes_back_bit_for_bit_from_a_single_file_and_twice_the_same_bytes() {
     write_model(&path, &model).unwrap();
     assert_eq!(std::fs::read(&path).unwrap(), bytes);
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_model_with_feature_curves_and_7_steps_comes_back_and_shares_the_chains_of_its_steps() {
+    use planish::curve::symmetry::Plane;
+    use planish::grid::{Family, FeatureCurve, Sections};
+    let folder = folder();
+    let mut model = model(5);
+    let entry = |k: usize| HistoryEntry { command: format!("drag_curve_{k}"), parameters: "{}".into() };
+    let points = model.network.curves[0].points.clone();
+    model.sketch.features.push(FeatureCurve { patch: 1, family: Family::V, points });
+    model.sketch.sections.push((1, Sections { u: vec![4, 9], v: Vec::new() }));
+    model.sketch.symmetry = Some(Plane { point: DVec3::ONE, normal: DVec3::Y });
+    let small = folder.path().join("small.planish");
+    write_model(&small, &model).unwrap();
+    for k in 0..7 {
+        let mut edited = model.drawing();
+        edited.network.curves[k].points.reverse();
+        model.record(entry(k), edited);
+    }
+    assert!(model.undo() && model.undo() && model.undo.len() == 5 && model.redo.len() == 2);
+    let path = folder.path().join("steps.planish");
+    write_model(&path, &model).unwrap();
+    let mut back = read_model(&path).unwrap();
+    assert_eq!(back, model);
+    // Taken back and made again after reading, as before writing.
+    assert!(back.redo() && model.redo());
+    assert_eq!(back, model);
+    while model.undo() {}
+    while back.undo() {}
+    assert_eq!(back, model);
+    assert_eq!(back.history.len(), 3);
 }
 
 #[test]
@@ -86,7 +119,7 @@ fn newer_schema_other_programs_truncated_and_damaged_files_are_refused_with_a_hi
         let message = read_model(file(&folder, "b.planish", bytes)).map(|_| wanted).unwrap_err().to_string();
         assert!(message.contains(wanted) && message.contains(" - hint: ") && !message.contains('\n'), "{message}");
     };
-    refused(&|b| b[63] = 7, "its schema is version 7, newer than 1 that this planish knows - hint: update planish");
+    refused(&|b| b[63] = 7, "its schema is version 7, newer than 2 that this planish knows - hint: update planish");
     refused(&|b| b[68..72].fill(0), "it is a database of another program (application id 0x00000000)");
     refused(&|b| b.clear(), "it is not a planish project");
     refused(&|b| b[0] = b'X', "it is not a planish project");

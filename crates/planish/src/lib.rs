@@ -19,6 +19,8 @@
 
 pub mod cloud;
 pub mod contour;
+pub mod curve;
+pub mod edit;
 pub mod field;
 pub mod geom;
 pub mod grid;

@@ -1,6 +1,7 @@
 //! A model: everything one project holds, from the mesh to the reliefs, and how it came to be.
 
-use crate::grid::Grid;
+use crate::curve::symmetry::Plane;
+use crate::grid::{FeatureCurve, Grid, Sections};
 use crate::mesh::TriMesh;
 use crate::network::Network;
 use crate::relief::Relief;
@@ -30,6 +31,87 @@ pub struct Model {
     pub params: String,
     /// The commands that led here, oldest first.
     pub history: Vec<HistoryEntry>,
+    /// What is drawn besides the network.
+    pub sketch: Sketch,
+    /// Edits that can be taken back, oldest first; their commands are the last ones of `history`.
+    pub undo: Vec<Step>,
+    /// Edits taken back that can be made again, the next one last.
+    pub redo: Vec<Step>,
+}
+
+/// What is drawn on the mesh besides the network.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sketch {
+    /// Feature curves of the patches.
+    pub features: Vec<FeatureCurve>,
+    /// Numbers of grid cells between the feature curves of a patch, where they are given: `(patch, cells)`.
+    pub sections: Vec<(u32, Sections)>,
+    /// The plane of symmetry, if one is given or was found.
+    pub symmetry: Option<Plane>,
+}
+
+/// Everything that edits change.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Drawing {
+    /// Corners, curves and patches.
+    pub network: Network,
+    /// What is drawn besides.
+    pub sketch: Sketch,
+}
+
+/// An edit with the drawing on its other side: that before it where it can be taken back, that after it where it can
+/// be made again.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Step {
+    /// The edit.
+    pub entry: HistoryEntry,
+    /// The drawing on its other side.
+    pub other: Drawing,
+}
+
+impl Model {
+    /// The drawing as it is.
+    pub fn drawing(&self) -> Drawing {
+        Drawing { network: self.network.clone(), sketch: self.sketch.clone() }
+    }
+
+    fn exchange(&mut self, drawing: Drawing) -> Drawing {
+        // Whatever was made from the network is no longer of it.
+        (self.grids, self.surfaces, self.reliefs) = Default::default();
+        let network = std::mem::replace(&mut self.network, drawing.network);
+        Drawing { network, sketch: std::mem::replace(&mut self.sketch, drawing.sketch) }
+    }
+
+    /// Takes over an edited drawing as one entry of the history. Grids, surfaces and reliefs are dropped; edits that
+    /// were taken back can no longer be made again.
+    pub fn record(&mut self, entry: HistoryEntry, edited: Drawing) {
+        let other = self.exchange(edited);
+        self.history.push(entry.clone());
+        self.undo.push(Step { entry, other });
+        self.redo.clear();
+    }
+
+    /// Takes back the last edit. False if there is none.
+    pub fn undo(&mut self) -> bool {
+        let Some(Step { entry, other }) = self.undo.pop() else { return false };
+        let other = self.exchange(other);
+        // Fits in between stay in the history: they did happen.
+        if let Some(at) = self.history.iter().rposition(|h| *h == entry) {
+            self.history.remove(at);
+        }
+        self.redo.push(Step { entry, other });
+        true
+    }
+
+    /// Makes the last edit that was taken back again. False if there is none.
+    pub fn redo(&mut self) -> bool {
+        let Some(Step { entry, other }) = self.redo.pop() else { return false };
+        let other = self.exchange(other);
+        self.history.push(entry.clone());
+        self.undo.push(Step { entry, other });
+        true
+    }
 }
 
 /// One command of a model's history.

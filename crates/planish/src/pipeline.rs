@@ -11,7 +11,7 @@ pub use quality::{SEAM_ANGLE_WARNING_DEG, displaced_mesh, span_count, surface_me
 pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
 pub use scan::{ScanError, ScanMeshed, ScanParams, mesh_scan, sample_figures, scan_figures, voxel_for};
 
-use crate::grid::{self, GridError, GridParams};
+use crate::grid::{self, FeatureError, GridError, GridParams};
 use crate::mesh::{self, CompareError, MeshError, Repairs, TriMesh};
 use crate::model::Model;
 use crate::network::{self, ImprintError, LayoutError, LayoutParams, Network};
@@ -78,6 +78,9 @@ pub enum PipelineError {
     /// A patch cannot be resampled.
     #[error(transparent)]
     Grid(#[from] GridError),
+    /// A patch cannot follow its feature curves.
+    #[error(transparent)]
+    Feature(#[from] FeatureError),
     /// The surfaces cannot be fitted.
     #[error(transparent)]
     Fit(#[from] FitError),
@@ -188,6 +191,49 @@ pub fn refit(
     let mut clock = Clock::new(observer, &WEIGHTS);
     surfaces(model, params, &mut clock).map_err(|e| or_cancelled(e, observer))?;
     Ok(clock.records)
+}
+
+/// Makes grids, surfaces, seams and reliefs of a model whose network or feature curves were edited, and measures it.
+///
+/// On an error the model is what it was.
+/// # Errors
+/// As [`fit`]; the network must part the whole mesh into four-sided patches.
+pub fn rework(
+    model: &mut Model,
+    params: &PipelineParams,
+    observer: &dyn PipelineObserver,
+) -> Result<Assessed, PipelineError> {
+    let mut clock = Clock::new(observer, &WEIGHTS);
+    let before =
+        (std::mem::take(&mut model.grids), std::mem::take(&mut model.surfaces), std::mem::take(&mut model.reliefs));
+    let made = remade(model, params, &mut clock).map_err(|e| or_cancelled(e, observer));
+    if made.is_err() {
+        (model.grids, model.surfaces, model.reliefs) = before;
+    }
+    let quality::Measured { quality, seams, warnings } = made?;
+    Ok(Assessed { stages: clock.records, quality, seams, warnings })
+}
+
+fn remade(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Result<quality::Measured, PipelineError> {
+    let (mesh, network) = (&model.mesh, &model.network);
+    let patches = clock.stage("imprint", |_| network::imprint(mesh, network), |p| [("patches", p.len())])?;
+    let drawn = (&model.sketch.features[..], &model.sketch.sections[..]);
+    model.grids = clock.stage(
+        "grids",
+        |o| -> Result<_, PipelineError> {
+            let plain = grid::resample(mesh, network, &patches, &params.grid, o)?;
+            if drawn.0.is_empty() {
+                return Ok(plain);
+            }
+            // As fine as the patches want without the curves.
+            let sizes: Vec<(usize, usize)> = plain.iter().map(|g| (g.cols, g.rows)).collect();
+            Ok(grid::relax_network(mesh, network, &patches, &sizes, drawn, &params.grid, o)?)
+        },
+        |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
+    )?;
+    surfaces(model, params, clock)?;
+    let repairs = Repairs::default();
+    clock.stage("measure", |o| quality::measure(model, &patches, &repairs, o), |m| [("seams", m.seams.len())])
 }
 
 /// What [`assess`] finds.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms and the floor each stands on; a room may use its own and lower floors. The ground floor also speaks of
 /// meshes in its queries, and those are plain types.
-const FLOORS: [(&str, u32); 15] = [
+const FLOORS: [(&str, u32); 16] = [
     ("observe", 0),
     ("linalg", 0),
     ("geom", 1),
@@ -20,6 +20,7 @@ const FLOORS: [(&str, u32); 15] = [
     ("relief", 9),
     ("model", 10),
     ("render", 10),
+    ("edit", 11),
     ("pipeline", 11),
 ];
 

@@ -4,6 +4,7 @@ mod clean;
 mod compare;
 mod decimate;
 mod demo;
+mod edit;
 mod export;
 mod fit;
 mod info;
@@ -37,6 +38,7 @@ pub fn run(cli: Cli) -> Result<Status, Failure> {
         Command::Decimate(args) => decimate::decimate(&Session::new(&args.common)?, &args),
         Command::Layout(args) => layout::layout(&Session::new(&args.common)?, &args),
         Command::Fit(args) => fit::fit(&Session::new(&args.common)?, &args),
+        Command::Edit(args) => edit::edit(&Session::new(&args.common)?, &args),
         Command::Export(args) => export::export(&Session::new(&args.common)?, &args),
         Command::Compare(args) => compare::compare(&Session::new(&args.common)?, &args),
         Command::Info(args) => info::info(&Session::new(&args.common)?, &args),

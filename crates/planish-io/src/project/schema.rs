@@ -1,7 +1,8 @@
-//! Schema version 1: tables of a project, and a model to and from them.
+//! Schema version 2: tables of a project, and a model to and from them. Version 1 had no sketch and no steps.
 
 use super::ProjectError;
 use super::array::{Array, Arrays, Loaded, damaged};
+use super::steps;
 use planish::grid::Grid;
 use planish::mesh::{Attribute, FacePoint, TriMesh};
 use planish::network::{Corner, Curve, CurveKind, Network, Patch};
@@ -26,6 +27,9 @@ CREATE TABLE surface (patch INTEGER PRIMARY KEY, rows INTEGER NOT NULL, cols INT
 CREATE TABLE relief (patch INTEGER PRIMARY KEY, rows INTEGER NOT NULL, cols INTEGER NOT NULL, vectors INTEGER NOT NULL);
 CREATE TABLE history (sequence INTEGER PRIMARY KEY, parent INTEGER REFERENCES history, command TEXT NOT NULL,
     parameters TEXT NOT NULL);
+CREATE TABLE pool (id INTEGER PRIMARY KEY, lengths INTEGER NOT NULL, faces INTEGER NOT NULL, weights INTEGER NOT NULL);
+CREATE TABLE step (id INTEGER PRIMARY KEY, stack TEXT NOT NULL, command TEXT NOT NULL, parameters TEXT NOT NULL,
+    drawing TEXT NOT NULL);
 ";
 
 /// A network without its places: these are arrays, first those of the corners, then those of the curves.
@@ -49,9 +53,11 @@ struct CurveLayout {
 pub(super) fn write(transaction: &Transaction, model: &Model) -> Result<(), ProjectError> {
     transaction.execute_batch(TABLES)?;
     let mut arrays = Arrays::default();
+    let sketch = serde_json::to_string(&model.sketch).map_err(std::io::Error::other)?;
     for (key, value) in [
         ("generator", concat!("planish ", env!("CARGO_PKG_VERSION"))),
         ("params", &model.params),
+        ("sketch", &sketch),
         ("units", model.units.symbol()),
     ] {
         transaction.execute("INSERT INTO meta VALUES (?1, ?2)", params![key, value])?;
@@ -90,6 +96,7 @@ pub(super) fn write(transaction: &Transaction, model: &Model) -> Result<(), Proj
         let row = params![k as i64 + 1, parent, entry.command, entry.parameters];
         transaction.prepare_cached("INSERT INTO history VALUES (?1, ?2, ?3, ?4)")?.execute(row)?;
     }
+    steps::write(transaction, model, &mut arrays)?;
     arrays.write(transaction)
 }
 
@@ -107,7 +114,7 @@ fn write_network(transaction: &Transaction, network: &Network, arrays: &mut Arra
     Ok(())
 }
 
-fn add_places<'a>(arrays: &mut Arrays, places: impl Iterator<Item = &'a FacePoint>) -> (i64, i64) {
+pub(super) fn add_places<'a>(arrays: &mut Arrays, places: impl Iterator<Item = &'a FacePoint>) -> (i64, i64) {
     let (mut faces, mut weights) = (Vec::new(), Vec::new());
     for place in places {
         faces.push(place.face);
@@ -117,7 +124,7 @@ fn add_places<'a>(arrays: &mut Arrays, places: impl Iterator<Item = &'a FacePoin
 }
 
 /// Reads a model and checks that its parts fit together.
-pub(super) fn read(connection: &Connection) -> Result<Model, ProjectError> {
+pub(super) fn read(connection: &Connection, version: u32) -> Result<Model, ProjectError> {
     let mut arrays = Loaded::read(connection)?;
     let meta = |key: &str| -> Result<String, ProjectError> {
         Ok(connection.query_row("SELECT value FROM meta WHERE key = ?1", [key], |row| row.get(0))?)
@@ -158,6 +165,11 @@ pub(super) fn read(connection: &Connection) -> Result<Model, ProjectError> {
     let mut select = connection.prepare("SELECT command, parameters FROM history ORDER BY sequence")?;
     let entry = |row: &rusqlite::Row| Ok(HistoryEntry { command: row.get(0)?, parameters: row.get(1)? });
     model.history = select.query_map([], entry)?.collect::<Result<_, _>>()?;
+    if version >= 2 {
+        model.sketch = serde_json::from_str(&meta("sketch")?).map_err(|e| damaged(e.to_string(), "meta", 0))?;
+        steps::check_sketch(&model.sketch, faces).map_err(|what| damaged(what, "meta", 0))?;
+        steps::read(connection, &mut arrays, &mut model)?;
+    }
     Ok(model)
 }
 
@@ -233,7 +245,12 @@ fn read_network(connection: &Connection, arrays: &mut Loaded, face_count: usize)
 }
 
 /// Places on the mesh out of their arrays.
-fn places(arrays: &mut Loaded, faces: i64, weights: i64, count: usize) -> Result<Vec<FacePoint>, ProjectError> {
+pub(super) fn places(
+    arrays: &mut Loaded,
+    faces: i64,
+    weights: i64,
+    count: usize,
+) -> Result<Vec<FacePoint>, ProjectError> {
     let (f, w) = (arrays.u32(faces)?, arrays.f64(weights)?);
     if w.len() != 3 * f.len() || f.iter().any(|&f| f as usize >= count) || !w.iter().all(|w| w.is_finite()) {
         return Err(damaged("the places are not on the mesh".into(), "array", faces));

@@ -11,7 +11,7 @@
 //! Belyaev and Seidel 2004, made symmetric) and moving single vertices into the kernel of their ring follow.
 
 use super::locate::orientation;
-use super::{Fault, side};
+use super::{Fault, SideStops, side};
 use crate::geom::tolerance;
 use crate::linalg::SparseCholesky;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
@@ -46,8 +46,14 @@ pub struct Chart {
     pub rim: [Vec<(u32, u8)>; 4],
 }
 
-/// Flattens `patch`.
-pub fn flatten(input: &TriMesh, patch: &PatchMesh, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<Chart, Fault> {
+/// Flattens `patch`; `stops` are those of its sides, which get `counts` points along u and v.
+pub fn flatten(
+    input: &TriMesh,
+    patch: &PatchMesh,
+    stops: &SideStops,
+    counts: [usize; 2],
+    cancelled: &(dyn Fn() -> bool + Sync),
+) -> Result<Chart, Fault> {
     let stop = || if cancelled() { Err(Fault::Cancelled) } else { Ok(()) };
     let adjacency = check(patch)?;
     stop()?;
@@ -66,7 +72,7 @@ pub fn flatten(input: &TriMesh, patch: &PatchMesh, cancelled: &(dyn Fn() -> bool
     chart.uv = vec![DVec2::ZERO; chart.points.len()];
     for (k, chain) in patch.sides.iter().enumerate() {
         let points: Vec<DVec3> = chain.iter().map(|&v| patch.mesh.points[v as usize]).collect();
-        for (&v, s) in chain.iter().zip(side::fractions(&points)) {
+        for (&v, s) in chain.iter().zip(side::fractions_at(&points, counts[k % 2], &stops[k])) {
             chart.uv[v as usize] = match k {
                 0 => DVec2::new(s, 0.0),
                 1 => DVec2::new(1.0, s),
@@ -480,7 +486,7 @@ pub mod tests {
             (0..n).rev().map(|j| j * n).collect(),
         ];
         let patch = PatchMesh { mesh: input.clone(), origin, face_origin, sides };
-        flatten(&input, &patch, &|| false).expect("a flat chart")
+        flatten(&input, &patch, &SideStops::default(), [2, 2], &|| false).expect("a flat chart")
     }
 
     #[test]

@@ -14,6 +14,9 @@
 mod catch;
 mod chart;
 mod even;
+mod feature_curve;
+mod feature_network;
+mod feature_strand;
 mod fold;
 mod locate;
 mod net;
@@ -25,6 +28,8 @@ mod sizes;
 mod springs;
 mod walk;
 
+pub use feature_curve::{Family, FeatureCurve, FeatureError, FeatureGrid, Sections, relax_with_features};
+pub use feature_network::relax_network;
 pub use quality::{GridQuality, measure};
 pub use resample::resample;
 pub use sizes::choose_sizes;
@@ -186,11 +191,26 @@ pub fn relax(
     params: &GridParams,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, GridError> {
+    relax_at(input, patches, sizes, &[], params, observer)
+}
+
+/// For each side the shares of its length at which a node is to lie, with the node.
+type SideStops = [side::Stops; 4];
+
+/// As [`relax`], with stops of the sides of each patch; an empty slice for none at all.
+fn relax_at(
+    input: &TriMesh,
+    patches: &[PatchMesh],
+    sizes: &[(usize, usize)],
+    stops: &[SideStops],
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<Vec<Grid>, GridError> {
     if patches.len() != sizes.len() {
         return Err(GridError::SizeCount { patches: patches.len(), sizes: sizes.len() });
     }
     let jobs: Vec<Job> = patches.iter().zip(sizes).enumerate().map(|(k, (patch, &size))| (k, patch, size)).collect();
-    relax_jobs(input, &jobs, params, observer)
+    relax_jobs(input, &jobs, stops, params, observer)
 }
 
 /// Vertices that are missed by more than this part of what is allowed are caught.
@@ -202,9 +222,11 @@ type Job<'a> = (usize, &'a PatchMesh, (usize, usize));
 fn relax_jobs(
     input: &TriMesh,
     jobs: &[Job],
+    stops: &[SideStops],
     params: &GridParams,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, GridError> {
+    let none = SideStops::default();
     let caught = CAUGHT * params.miss * input.bounds().diagonal();
     let total: usize = jobs.iter().map(|j| j.1.mesh.triangles.len()).sum::<usize>().max(1);
     let done = AtomicUsize::new(0);
@@ -218,7 +240,9 @@ fn relax_jobs(
             if cols < 2 || rows < 2 {
                 return Err(GridError::TooSmall { patch: k, cols, rows });
             }
-            let grid = relax_patch(input, patch, cols, rows, params, caught, observer).map_err(|f| f.of_patch(k))?;
+            let stops = stops.get(k).unwrap_or(&none);
+            let made = relax_patch(input, patch, (cols, rows), stops, params, caught, observer);
+            let grid = made.map_err(|f| f.of_patch(k))?;
             let size = patch.mesh.triangles.len();
             observer.progress((done.fetch_add(size, Ordering::Relaxed) + size) as f64 / total as f64);
             Ok(grid)
@@ -227,17 +251,27 @@ fn relax_jobs(
     results.into_iter().collect()
 }
 
+/// Index of the `n`-th point along side `k`, in the direction of the side.
+fn rim_node(k: usize, n: usize, cols: usize, rows: usize) -> usize {
+    match k {
+        0 => n,
+        1 => n * cols + cols - 1,
+        2 => (rows - 1) * cols + cols - 1 - n,
+        _ => (rows - 1 - n) * cols,
+    }
+}
+
 fn relax_patch(
     input: &TriMesh,
     patch: &PatchMesh,
-    cols: usize,
-    rows: usize,
+    (cols, rows): (usize, usize),
+    stops: &SideStops,
     params: &GridParams,
     caught: f64,
     observer: &dyn Observer,
 ) -> Result<Grid, Fault> {
     let cancelled = || observer.cancelled();
-    let chart = chart::flatten(input, patch, &cancelled)?;
+    let chart = chart::flatten(input, patch, stops, [cols, rows], &cancelled)?;
     let spots = springs::relax(&chart, cols, rows, params, caught, &cancelled)?;
     let mut grid = Grid {
         rows,
@@ -248,14 +282,9 @@ fn relax_patch(
     for (k, chain) in patch.sides.iter().enumerate() {
         let count = if k % 2 == 0 { cols } else { rows };
         let points: Vec<DVec3> = chain.iter().map(|&v| patch.mesh.points[v as usize]).collect();
-        let samples = side::resample(&points, count);
+        let samples = side::resample_at(&points, count, &stops[k]);
         for n in 0..count {
-            let node = match k {
-                0 => n,
-                1 => n * cols + cols - 1,
-                2 => (rows - 1) * cols + cols - 1 - n,
-                _ => (rows - 1 - n) * cols,
-            };
+            let node = rim_node(k, n, cols, rows);
             let (triangle, corner) = chart.rim[k][samples.segment[n] as usize];
             let mut bary = [0.0; 3];
             bary[corner as usize] = 1.0 - samples.fraction[n];

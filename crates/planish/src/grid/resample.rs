@@ -64,7 +64,7 @@ pub fn resample(
         let jobs: Vec<Job> = suspects.iter().map(|&p| (p, &patches[p], wanted[p])).collect();
         let share = (1.0 - FIRST_SHARE) / ROUNDS as f64;
         let part = Part::new(observer, FIRST_SHARE + share * round as f64, share);
-        for (&p, grid) in suspects.iter().zip(relax_jobs(input, &jobs, params, &part)?) {
+        for (&p, grid) in suspects.iter().zip(relax_jobs(input, &jobs, &[], params, &part)?) {
             grids[p] = grid;
         }
         sizes = wanted;

@@ -52,17 +52,62 @@ pub fn length(chain: &[DVec3]) -> f64 {
     arc_lengths(chain).last().copied().unwrap_or(0.0)
 }
 
+/// Stops of a side: shares of its length, rising, with the node that lies there. Shares are multiples of
+/// [`STOP_STEP`], so that both directions of a chain have the same bits.
+pub type Stops = Vec<(f64, usize)>;
+
+/// Step of the shares of stops.
+const STOP_STEP: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// The multiple of [`STOP_STEP`] nearest to a share.
+pub fn stop_share(share: f64) -> f64 {
+    (share / STOP_STEP).round() * STOP_STEP
+}
+
+/// The stops of a side read from its other end.
+pub fn turned(stops: &Stops, count: usize) -> Stops {
+    stops.iter().rev().map(|&(s, k)| (1.0 - s, count - 1 - k)).collect()
+}
+
+/// Share of the length at node `k` of `count`: even between stops.
+fn share_at(k: usize, count: usize, stops: &Stops) -> f64 {
+    let after = stops.iter().position(|s| s.1 > k).unwrap_or(stops.len());
+    let low = if after > 0 { stops[after - 1] } else { (0.0, 0) };
+    let high = stops.get(after).copied().unwrap_or((1.0, count - 1));
+    if high.1 == low.1 {
+        return low.0;
+    }
+    low.0 + (high.0 - low.0) * ((k - low.1) as f64 / (high.1 - low.1) as f64)
+}
+
+/// Place in the chart, 0 to 1, of a share of the length: nodes lie evenly in the chart.
+fn chart_at(share: f64, count: usize, stops: &Stops) -> f64 {
+    let after = stops.iter().position(|s| s.0 > share).unwrap_or(stops.len());
+    let low = if after > 0 { stops[after - 1] } else { (0.0, 0) };
+    let high = stops.get(after).copied().unwrap_or((1.0, count - 1));
+    let t = if high.0 > low.0 { (share - low.0) / (high.0 - low.0) } else { 0.0 };
+    (low.1 as f64 + t * (high.1 - low.1) as f64) / (count - 1) as f64
+}
+
 /// `count >= 2` points of `chain` at equal arc length.
+#[cfg(test)]
 pub fn resample(chain: &[DVec3], count: usize) -> SideSamples {
+    resample_at(chain, count, &Stops::new())
+}
+
+/// `count >= 2` points of `chain` at equal arc length between stops.
+pub fn resample_at(chain: &[DVec3], count: usize, stops: &Stops) -> SideSamples {
     let backwards = runs_backwards(chain);
     let canonical: Vec<DVec3> = if backwards { chain.iter().rev().copied().collect() } else { chain.to_vec() };
+    let stops = if backwards { turned(stops, count) } else { stops.clone() };
     let sums = arc_lengths(&canonical);
     let total = sums[sums.len() - 1];
     let segments = canonical.len() - 1;
     let mut out = SideSamples { points: Vec::new(), segment: Vec::new(), fraction: Vec::new() };
     let mut s = 0;
     for k in 0..count {
-        let target = total * (k as f64 / (count - 1) as f64);
+        let share = if stops.is_empty() { k as f64 / (count - 1) as f64 } else { share_at(k, count, &stops) };
+        let target = total * share;
         while s + 1 < segments && sums[s + 1] <= target {
             s += 1;
         }
@@ -83,6 +128,15 @@ pub fn resample(chain: &[DVec3], count: usize) -> SideSamples {
         out.fraction.reverse();
     }
     out
+}
+
+/// Place of every vertex of `chain` in the chart: 0 to 1, strictly rising, by arc length between stops.
+pub fn fractions_at(chain: &[DVec3], count: usize, stops: &Stops) -> Vec<f64> {
+    let mut at = fractions(chain);
+    if !stops.is_empty() {
+        at.iter_mut().for_each(|s| *s = chart_at(*s, count, stops));
+    }
+    at
 }
 
 /// Arc length of every vertex of `chain` over its whole length: 0 to 1, strictly rising.

@@ -100,12 +100,27 @@ pub enum LayoutError {
 /// # Errors
 /// `NotManifold` for a mesh that needs repair, `Stuck` if its faces are degenerate beyond use.
 pub fn layout(mesh: &TriMesh, params: &LayoutParams, observer: &dyn Observer) -> Result<Network, LayoutError> {
+    layout_around(mesh, &[], &[], params, observer)
+}
+
+/// As [`layout`], around lines that are given: the half-edges `lines` become patch boundaries like feature lines,
+/// the vertices `corners` of them corners. Both may be empty.
+/// # Errors
+/// As [`layout`].
+pub(super) fn layout_around(
+    mesh: &TriMesh,
+    lines: &[bool],
+    corners: &[bool],
+    params: &LayoutParams,
+    observer: &dyn Observer,
+) -> Result<Network, LayoutError> {
     check(mesh)?;
     let adjacency = Adjacency::new(mesh);
     let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
     let side = (area / params.patches.max(1) as f64).sqrt();
     let mut edge = EDGE_TO_SIDE * side;
-    let (sharp, _) = lines::feature_lines(mesh, &adjacency, params);
+    let (mut sharp, _) = lines::feature_lines(mesh, &adjacency, params);
+    sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
     let mut fixed = vec![false; mesh.points.len()];
     for h in 0..sharp.len() as u32 {
         if sharp[h as usize] || adjacency.opposite[h as usize] == NONE {
@@ -115,7 +130,7 @@ pub fn layout(mesh: &TriMesh, params: &LayoutParams, observer: &dyn Observer) ->
     }
     for _ in 0..ATTEMPTS {
         let work = refine::refine(mesh, edge, &fixed);
-        if let Some((work, complex)) = draft(work, &sharp, side, params, observer)? {
+        if let Some((work, complex)) = draft(work, (&sharp, corners), side, params, observer)? {
             let work_adjacency = Adjacency::new(&work.mesh);
             if let Some(mut bench) = Bench::new(&work.mesh, &work_adjacency, complex)
                 && improve::quads(&mut bench)
@@ -162,7 +177,7 @@ fn check(mesh: &TriMesh) -> Result<(), LayoutError> {
 /// `None` if the cells cannot be made even.
 fn draft(
     work: Refined,
-    sharp: &[bool],
+    (sharp, given): (&[bool], &[bool]),
     side: f64,
     params: &LayoutParams,
     observer: &dyn Observer,
@@ -175,7 +190,7 @@ fn draft(
     for attempt in 0..COUNT_ATTEMPTS {
         observer.progress(0.1 * attempt as f64);
         let (label, count) = partition::partition(&ground, cells.round() as usize, COVER * side, observer)?;
-        let (finer, mut complex) = draw(&work, &ground, sharp, &label, count, side / 4.0);
+        let (finer, mut complex) = draw(&work, &ground, (sharp, given), &label, count, side / 4.0);
         if !polygon::make_even(&finer.mesh, &mut complex) {
             break;
         }
@@ -198,12 +213,12 @@ fn draft(
 fn draw(
     work: &Refined,
     ground: &partition::Ground,
-    sharp: &[bool],
+    (sharp, given): (&[bool], &[bool]),
     label: &[u32],
     count: usize,
     reach: f64,
 ) -> (Refined, Complex) {
-    let complex = outline::outline(ground, label, count, &outline::corners(ground, reach));
+    let complex = outline::outline(ground, label, count, &corners(ground, given, reach));
     let short: HashSet<[u32; 2]> = complex
         .live_arcs()
         .filter_map(|a| match complex.arc(2 * a).chain[..] {
@@ -216,8 +231,15 @@ fn draw(
     let adjacency = Adjacency::new(&finer.mesh);
     let finer_sharp = carry(&finer, &adjacency, sharp);
     let ground = partition::Ground::new(&finer.mesh, &adjacency, &finer_sharp);
-    let complex = outline::outline(&ground, &label, count, &outline::corners(&ground, reach));
+    let complex = outline::outline(&ground, &label, count, &corners(&ground, given, reach));
     (finer, complex)
+}
+
+/// Corners of the fixed lines, those given among them (the working mesh keeps the numbers of the vertices).
+fn corners(ground: &partition::Ground, given: &[bool], reach: f64) -> Vec<bool> {
+    let mut corner = outline::corners(ground, reach);
+    corner.iter_mut().zip(given).for_each(|(c, &g)| *c |= g);
+    corner
 }
 
 /// The sharp half-edges of the working mesh: the pieces of those of the input.

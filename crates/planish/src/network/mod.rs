@@ -1,9 +1,14 @@
 //! Networks: corners, curves and four-sided patches on a mesh.
 
+mod diagnose;
 pub(crate) mod disk;
+mod edit;
+mod edit_split;
 pub(crate) mod imprint;
 mod layout;
 
+pub use diagnose::{Diagnosis, Fault, Region, diagnose, glance};
+pub use edit::{EditError, Editor};
 pub use imprint::{ImprintError, imprint};
 pub use layout::{LayoutError, LayoutParams, layout};
 

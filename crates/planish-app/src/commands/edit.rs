@@ -1,0 +1,204 @@
+//! `planish edit`: a script of edits applied to a model, as one history.
+
+use super::run::{seam_rows, summary, verdict};
+use super::{Session, commit_report, pipeline_failure};
+use crate::args::Edit as EditArgs;
+use crate::failure::{Failure, Status};
+use crate::files;
+use crate::pictures::{self, View};
+use crate::products::Staged;
+use crate::summary::Summary;
+use planish::edit::{self, ApplyError, Edit, Ground};
+use planish::model::{Drawing, HistoryEntry, Model};
+use planish::network::{Diagnosis, diagnose};
+use planish::pipeline::{self, PipelineParams, Warning};
+use planish_io::report::{Report, count};
+use serde::Deserialize;
+use std::path::Path;
+
+/// A script.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Script {
+    /// The edits, one after the other.
+    #[serde(default)]
+    step: Vec<Edit>,
+    /// What pictures show.
+    #[serde(default)]
+    view: View,
+}
+
+pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
+    let from_mesh = !files::is_model(&args.input);
+    let output = match &args.output {
+        Some(output) => output.clone(),
+        None if from_mesh => {
+            return Err(Failure::usage("--output", "is needed with a mesh").hint("name a .planish file with -o"));
+        }
+        None => args.input.clone(),
+    };
+    files::check_extension(&output, &["planish"])?;
+    let script = read_script(&args.script)?;
+    let own_report = session.stage_report()?;
+    if let Some(folder) = &args.pictures {
+        std::fs::create_dir_all(folder).map_err(|e| Failure::usage(folder, format!("cannot be made ({e})")))?;
+    }
+    let (mut model, read) = session.step("read", || start(session, args))?;
+    let params = params(session, args, &model)?;
+    let mut report = Report::new("edit", files::model_facts(&args.input, &model, model.units));
+    report.stages.push(read);
+    let (found, record) = session.step("edit", || replay(session, args, &script, &mut model))?;
+    report.stages.push(record);
+    for fault in &found.faults {
+        report.warnings.push(Warning::new("network_unfinished", fault.to_string(), ""));
+    }
+    let finished = found.is_finished() && !model.network.patches.is_empty();
+    if finished && !args.no_fit && model.grids.is_empty() {
+        let wrong = |e| pipeline_failure(&args.input, None, e);
+        let made = pipeline::rework(&mut model, &params, &session.bars).map_err(wrong)?;
+        report.stages.extend(made.stages);
+        report.quality = made.quality;
+        report.warnings.extend(made.warnings);
+        report.seams = seam_rows(&model, &made.seams);
+        model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
+    }
+    let staged = Staged::file(&output)?;
+    let write = || planish_io::write_model(staged.file_path(), &model).map_err(|e| Failure::usage(&output, e));
+    let ((), record) = session.step("write", write)?;
+    report.stages.push(record);
+    staged.commit()?;
+    commit_report(own_report, &report)?;
+    let demanded = args.stages.demanded_tolerance();
+    if !session.common.quiet {
+        session.tell_warnings(&report);
+        let mut table = if model.surfaces.is_empty() { Summary::default() } else { summary(&report, demanded) };
+        let network = &model.network;
+        table.row("edits", count(script.step.len() as u64));
+        table.row(
+            "network",
+            format!(
+                "{} corners, {} curves, {} patches{}",
+                count(network.corners.len() as u64),
+                count(network.curves.len() as u64),
+                count(network.patches.len() as u64),
+                if finished { ", finished" } else { ", not finished" }
+            ),
+        );
+        if !model.sketch.features.is_empty() {
+            table.row("feature curves", count(model.sketch.features.len() as u64));
+        }
+        table.row("history", format!("{} to take back, {} to make again", model.undo.len(), model.redo.len()));
+        table.row("model", output.display().to_string());
+        table.print();
+    }
+    Ok(if model.surfaces.is_empty() { Status::Done } else { verdict(&report, demanded) })
+}
+
+fn read_script(path: &Path) -> Result<Script, Failure> {
+    let text = std::fs::read_to_string(path).map_err(|e| Failure::input(path, format!("cannot be read ({e})")))?;
+    toml::from_str(&text).map_err(|e| {
+        let place = e.span().map_or(String::new(), |s| {
+            let line = text[..s.start.min(text.len())].lines().count().max(1);
+            format!(" (line {line})")
+        });
+        Failure::input(path, format!("{}{place}", e.message())).hint("see docs/guide/edit.md for the edits")
+    })
+}
+
+/// The model to start from.
+fn start(session: &Session, args: &EditArgs) -> Result<Model, Failure> {
+    if files::is_model(&args.input) {
+        let mut model = files::model(&args.input)?;
+        if let Some(units) = session.common.units {
+            model.units = units.into();
+        }
+        return Ok(model);
+    }
+    let input = files::mesh(&args.input)?;
+    let (mesh, _) = planish::mesh::repair(&input).map_err(|e| Failure::input(&args.input, e))?;
+    Ok(Model { mesh, units: session.units(), ..Model::default() })
+}
+
+/// The model's own parameters, with the options given in place.
+fn params(session: &Session, args: &EditArgs, model: &Model) -> Result<PipelineParams, Failure> {
+    let given = args.stages.params(session.common.seed)?;
+    match model.params.as_str() {
+        "" => Ok(given),
+        json if args.stages.none_given() => serde_json::from_str(json).map_err(|e| {
+            Failure::input(&args.input, format!("has parameters of another version ({e})")).hint("give them as options")
+        }),
+        _ => Ok(given),
+    }
+}
+
+/// Applies the edits; returns what is left to do on the network.
+fn replay(session: &Session, args: &EditArgs, script: &Script, model: &mut Model) -> Result<Diagnosis, Failure> {
+    // The mesh stays as it is, so that all edits share what is made ready of it.
+    let mesh = std::mem::take(&mut model.mesh);
+    let ground = Ground::new(&mesh);
+    let others = |name: &str| other(&args.script, name);
+    let mut step = |k: usize, edit: &Edit| -> Result<(), Failure> {
+        one(model, edit, &ground, &others, session).map_err(|e| told(&args.script, k, edit, e))?;
+        let Some(folder) = &args.pictures else { return Ok(()) };
+        let file = folder.join(format!("{:02}-{}.png", k + 1, edit.name()));
+        let png = pictures::drawing(&mesh, &model.drawing(), &script.view)?;
+        std::fs::write(&file, png).map_err(|e| Failure::usage(&file, e))
+    };
+    let outcome = script.step.iter().enumerate().try_for_each(|(k, edit)| step(k, edit));
+    let found = diagnose(&mesh, &ground.canvas.adjacency, &model.network);
+    drop(ground);
+    model.mesh = mesh;
+    outcome?;
+    Ok(found)
+}
+
+enum Wrong {
+    Apply(ApplyError),
+    Nothing(&'static str),
+}
+
+impl From<ApplyError> for Wrong {
+    fn from(e: ApplyError) -> Wrong {
+        Wrong::Apply(e)
+    }
+}
+
+fn one(model: &mut Model, edit: &Edit, ground: &Ground, others: &edit::Others, session: &Session) -> Result<(), Wrong> {
+    match edit {
+        Edit::Undo { count } => (0..*count).try_for_each(|_| match model.undo() {
+            true => Ok(()),
+            false => Err(Wrong::Nothing("there is nothing left to take back")),
+        }),
+        Edit::Redo { count } => (0..*count).try_for_each(|_| match model.redo() {
+            true => Ok(()),
+            false => Err(Wrong::Nothing("there is nothing left to make again")),
+        }),
+        edit => {
+            let mut drawing: Drawing = model.drawing();
+            edit::apply(&mut drawing, edit, ground, others, &session.bars)?;
+            model.record(HistoryEntry { command: edit.name(), parameters: edit.parameters() }, drawing);
+            Ok(())
+        }
+    }
+}
+
+fn told(script: &Path, k: usize, edit: &Edit, wrong: Wrong) -> Failure {
+    let name = edit.name();
+    match wrong {
+        Wrong::Apply(ApplyError::Cancelled) => Failure::interrupted(),
+        Wrong::Apply(e) => {
+            Failure::input(script, format!("step {} ({name}): {}", k + 1, super::with_hint(&e.to_string())))
+        }
+        Wrong::Nothing(what) => {
+            Failure::input(script, format!("step {} ({name}): {what}", k + 1)).hint("ask for fewer")
+        }
+    }
+}
+
+/// Another model, named relative to the script.
+fn other(script: &Path, name: &str) -> Result<(planish::mesh::TriMesh, Drawing), String> {
+    let path = script.parent().unwrap_or(Path::new("")).join(name);
+    let model = planish_io::read_model(&path).map_err(|e| e.to_string())?;
+    let drawing = model.drawing();
+    Ok((model.mesh, drawing))
+}

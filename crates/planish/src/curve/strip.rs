@@ -1,0 +1,581 @@
+//! Strips of faces: the shortest way between two places within a strip, and strips turned around vertices until
+//! the way is straight everywhere on the surface.
+//!
+//! 1. a strip follows a chain of edges; 2. laid out flat, the funnel of its edges gives the shortest way in it;
+//! 3. where the way bends around a vertex and the surface on the other side opens by less than 180 degrees, the
+//!    strip is turned to that side; 4. again, until no vertex is left: the way is a geodesic.
+//!
+//! The turns are those that edge flips make in an intrinsic triangulation (Sharp and Crane 2020, *You can find
+//! geodesic paths in triangle meshes by just flipping edges*), done on the faces themselves: only faces that the
+//! way crosses are looked at.
+
+use super::CurveError;
+use crate::mesh::path::neighbours;
+use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next, previous};
+use glam::{DVec2, DVec3};
+use std::cmp::Ordering;
+use std::collections::{BinaryHeap, HashMap};
+
+/// A crossing nearer to the end of an edge than this share of it goes through the vertex: nearer ones would make
+/// triangles without area where the curve is imprinted.
+const AT_VERTEX: f64 = 1e-9;
+/// Slack on the angle of 180 degrees, radians: a way this straight is straight.
+const STRAIGHT: f64 = 1e-9;
+/// Rounds of turning per face of the strip before the way is taken as it is.
+const ROUNDS_PER_FACE: usize = 2;
+const LEAST_ROUNDS: usize = 64;
+
+/// Vertex that a place lies on, if it does exactly.
+pub(crate) fn vertex_of(mesh: &TriMesh, place: &FacePoint) -> Option<u32> {
+    (0..3).find(|&k| place.bary[k] == 1.0).map(|k| mesh.triangles[place.face as usize][k])
+}
+
+/// The corner of a place's face that is nearest to it.
+pub(crate) fn nearest_corner(mesh: &TriMesh, place: &FacePoint) -> u32 {
+    let p = place.position(mesh);
+    let corners = mesh.corners(place.face as usize);
+    let k = (0..3).min_by(|&i, &j| corners[i].distance_squared(p).total_cmp(&corners[j].distance_squared(p)));
+    mesh.triangles[place.face as usize][k.unwrap_or(0)]
+}
+
+/// Places from `from` to `to`, both included, along a geodesic of the surface near the shortest chain of edges;
+/// neighbours share a face.
+/// # Errors
+/// `NoWay` if the two lie on different pieces of the mesh.
+pub fn connect(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    from: FacePoint,
+    to: FacePoint,
+) -> Result<Vec<FacePoint>, CurveError> {
+    if from.face == to.face {
+        return Ok(vec![from, to]);
+    }
+    // Most neighbours of a curve lie on adjacent faces.
+    for h in 3 * from.face..3 * from.face + 3 {
+        let o = adjacency.opposite[h as usize];
+        if o != NONE && o / 3 == to.face {
+            return Ok(straightened(mesh, adjacency, from, vec![h], to));
+        }
+    }
+    let (a, b) = (nearest_corner(mesh, &from), nearest_corner(mesh, &to));
+    let chain = local_path(mesh, adjacency, a, b).ok_or_else(|| no_way(mesh, &from, &to))?;
+    straighten(mesh, adjacency, from, &chain, to).ok_or_else(|| no_way(mesh, &from, &to))
+}
+
+pub(crate) fn no_way(mesh: &TriMesh, from: &FacePoint, to: &FacePoint) -> CurveError {
+    CurveError::NoWay { from: from.position(mesh).to_array(), to: to.position(mesh).to_array() }
+}
+
+/// Pulls the chain of vertices `chain`, which begins at a corner of the face of `from` and ends at one of the face of
+/// `to`, to a geodesic between these places. Neighbours of the result share a face. `None` if the chain is no chain
+/// of edges.
+pub fn straighten(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    from: FacePoint,
+    chain: &[u32],
+    to: FacePoint,
+) -> Option<Vec<FacePoint>> {
+    let portals = strip_along(mesh, adjacency, from.face, chain, to.face)?;
+    Some(straightened(mesh, adjacency, from, portals, to))
+}
+
+/// Half-edges that a strip leaves its faces by, from `first` along `chain` to `last`.
+fn strip_along(mesh: &TriMesh, adjacency: &Adjacency, first: u32, chain: &[u32], last: u32) -> Option<Vec<u32>> {
+    let mut portals = Vec::with_capacity(2 * chain.len());
+    let mut face = first;
+    for (k, &v) in chain.iter().enumerate() {
+        let has = |f: u32| match chain.get(k + 1) {
+            Some(&w) => mesh.triangles[f as usize].contains(&w),
+            None => f == last,
+        };
+        face = turn(mesh, adjacency, face, v, has, &mut portals)?;
+    }
+    (face == last).then_some(portals)
+}
+
+/// Turns around `v` from `face` to a face for which `there` holds, the way with fewer faces; adds the half-edges
+/// crossed to `portals`. `None` if there is no such face around `v`.
+fn turn(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    face: u32,
+    v: u32,
+    there: impl Fn(u32) -> bool,
+    portals: &mut Vec<u32>,
+) -> Option<u32> {
+    if there(face) {
+        return Some(face);
+    }
+    let k = mesh.triangles[face as usize].iter().position(|&w| w == v)? as u32;
+    let (mut left, mut right) = (Vec::new(), Vec::new());
+    // Counter-clockwise a face is left by the half-edge that enters the vertex, clockwise by the one that leaves it.
+    let (mut out_left, mut out_right) = (previous(3 * face + k), 3 * face + k);
+    let (mut open_left, mut open_right) = (true, true);
+    while open_left || open_right {
+        if open_left {
+            left.push(out_left);
+            let g = adjacency.opposite[out_left as usize];
+            open_left = g != NONE && g / 3 != face;
+            if open_left {
+                if there(g / 3) {
+                    push_all(adjacency, portals, &left);
+                    return Some(g / 3);
+                }
+                out_left = previous(g);
+            }
+        }
+        if open_right {
+            right.push(out_right);
+            let g = adjacency.opposite[out_right as usize];
+            open_right = g != NONE && g / 3 != face;
+            if open_right {
+                if there(g / 3) {
+                    push_all(adjacency, portals, &right);
+                    return Some(g / 3);
+                }
+                out_right = next(g);
+            }
+        }
+    }
+    None
+}
+
+/// Appends half-edges to a strip; going back over the last one takes it away.
+fn push_all(adjacency: &Adjacency, portals: &mut Vec<u32>, more: &[u32]) {
+    for &h in more {
+        match portals.last() {
+            Some(&g) if adjacency.opposite[g as usize] == h => {
+                portals.pop();
+            }
+            _ => portals.push(h),
+        }
+    }
+}
+
+/// A strip laid out in the plane.
+struct Layout {
+    start: DVec2,
+    end: DVec2,
+    /// For each half-edge crossed the vertex on the left and its place, then the same on the right.
+    left: Vec<(u32, DVec2)>,
+    right: Vec<(u32, DVec2)>,
+}
+
+/// A bend of the shortest way within a strip.
+struct Bend {
+    /// Last half-edge crossed that has the vertex.
+    portal: usize,
+    on_left: bool,
+    at: DVec2,
+}
+
+fn lay_out(mesh: &TriMesh, from: &FacePoint, portals: &[u32], to: &FacePoint) -> Layout {
+    let point = |v: u32| mesh.points[v as usize];
+    let [a, b, c] = mesh.triangles[from.face as usize];
+    let mut flat = [DVec2::ZERO, DVec2::new(point(a).distance(point(b)), 0.0), DVec2::ZERO];
+    flat[2] = beyond(point(b), flat[1], point(a), flat[0], point(c));
+    let mut names = [a, b, c];
+    let weigh = |flat: &[DVec2; 3], w: [f64; 3]| flat[0] * w[0] + flat[1] * w[1] + flat[2] * w[2];
+    let start = weigh(&flat, from.bary);
+    let (mut left, mut right) = (Vec::with_capacity(portals.len()), Vec::with_capacity(portals.len()));
+    for (i, &h) in portals.iter().enumerate() {
+        let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
+        let find = |v: u32| names.iter().position(|&w| w == v).unwrap_or(0);
+        let (fa, fb) = (flat[find(a)], flat[find(b)]);
+        right.push((a, fa));
+        left.push((b, fb));
+        // The face beyond: that of the next half-edge, or the last.
+        let face = portals.get(i + 1).map_or(to.face, |&g| g / 3);
+        let apex = mesh.triangles[face as usize].into_iter().find(|&v| v != a && v != b).unwrap_or(a);
+        names = [b, a, apex];
+        flat = [fb, fa, beyond(point(a), fa, point(b), fb, point(apex))];
+    }
+    let corner = |v: u32| flat[names.iter().position(|&w| w == v).unwrap_or(0)];
+    let end = weigh(&mesh.triangles[to.face as usize].map(corner), to.bary);
+    Layout { start, end, left, right }
+}
+
+/// Where `c` comes to lie in the plane, to the right of the way from `a` to `b`.
+fn beyond(a: DVec3, fa: DVec2, b: DVec3, fb: DVec2, c: DVec3) -> DVec2 {
+    let (edge, flat) = (b - a, fb - fa);
+    let length = edge.length();
+    if length == 0.0 {
+        return fa + DVec2::new(c.distance(a), 0.0);
+    }
+    let along = (c - a).dot(edge) / length;
+    let height = (c - a).cross(edge).length() / length;
+    let unit = flat / flat.length().max(f64::MIN_POSITIVE);
+    fa + unit * along + DVec2::new(unit.y, -unit.x) * height
+}
+
+/// Bends of the shortest way through a laid-out strip (the funnel of Lee and Preparata).
+fn funnel(lay: &Layout) -> Vec<Bend> {
+    let count = lay.left.len();
+    let sides = |i: usize| if i < count { (lay.left[i].1, lay.right[i].1) } else { (lay.end, lay.end) };
+    let mut bends = Vec::new();
+    let mut apex = lay.start;
+    if count == 0 {
+        return bends;
+    }
+    let (mut l, mut r) = sides(0);
+    let (mut li, mut ri) = (0, 0);
+    let mut i = 1;
+    while i <= count {
+        let (left, right) = sides(i);
+        if (r - apex).perp_dot(right - apex) >= 0.0 {
+            if apex == r || (l - apex).perp_dot(right - apex) < 0.0 {
+                (r, ri) = (right, i);
+            } else {
+                bends.push(Bend { portal: li, on_left: true, at: l });
+                apex = l;
+                i = li + 1;
+                (l, r) = (apex, apex);
+                ri = li;
+                continue;
+            }
+        }
+        if (l - apex).perp_dot(left - apex) <= 0.0 {
+            if apex == l || (r - apex).perp_dot(left - apex) > 0.0 {
+                (l, li) = (left, i);
+            } else {
+                bends.push(Bend { portal: ri, on_left: false, at: r });
+                apex = r;
+                i = ri + 1;
+                (l, r) = (apex, apex);
+                li = ri;
+                continue;
+            }
+        }
+        i += 1;
+    }
+    // The funnel may name the end itself, or one vertex twice.
+    bends.retain(|b| b.portal < count);
+    bends.dedup_by(|b, a| a.at == b.at);
+    bends
+}
+
+/// Turns the strip until its shortest way is straight; returns the places of that way.
+fn straightened(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    from: FacePoint,
+    mut portals: Vec<u32>,
+    to: FacePoint,
+) -> Vec<FacePoint> {
+    let ends = [from, to];
+    let (from, to) =
+        (beyond_its_edge(adjacency, from, &mut portals, true), beyond_its_edge(adjacency, to, &mut portals, false));
+    let finish = |mut places: Vec<FacePoint>| {
+        let last = places.len() - 1;
+        (places[0], places[last]) = (ends[0], ends[1]);
+        places
+    };
+    let rounds = ROUNDS_PER_FACE * portals.len() + LEAST_ROUNDS;
+    for _ in 0..rounds {
+        let lay = lay_out(mesh, &from, &portals, &to);
+        let bends = funnel(&lay);
+        let mut turned: Vec<u32> = Vec::with_capacity(portals.len());
+        let mut done = 0;
+        let mut changed = false;
+        for (k, bend) in bends.iter().enumerate() {
+            let side = if bend.on_left { &lay.left } else { &lay.right };
+            let w = side[bend.portal].0;
+            let first = (0..=bend.portal).rev().take_while(|&i| side[i].0 == w).last().unwrap_or(bend.portal);
+            let last = (bend.portal..side.len()).take_while(|&i| side[i].0 == w).last().unwrap_or(bend.portal);
+            if first < done {
+                continue;
+            }
+            let before = if k > 0 { bends[k - 1].at } else { lay.start };
+            let after = bends.get(k + 1).map_or(lay.end, |b| b.at);
+            if let Some(other) = other_side(mesh, adjacency, &lay, bend, [first, last], &portals, [before, after]) {
+                push_all(adjacency, &mut turned, &portals[done..first]);
+                push_all(adjacency, &mut turned, &other);
+                done = last + 1;
+                changed = true;
+            }
+        }
+        if !changed {
+            return finish(places(mesh, &from, &portals, &to, &lay, &bends));
+        }
+        push_all(adjacency, &mut turned, &portals[done..]);
+        portals = turned;
+    }
+    let lay = lay_out(mesh, &from, &portals, &to);
+    let bends = funnel(&lay);
+    finish(places(mesh, &from, &portals, &to, &lay, &bends))
+}
+
+/// Weights below this are zero: the place lies on the edge.
+const ON_EDGE: f64 = 1e-12;
+
+/// An end of a strip that lies on the first (or last) edge crossed, named on the face beyond; that edge is no longer
+/// crossed then, or the way would name the place twice.
+fn beyond_its_edge(adjacency: &Adjacency, place: FacePoint, portals: &mut Vec<u32>, first: bool) -> FacePoint {
+    let mut at = place;
+    let mut done = 0;
+    loop {
+        // The half-edge of the face that the place is named on, and the one beyond.
+        let left = portals.len() - done;
+        let h = match first {
+            _ if left == 0 => break,
+            true => portals[done],
+            false => adjacency.opposite[portals[left - 1] as usize],
+        };
+        if h / 3 != at.face || at.bary[previous(h) as usize % 3] > ON_EDGE {
+            break;
+        }
+        let g = adjacency.opposite[h as usize];
+        let mut bary = [0.0; 3];
+        let (a, b) = (at.bary[h as usize % 3], at.bary[next(h) as usize % 3]);
+        (bary[next(g) as usize % 3], bary[g as usize % 3]) = (a / (a + b), b / (a + b));
+        at = FacePoint { face: g / 3, bary };
+        done += 1;
+    }
+    if first {
+        portals.drain(..done)
+    } else {
+        portals.drain(portals.len() - done..)
+    };
+    at
+}
+
+/// The half-edges that pass the vertex of `bend` on its other side, if the surface opens by less than 180 degrees
+/// there.
+fn other_side(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    lay: &Layout,
+    bend: &Bend,
+    [first, last]: [usize; 2],
+    portals: &[u32],
+    [before, after]: [DVec2; 2],
+) -> Option<Vec<u32>> {
+    let (own, far) = if bend.on_left { (&lay.left, &lay.right) } else { (&lay.right, &lay.left) };
+    let w = own[bend.portal].0;
+    if before == bend.at || after == bend.at || adjacency.is_boundary_vertex(w) {
+        return None;
+    }
+    let mut inside = 0.0;
+    let mut arm = before - bend.at;
+    for x in (first..=last).map(|i| far[i].1).chain([after]) {
+        let edge = x - bend.at;
+        inside += arm.perp_dot(edge).abs().atan2(arm.dot(edge));
+        arm = edge;
+    }
+    let p = mesh.points[w as usize];
+    let whole: f64 = adjacency
+        .fan(w)
+        .map(|h| {
+            let (e, f) =
+                (mesh.points[mesh.origin(next(h)) as usize] - p, mesh.points[mesh.origin(previous(h)) as usize] - p);
+            e.cross(f).length().atan2(e.dot(f))
+        })
+        .sum();
+    if whole - inside >= std::f64::consts::PI - STRAIGHT {
+        return None;
+    }
+    let goal = adjacency.opposite[portals[last] as usize] / 3;
+    let mut crossed = Vec::new();
+    let mut out = if bend.on_left { next(portals[first]) } else { previous(portals[first]) };
+    for _ in 0..3 * (last - first) + 64 {
+        crossed.push(out);
+        let g = adjacency.opposite[out as usize];
+        if g == NONE {
+            return None;
+        }
+        if g / 3 == goal {
+            return Some(crossed);
+        }
+        out = if bend.on_left { next(g) } else { previous(g) };
+    }
+    // A vertex with a great many faces.
+    None
+}
+
+/// The places where the way crosses the half-edges of its strip.
+fn places(
+    mesh: &TriMesh,
+    from: &FacePoint,
+    portals: &[u32],
+    to: &FacePoint,
+    lay: &Layout,
+    bends: &[Bend],
+) -> Vec<FacePoint> {
+    let mut out = vec![*from];
+    let mut last_vertex = vertex_of(mesh, from);
+    let (mut a, mut bend) = (lay.start, 0);
+    for (i, &h) in portals.iter().enumerate() {
+        while bend < bends.len() && bends[bend].portal < i {
+            a = bends[bend].at;
+            bend += 1;
+        }
+        let b = bends.get(bend).map_or(lay.end, |b| b.at);
+        let (l, r) = (lay.left[i].1, lay.right[i].1);
+        let share = if l == a || l == b {
+            0.0
+        } else if r == a || r == b {
+            1.0
+        } else {
+            let d = b - a;
+            let over = (r - l).perp_dot(d);
+            let s = (a - l).perp_dot(d) / over;
+            if s.is_finite() { s.clamp(0.0, 1.0) } else { 0.5 }
+        };
+        let k = if share <= AT_VERTEX {
+            Some(next(h))
+        } else if share >= 1.0 - AT_VERTEX {
+            Some(h)
+        } else {
+            None
+        };
+        let place = match k {
+            Some(k) => FacePoint::corner(k / 3, k as usize % 3),
+            None => {
+                let mut bary = [0.0; 3];
+                bary[h as usize % 3] = share;
+                bary[next(h) as usize % 3] = 1.0 - share;
+                FacePoint { face: h / 3, bary }
+            }
+        };
+        let vertex = k.map(|k| mesh.origin(k));
+        if vertex.is_none() || vertex != last_vertex {
+            out.push(place);
+        }
+        last_vertex = vertex;
+    }
+    if last_vertex.is_none() || vertex_of(mesh, to) != last_vertex || out.len() == 1 {
+        out.push(*to);
+    } else if let Some(last) = out.last_mut() {
+        *last = *to;
+    }
+    out
+}
+
+/// A vertex waiting in the heap; the nearest comes out first, ties by index.
+pub(super) struct Waiting {
+    pub estimate: f64,
+    pub distance: f64,
+    pub vertex: u32,
+}
+
+impl PartialEq for Waiting {
+    fn eq(&self, other: &Waiting) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Waiting {}
+impl PartialOrd for Waiting {
+    fn partial_cmp(&self, other: &Waiting) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Waiting {
+    fn cmp(&self, other: &Waiting) -> Ordering {
+        other.estimate.total_cmp(&self.estimate).then(other.vertex.cmp(&self.vertex))
+    }
+}
+
+/// Shortest chain of edges between two vertices that lie near each other (A*); memory grows with what is visited.
+fn local_path(mesh: &TriMesh, adjacency: &Adjacency, from: u32, to: u32) -> Option<Vec<u32>> {
+    let goal = mesh.points[to as usize];
+    let mut reached: HashMap<u32, (f64, u32)> = HashMap::from([(from, (0.0, NONE))]);
+    let mut heap = BinaryHeap::from([Waiting { estimate: 0.0, distance: 0.0, vertex: from }]);
+    while let Some(Waiting { distance, vertex: v, .. }) = heap.pop() {
+        if distance > reached[&v].0 {
+            continue;
+        }
+        if v == to {
+            let mut chain = vec![v];
+            let mut at = v;
+            while reached[&at].1 != NONE {
+                at = reached[&at].1;
+                chain.push(at);
+            }
+            chain.reverse();
+            return Some(chain);
+        }
+        let p = mesh.points[v as usize];
+        for (w, _) in neighbours(mesh, adjacency, v) {
+            let q = mesh.points[w as usize];
+            let d = distance + p.distance(q);
+            if reached.get(&w).is_none_or(|x| d < x.0) {
+                reached.insert(w, (d, v));
+                heap.push(Waiting { estimate: d + q.distance(goal), distance: d, vertex: w });
+            }
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    fn length(mesh: &TriMesh, places: &[FacePoint]) -> f64 {
+        places.windows(2).map(|w| w[0].position(mesh).distance(w[1].position(mesh))).sum()
+    }
+
+    #[test]
+    fn a_way_over_a_flat_sheet_is_the_straight_segment_within_1e_12() {
+        let mesh = shapes::rectangle(2.0, 1.0, 23, 17);
+        let adjacency = Adjacency::new(&mesh);
+        for k in 0..40u32 {
+            let faces = mesh.triangles.len() as u32;
+            let at = |i: u32| FacePoint { face: i * 7919 % faces, bary: [0.2, 0.3, 0.5] };
+            let (p, q) = (at(k + 1), at(3 * k + 5));
+            let way = connect(&mesh, &adjacency, p, q).unwrap();
+            let straight = p.position(&mesh).distance(q.position(&mesh));
+            assert!((length(&mesh, &way) - straight).abs() < 1e-12, "{k}");
+        }
+    }
+
+    #[test]
+    fn a_way_over_a_cube_unfolds_to_the_straight_line_of_length_root_5() {
+        // From the middle of a lower edge of one face over the opposite upper edge of the next: 1 across, 2 up.
+        let mesh = shapes::cuboid(DVec3::ONE, 6);
+        let adjacency = Adjacency::new(&mesh);
+        let find = |p: DVec3| {
+            let v = (0..mesh.points.len())
+                .min_by(|&a, &b| mesh.points[a].distance(p).total_cmp(&mesh.points[b].distance(p)));
+            let h = adjacency.outgoing[v.unwrap()];
+            FacePoint::corner(h / 3, h as usize % 3)
+        };
+        let low = mesh.bounds();
+        let (a, b) = (low.min, low.max);
+        let p = find(a);
+        let q = find(b);
+        let way = connect(&mesh, &adjacency, p, q).unwrap();
+        assert!((length(&mesh, &way) - 5f64.sqrt()).abs() < 1e-12, "{}", length(&mesh, &way));
+    }
+
+    #[test]
+    fn neighbours_of_a_way_share_a_face_and_ends_are_kept() {
+        let mesh = shapes::double_torus(6);
+        let adjacency = Adjacency::new(&mesh);
+        let faces = mesh.triangles.len() as u32;
+        for k in 0..60u32 {
+            let p = FacePoint { face: (k * 104_729) % faces, bary: [0.1, 0.3, 0.6] };
+            let q = FacePoint { face: (k * 7_907 + 13) % faces, bary: [0.5, 0.5, 0.0] };
+            let way = connect(&mesh, &adjacency, p, q).unwrap();
+            assert_eq!((way[0], way[way.len() - 1]), (p, q));
+            for pair in way.windows(2) {
+                let faces = |x: &FacePoint| -> Vec<u32> {
+                    let near: Vec<usize> = (0..3).filter(|&k| x.bary[k] > 0.0).collect();
+                    let t = mesh.triangles[x.face as usize];
+                    match near[..] {
+                        [i] => adjacency.fan(t[i]).map(|h| h / 3).collect(),
+                        [i, j] => (0..faces)
+                            .filter(|&f| [t[i], t[j]].iter().all(|v| mesh.triangles[f as usize].contains(v)))
+                            .collect(),
+                        _ => vec![x.face],
+                    }
+                };
+                let other = faces(&pair[1]);
+                assert!(faces(&pair[0]).iter().any(|f| other.contains(f)), "{k}");
+            }
+        }
+    }
+}
