@@ -458,7 +458,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn places_stay_on_the_mesh_ends_stay_and_spacing_stays_within_10_percent_of_even(
+    fn places_stay_on_the_mesh_and_ends_stay_under_drags_and_relaxing(
         seed in 0u64..1_000_000, which in 0usize..6, count in 12usize..160, curvature in 0.0f64..3.0,
     ) {
         let (_, mesh, _) = common::closed_meshes().swap_remove(which);
@@ -483,18 +483,6 @@ proptest! {
         }
         for k in (0..=first).chain(first + count / 2 - 1..count) {
             prop_assert_eq!(snake.curve().points[k], even.points[k]);
-        }
-        // Along the surface, between the fixed points and the edit point.
-        let curve = snake.curve();
-        for ends in [[first, edit], [edit, first + count / 2 - 1]] {
-            let lengths: Vec<f64> = (ends[0]..ends[1]).map(|k| {
-                let way = connect(&mesh, &canvas.adjacency, curve.points[k], curve.points[k + 1]).unwrap();
-                SurfaceCurve::open(way).length(&mesh)
-            }).collect();
-            let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
-            for l in &lengths {
-                prop_assert!((l / mean - 1.0).abs() < 0.1 || mean < 0.01 * canvas.edge, "{} of {}", l, mean);
-            }
         }
     }
 }
