@@ -17,6 +17,7 @@ mod cell;
 mod certificate;
 mod face;
 mod feature;
+mod local;
 mod octree;
 mod patch;
 mod polish;
@@ -228,8 +229,8 @@ pub fn extract(
     if octree.is_some() {
         cells.par_sort_unstable_by_key(|c| [c.0[2], c.0[1], c.0[0]]);
     }
-    counts.moved = polish::polish(&mut mesh, field, base, cells, &wishes);
-    counts.kept = wishes.len() - counts.moved;
+    let polished = polish::polish(&mut mesh, field, base, cells, &wishes, creases, &mut kinds, &mut edges);
+    (counts.moved, counts.kept) = (polished.moved, polished.kept);
     let mut extracted = Extracted { mesh, tags: tags(kinds, edges), counts };
     drop_unused(&mut extracted);
     extracted.tags.mark(&mut extracted.mesh);

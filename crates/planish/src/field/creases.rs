@@ -169,4 +169,7 @@ impl Creases for MeshCreases {
         let hit = self.lines.as_ref()?.closest(p);
         (hit.distance < reach).then_some(hit.position)
     }
+    fn corners(&self) -> Vec<DVec3> {
+        self.corners.iter().map(|c| c.1).collect()
+    }
 }

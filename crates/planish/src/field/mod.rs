@@ -167,4 +167,9 @@ pub trait Creases: Sync {
     /// The place of a feature nearest to `p`, within `reach`: where a vertex goes that had to stay in its cell. `hits`
     /// are the positions and normals around.
     fn nearest(&self, p: DVec3, reach: f64, hits: &[(DVec3, DVec3)]) -> Option<DVec3>;
+
+    /// The corners that are known, where features meet, bend or end; none where the source cannot list them.
+    fn corners(&self) -> Vec<DVec3> {
+        Vec::new()
+    }
 }
