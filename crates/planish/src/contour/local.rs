@@ -24,8 +24,6 @@ const LEAN: f64 = 0.5;
 pub struct Local<'a> {
     /// The mesh. Merged triangles stay as [`GONE`].
     pub mesh: &'a mut TriMesh,
-    /// Vertices that were merged, and into which.
-    pub merged: Vec<[u32; 2]>,
     field: &'a Directed,
     /// First name of the hits of each axis.
     base: [u32; 3],
@@ -73,7 +71,7 @@ impl<'a> Local<'a> {
             }
         }
         let least = 2.0 * DEGENERATE_AREA * mesh.bounds().diagonal().powi(2);
-        Local { mesh, merged: Vec::new(), field, base, cells, which, stars, strays: HashMap::new(), least }
+        Local { mesh, field, base, cells, which, stars, strays: HashMap::new(), least }
     }
 
     /// Triangles around a vertex near the seeds.
@@ -183,9 +181,65 @@ impl<'a> Local<'a> {
         if let Some(star) = self.stars.get_mut(self.which[v as usize] as usize) {
             star.clear();
         }
-        self.merged.push([v, w]);
         self.stray(&changed);
         true
+    }
+
+    /// True if two vertices are neighbours.
+    pub fn are_neighbours(&self, v: u32, w: u32) -> bool {
+        self.star(v).iter().any(|&t| self.mesh.triangles[t as usize].contains(&w))
+    }
+
+    /// Makes `v` and `w` neighbours by a flip of the edge between them ([K01] fig. 9), if there is one, the mesh stays
+    /// embedded and no more triangles lean than before; returns whether.
+    pub fn flip_to(&mut self, v: u32, w: u32) -> bool {
+        let shared = |s: &[u32; 3], t: &[u32; 3]| s.iter().filter(|x| t.contains(x)).count() == 2;
+        let found = self.star(v).iter().find_map(|&s| {
+            let own = self.mesh.triangles[s as usize];
+            let other = self.star(w).iter().find(|&&t| shared(&own, &self.mesh.triangles[t as usize]));
+            other.map(|&t| (s, t))
+        });
+        let Some((s, t)) = found else { return false };
+        let (one, two) = (self.mesh.triangles[s as usize], self.mesh.triangles[t as usize]);
+        if self.are_neighbours(v, w) || one.contains(&w) || two.contains(&v) {
+            return false;
+        }
+        // v a b and w b a become v a w and w b v.
+        let at = one.iter().position(|&x| x == v).unwrap_or(0);
+        let (a, b) = (one[(at + 1) % 3], one[(at + 2) % 3]);
+        let leaning = self.leaning(&[s, t]);
+        let areas = [s, t].map(|t| self.mesh.area(t as usize));
+        self.mesh.triangles[s as usize] = [v, a, w];
+        self.mesh.triangles[t as usize] = [w, b, v];
+        let kept = self.is_wide(&[s, t], &areas) && self.leaning(&[s, t]) <= leaning && self.is_embedded(&[s, t]);
+        if !kept {
+            self.mesh.triangles[s as usize] = one;
+            self.mesh.triangles[t as usize] = two;
+            return false;
+        }
+        let mut change = |x: u32, lost: Option<u32>, won: Option<u32>| {
+            if let Some(star) = self.stars.get_mut(self.which[x as usize] as usize) {
+                star.retain(|t| Some(*t) != lost);
+                star.extend(won);
+            }
+        };
+        change(v, None, Some(t));
+        change(w, None, Some(s));
+        change(a, Some(t), None);
+        change(b, Some(s), None);
+        self.stray(&[s, t]);
+        true
+    }
+
+    /// True if the triangles beside the edge from `v` to `w` turn by more than `cosine`.
+    pub fn is_sharp(&self, v: u32, w: u32, cosine: f64) -> bool {
+        let beside: Vec<DVec3> = self
+            .star(v)
+            .iter()
+            .filter(|&&t| self.mesh.triangles[t as usize].contains(&w))
+            .map(|&t| self.mesh.normal(t as usize))
+            .collect();
+        beside.len() == 2 && beside[0].dot(beside[1]) < cosine
     }
 
     /// True if no triangle has too little area, or less than it had if that was too little already.

@@ -7,14 +7,15 @@
 //! Each step is kept only if the mesh stays embedded ([`Local`]), so the certificate holds.
 //!
 //! 1. corners of the source that no vertex took     2. vertices that were clamped: together, one by one, merged
-//! 3. what is left: a part of the way     4. triangles without area: merged away
+//! 3. what is left: a part of the way     4. loose ends of lines joined, by a flip if need be
+//! 5. triangles without area: merged away
 
 use super::local::{CellRange, GONE, Local};
 use super::patch::Wish;
 use crate::field::{Creases, Directed};
 use crate::mesh::{DEGENERATE_AREA, FeatureKind, TriMesh};
 use glam::DVec3;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Parts of the way that are tried in the end.
 const WAYS: [f64; 3] = [1.0, 0.6, 0.3];
@@ -41,6 +42,15 @@ pub struct Polished {
 struct Lines(BTreeMap<u32, Vec<u32>>);
 
 impl Lines {
+    fn join(&mut self, v: u32, w: u32) {
+        for (a, b) in [(v, w), (w, v)] {
+            let list = self.0.entry(a).or_default();
+            if !list.contains(&b) {
+                list.push(b);
+            }
+        }
+    }
+
     fn beside(&self, v: u32) -> Vec<u32> {
         self.0.get(&v).cloned().unwrap_or_default()
     }
@@ -74,23 +84,21 @@ pub fn polish(
     creases: Option<&dyn Creases>,
     kinds: &mut [FeatureKind],
     edges: &mut Vec<[u32; 2]>,
+    sharp: f64,
 ) -> Polished {
     let calls = calls(mesh, field, creases, kinds);
     let thin = thin(mesh);
-    if wishes.is_empty() && calls.is_empty() && thin.is_empty() {
-        return Polished::default();
-    }
     let mut seeds: Vec<u32> = wishes.iter().map(|w| w.0).collect();
     seeds.extend(calls.iter().flat_map(|c| &c.1));
     seeds.extend(thin.iter().flat_map(|&t| mesh.triangles[t as usize]));
     let mut lines = Lines(BTreeMap::new());
     for &[a, b] in edges.iter() {
-        for (v, w) in [(a, b), (b, a)] {
-            let list = lines.0.entry(v).or_default();
-            if !list.contains(&w) {
-                list.push(w);
-            }
-        }
+        lines.join(a, b);
+    }
+    let special = |v: u32, beside: &[u32]| beside.len() != 2 || kinds[v as usize] == FeatureKind::Corner;
+    seeds.extend(lines.0.iter().filter(|(v, beside)| special(**v, beside)).map(|(v, _)| *v));
+    if seeds.is_empty() {
+        return Polished::default();
     }
     let mut local = Local::new(mesh, field, base, cells, &seeds);
     let mut targets: HashMap<u32, DVec3> = wishes.iter().copied().collect();
@@ -99,11 +107,14 @@ pub fn polish(
     open.sort_unstable();
     open.dedup();
 
+    let mut arrived: Vec<u32> = Vec::new();
     for (p, vertices) in &calls {
-        if let Some(&v) = vertices.iter().find(|&&v| kinds[v as usize] != FeatureKind::Corner && local.shift(&[(v, *p)])) {
+        let free = |v: u32, arrived: &[u32]| !arrived.contains(&v);
+        if let Some(&v) = vertices.iter().find(|&&v| free(v, &arrived) && local.shift(&[(v, *p)])) {
             kinds[v as usize] = FeatureKind::Corner;
+            arrived.push(v);
             open.retain(|&o| o != v);
-        } else if let Some(&v) = vertices.first() {
+        } else if let Some(&v) = vertices.iter().find(|&&v| free(v, &arrived)) {
             // It may come later, when others made room.
             kinds[v as usize] = FeatureKind::Corner;
             targets.insert(v, *p);
@@ -124,20 +135,12 @@ pub fn polish(
     }
     approach(&mut local, &targets, &mut open);
     let kept = open.len();
+    gather(&mut local, &mut lines, kinds, creases, field.lattice.step.max_element());
+    join_ends(&mut local, &mut lines, kinds, sharp);
     merge_thin(&mut local, &mut lines, kinds, thin);
 
-    let mut name: HashMap<u32, u32> = HashMap::new();
-    for [v, w] in local.merged.iter().rev() {
-        // Later merges are known already.
-        name.insert(*v, name.get(w).copied().unwrap_or(*w));
-    }
-    if !name.is_empty() {
-        for e in edges.iter_mut() {
-            *e = e.map(|v| name.get(&v).copied().unwrap_or(v));
-        }
-        edges.retain(|e| e[0] != e[1]);
-        mesh.triangles.retain(|t| *t != GONE);
-    }
+    mesh.triangles.retain(|t| *t != GONE);
+    *edges = lines.0.iter().flat_map(|(&v, beside)| beside.iter().filter(move |&&w| v < w).map(move |&w| [v, w])).collect();
     Polished { moved: count.saturating_sub(kept), kept }
 }
 
@@ -159,20 +162,24 @@ fn calls(
         vertices.entry(cell(mesh.points[v])).or_default().push(v as u32);
     }
     let size = l.step.max_element();
-    let mut calls = Vec::new();
-    for p in corners {
+    let around = |p: DVec3| {
         let [x, y, z] = cell(p);
-        let around = (0..27).map(|n| [x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]);
-        let mut near: Vec<(f64, u32)> = around
+        let cells = (0..27).map(|n| [x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]);
+        let mut near: Vec<(f64, u32)> = cells
             .filter_map(|c| vertices.get(&c))
             .flatten()
             .map(|&v| (mesh.points[v as usize].distance(p), v))
             .filter(|n| n.0 < CALL * size)
             .collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near
+    };
+    let near: Vec<_> = corners.iter().map(|&p| around(p)).collect();
+    let taken: BTreeSet<u32> = near.iter().flatten().filter(|n| n.0 <= TAKEN * size).map(|n| n.1).collect();
+    let mut calls = Vec::new();
+    for (p, near) in corners.into_iter().zip(near) {
         if near.first().is_some_and(|n| n.0 > TAKEN * size) {
-            let free = near.iter().map(|n| n.1).filter(|&v| kinds[v as usize] == FeatureKind::Edge);
-            calls.push((p, free.take(CALLED).collect()));
+            calls.push((p, near.iter().map(|n| n.1).filter(|v| !taken.contains(v)).take(CALLED).collect()));
         }
     }
     calls
@@ -282,6 +289,101 @@ fn approach(local: &mut Local, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32
                 } else if !open.contains(&v) {
                     open.push(v);
                 }
+            }
+        }
+    }
+}
+
+/// Vertices that pose as corners beside a corner of the source are merged into the one that is there.
+fn gather(
+    local: &mut Local,
+    lines: &mut Lines,
+    kinds: &mut [FeatureKind],
+    creases: Option<&dyn Creases>,
+    size: f64,
+) {
+    let corners = creases.map(|c| c.corners()).unwrap_or_default();
+    if corners.is_empty() {
+        return;
+    }
+    let key = |p: DVec3| (p / size).floor().to_array().map(|x| x as i64);
+    let mut places: HashMap<[i64; 3], Vec<DVec3>> = HashMap::new();
+    for &p in &corners {
+        places.entry(key(p)).or_default().push(p);
+    }
+    let near = |p: DVec3| {
+        let [x, y, z] = key(p);
+        (0..27).filter_map(|n| places.get(&[x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1])).flatten().copied().collect::<Vec<DVec3>>()
+    };
+    let vertices: Vec<u32> = lines.0.keys().copied().collect();
+    for v in vertices {
+        let p = local.position(v);
+        let around = near(p);
+        if around.iter().any(|c| c.distance(p) < TAKEN * size) {
+            kinds[v as usize] = FeatureKind::Corner;
+        }
+    }
+    let vertices: Vec<u32> = lines.0.keys().copied().filter(|&v| kinds[v as usize] == FeatureKind::Corner).collect();
+    for &v in &vertices {
+        let p = local.position(v);
+        let around = near(p);
+        if around.is_empty() || around.iter().any(|c| c.distance(p) < TAKEN * size) {
+            continue;
+        }
+        // The vertex at the nearest corner, if there is one within reach of a flip.
+        let mut ring = local.neighbours(v);
+        ring.extend(local.star(v).to_vec().iter().flat_map(|&t| local.mesh.triangles[t as usize]).flat_map(|w| local.neighbours(w)).collect::<Vec<_>>());
+        ring.sort_unstable();
+        ring.dedup();
+        let taken = |w: u32| kinds[w as usize] == FeatureKind::Corner && near(local.position(w)).iter().any(|c| c.distance(local.position(w)) < TAKEN * size);
+        let goal = ring
+            .into_iter()
+            .filter(|&w| w != v && taken(w) && local.position(w).distance(p) < CALL * size)
+            .min_by(|a, b| local.position(*a).distance(p).total_cmp(&local.position(*b).distance(p)).then(a.cmp(b)));
+        if let Some(w) = goal
+            && (local.are_neighbours(v, w) || local.flip_to(v, w))
+        {
+            if local.merge(v, w, local.position(w)) {
+                lines.merge(v, w);
+            } else {
+                lines.join(v, w);
+            }
+        }
+    }
+}
+
+/// Joins loose ends of lines with what they end beside: over an edge that is there, or that a flip makes.
+fn join_ends(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], sharp: f64) {
+    let ends: Vec<u32> = lines.0.iter().filter(|(_, beside)| beside.len() == 1).map(|(v, _)| *v).collect();
+    for v in ends {
+        if lines.beside(v).len() != 1 || local.star(v).is_empty() {
+            continue;
+        }
+        let joins = |w: u32, lines: &Lines| {
+            let beside = lines.beside(w);
+            w != v && !beside.contains(&v) && (beside.len() == 1 || (kinds[w as usize] == FeatureKind::Corner && !beside.is_empty()))
+        };
+        let ring = local.neighbours(v);
+        if let Some(&w) = ring.iter().find(|&&w| joins(w, lines) && local.is_sharp(v, w, sharp)) {
+            lines.join(v, w);
+            continue;
+        }
+        // Vertices opposite over an edge of the star.
+        let mut beyond: Vec<u32> = ring
+            .iter()
+            .flat_map(|&a| local.star(a).iter().map(|&t| local.mesh.triangles[t as usize]).collect::<Vec<_>>())
+            .filter(|t| t.iter().filter(|x| ring.binary_search(x).is_ok()).count() == 2)
+            .flatten()
+            .filter(|&w| w != v && ring.binary_search(&w).is_err() && joins(w, lines))
+            .collect();
+        beyond.sort_unstable();
+        beyond.dedup();
+        for w in beyond {
+            if local.flip_to(v, w) {
+                if local.is_sharp(v, w, sharp) {
+                    lines.join(v, w);
+                }
+                break;
             }
         }
     }
