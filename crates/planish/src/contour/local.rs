@@ -193,16 +193,78 @@ impl<'a> Local<'a> {
     /// Makes `v` and `w` neighbours by a flip of the edge between them ([K01] fig. 9), if there is one, the mesh stays
     /// embedded and no more triangles lean than before; returns whether.
     pub fn flip_to(&mut self, v: u32, w: u32) -> bool {
+        self.flip_if(v, w, true).is_some()
+    }
+
+    /// [`Local::flip_to`] of the edge to some vertex opposite of `v`, and then [`Local::shift`] of `v`: a vertex may have
+    /// to reach over the next triangle to find its place. All or nothing.
+    pub fn flip_and_shift(&mut self, v: u32, to: DVec3) -> bool {
+        let from = self.position(v);
+        self.beyond(v).into_iter().any(|w| {
+            let leaning = self.leaning(self.star(v)) + self.leaning_between(v, w);
+            let Some([a, b]) = self.flip_if(v, w, false) else { return false };
+            if self.shift_leaning(&[(v, to)]) {
+                if self.leaning(self.star(v)) <= leaning {
+                    return true;
+                }
+                self.shift_leaning(&[(v, from)]);
+            }
+            self.flip_if(a, b, false);
+            false
+        })
+    }
+
+    /// Makes `v` and `w` neighbours by a flip if need be and merges them at the place of `w`. All or nothing.
+    pub fn flip_and_merge(&mut self, v: u32, w: u32) -> bool {
+        if self.are_neighbours(v, w) {
+            return self.merge(v, w, self.position(w));
+        }
+        let Some([a, b]) = self.flip_if(v, w, false) else { return false };
+        let merged = self.merge(v, w, self.position(w));
+        if !merged {
+            self.flip_if(a, b, false);
+        }
+        merged
+    }
+
+    /// Vertices opposite of `v` over the edges of its star, ascending.
+    pub fn beyond(&self, v: u32) -> Vec<u32> {
+        let ring = self.neighbours(v);
+        let mut beyond: Vec<u32> = ring
+            .iter()
+            .flat_map(|&a| self.star(a))
+            .map(|&t| self.mesh.triangles[t as usize])
+            .filter(|t| !t.contains(&v) && t.iter().filter(|x| ring.binary_search(x).is_ok()).count() == 2)
+            .flatten()
+            .filter(|w| ring.binary_search(w).is_err())
+            .collect();
+        beyond.sort_unstable();
+        beyond.dedup();
+        beyond
+    }
+
+    /// Leaning triangles at `w` that a flip towards `v` would take.
+    fn leaning_between(&self, v: u32, w: u32) -> usize {
+        let ring = self.neighbours(v);
+        let opposite = |t: &&u32| {
+            self.mesh.triangles[**t as usize].iter().filter(|x| ring.binary_search(x).is_ok()).count() == 2
+        };
+        let found: Vec<u32> = self.star(w).iter().filter(opposite).copied().collect();
+        self.leaning(&found)
+    }
+
+    /// Returns the edge that was flipped.
+    fn flip_if(&mut self, v: u32, w: u32, upright: bool) -> Option<[u32; 2]> {
         let shared = |s: &[u32; 3], t: &[u32; 3]| s.iter().filter(|x| t.contains(x)).count() == 2;
         let found = self.star(v).iter().find_map(|&s| {
             let own = self.mesh.triangles[s as usize];
             let other = self.star(w).iter().find(|&&t| shared(&own, &self.mesh.triangles[t as usize]));
             other.map(|&t| (s, t))
         });
-        let Some((s, t)) = found else { return false };
+        let (s, t) = found?;
         let (one, two) = (self.mesh.triangles[s as usize], self.mesh.triangles[t as usize]);
-        if self.are_neighbours(v, w) || one.contains(&w) || two.contains(&v) {
-            return false;
+        if self.are_neighbours(v, w) {
+            return None;
         }
         // v a b and w b a become v a w and w b v.
         let at = one.iter().position(|&x| x == v).unwrap_or(0);
@@ -211,11 +273,13 @@ impl<'a> Local<'a> {
         let areas = [s, t].map(|t| self.mesh.area(t as usize));
         self.mesh.triangles[s as usize] = [v, a, w];
         self.mesh.triangles[t as usize] = [w, b, v];
-        let kept = self.is_wide(&[s, t], &areas) && self.leaning(&[s, t]) <= leaning && self.is_embedded(&[s, t]);
+        let kept = self.is_wide(&[s, t], &areas)
+            && (!upright || self.leaning(&[s, t]) <= leaning)
+            && self.is_embedded(&[s, t]);
         if !kept {
             self.mesh.triangles[s as usize] = one;
             self.mesh.triangles[t as usize] = two;
-            return false;
+            return None;
         }
         let mut change = |x: u32, lost: Option<u32>, won: Option<u32>| {
             if let Some(star) = self.stars.get_mut(self.which[x as usize] as usize) {
@@ -228,7 +292,7 @@ impl<'a> Local<'a> {
         change(a, Some(t), None);
         change(b, Some(s), None);
         self.stray(&[s, t]);
-        true
+        Some([a, b])
     }
 
     /// True if the triangles beside the edge from `v` to `w` turn by more than `cosine`.

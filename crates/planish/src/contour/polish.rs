@@ -129,6 +129,7 @@ pub fn polish(
         together(&mut local, &lines, &targets, &mut open);
         open.retain(|&v| !local.shift(&[(v, targets[&v])]));
         merge_along(&mut local, &mut lines, kinds, &targets, &mut open);
+        open.retain(|&v| !local.flip_and_shift(v, targets[&v]));
         if open.is_empty() || open.len() == before {
             break;
         }
@@ -341,13 +342,9 @@ fn gather(
             .filter(|&w| w != v && taken(w) && local.position(w).distance(p) < CALL * size)
             .min_by(|a, b| local.position(*a).distance(p).total_cmp(&local.position(*b).distance(p)).then(a.cmp(b)));
         if let Some(w) = goal
-            && (local.are_neighbours(v, w) || local.flip_to(v, w))
+            && local.flip_and_merge(v, w)
         {
-            if local.merge(v, w, local.position(w)) {
-                lines.merge(v, w);
-            } else {
-                lines.join(v, w);
-            }
+            lines.merge(v, w);
         }
     }
 }
@@ -369,17 +366,8 @@ fn join_ends(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], sharp:
             continue;
         }
         // Vertices opposite over an edge of the star.
-        let mut beyond: Vec<u32> = ring
-            .iter()
-            .flat_map(|&a| local.star(a).iter().map(|&t| local.mesh.triangles[t as usize]).collect::<Vec<_>>())
-            .filter(|t| t.iter().filter(|x| ring.binary_search(x).is_ok()).count() == 2)
-            .flatten()
-            .filter(|&w| w != v && ring.binary_search(&w).is_err() && joins(w, lines))
-            .collect();
-        beyond.sort_unstable();
-        beyond.dedup();
-        for w in beyond {
-            if local.flip_to(v, w) {
+        for w in local.beyond(v) {
+            if joins(w, lines) && local.flip_to(v, w) {
                 if local.is_sharp(v, w, sharp) {
                     lines.join(v, w);
                 }

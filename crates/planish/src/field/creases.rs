@@ -37,11 +37,11 @@ struct Cut {
 
 /// A sharp line that turns by more than this at a vertex has a corner there (cosine of 35 degrees).
 const BEND: f64 = 0.82;
-/// Sharp lines go on over edges whose normals have a cosine below this (10 degrees), and other such edges are bends:
+/// Sharp lines go on over edges whose normals have a cosine below this (5 degrees), and other such edges are bends:
 /// facets larger than a cell keep their edges.
-const FAINT: f64 = 0.985;
-/// Normals of two hits may differ by less than those beside the faint edge between them (cosine of 8 degrees).
-const FAINT_HITS: f64 = 0.990;
+const FAINT: f64 = 0.9962;
+/// Normals of two hits may differ by less than those beside the faint edge between them (cosine of 4 degrees).
+const FAINT_HITS: f64 = 0.9976;
 /// A hit beside a faint edge has the normal of its side within this (cosine of 18 degrees).
 const FAINT_AGREE: f64 = 0.95;
 /// Normals of the hits and of the faces beside the edge agree if their cosine is above this: facets of curved surfaces
