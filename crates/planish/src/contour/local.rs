@@ -341,8 +341,8 @@ impl<'a> Local<'a> {
         self.star(v).iter().filter(|&&t| against(t)).count()
     }
 
-    /// Normal of a hit.
-    fn normal(&self, v: u32) -> Option<DVec3> {
+    /// Normal of a hit; none for other vertices.
+    pub fn normal(&self, v: u32) -> Option<DVec3> {
         let axis = (0..3).rev().find(|&a| v >= self.base[a])?;
         self.field.axes[axis].hits.get((v - self.base[axis]) as usize).map(|h| h.normal)
     }

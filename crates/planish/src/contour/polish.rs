@@ -134,9 +134,13 @@ pub fn polish(
             break;
         }
     }
+    let mut corners = creases.map(|c| c.corners()).unwrap_or_default();
+    if let Some(creases) = creases.filter(|_| corners.is_empty()) {
+        corners = ask_corners(&mut local, &lines, kinds, creases, &mut open, field.lattice.step.max_element());
+    }
     approach(&mut local, &targets, &mut open);
     let kept = open.len();
-    gather(&mut local, &mut lines, kinds, creases, field.lattice.step.max_element());
+    gather(&mut local, &mut lines, kinds, &corners, field.lattice.step.max_element());
     join_ends(&mut local, &mut lines, kinds, sharp);
     merge_thin(&mut local, &mut lines, kinds, thin);
 
@@ -295,21 +299,66 @@ fn approach(local: &mut Local, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32
     }
 }
 
+/// Asks the source for the corners near vertices where lines end, meet or seem to have a corner, and brings the nearest
+/// vertex of a line there. Returns the corners.
+fn ask_corners(
+    local: &mut Local,
+    lines: &Lines,
+    kinds: &mut [FeatureKind],
+    creases: &dyn Creases,
+    open: &mut Vec<u32>,
+    size: f64,
+) -> Vec<DVec3> {
+    let special: Vec<u32> = lines
+        .0
+        .iter()
+        .filter(|(v, beside)| beside.len() != 2 || kinds[**v as usize] == FeatureKind::Corner)
+        .map(|(v, _)| *v)
+        .collect();
+    let mut corners: Vec<DVec3> = Vec::new();
+    for v in special {
+        let mut ring = local.neighbours(v);
+        ring.extend(ring.clone().iter().flat_map(|&w| local.neighbours(w)));
+        ring.sort_unstable();
+        ring.dedup();
+        let hits: Vec<(DVec3, DVec3)> = ring.iter().filter_map(|&w| Some((local.position(w), local.normal(w)?))).collect();
+        let Some(corner) = creases.corner_near(local.position(v), size, &hits) else { continue };
+        if corners.iter().any(|c| c.distance(corner) < TAKEN * size) {
+            continue;
+        }
+        corners.push(corner);
+        let mut near: Vec<(f64, u32)> = ring
+            .iter()
+            .filter(|w| !lines.beside(**w).is_empty())
+            .map(|&w| (local.position(w).distance(corner), w))
+            .collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let taken = near.first().is_some_and(|n| n.0 < TAKEN * size);
+        for &(_, w) in near.iter().take(CALLED).filter(|_| !taken) {
+            if local.shift(&[(w, corner)]) || local.flip_and_shift(w, corner) {
+                kinds[w as usize] = FeatureKind::Corner;
+                open.retain(|&o| o != w);
+                break;
+            }
+        }
+    }
+    corners
+}
+
 /// Vertices that pose as corners beside a corner of the source are merged into the one that is there.
 fn gather(
     local: &mut Local,
     lines: &mut Lines,
     kinds: &mut [FeatureKind],
-    creases: Option<&dyn Creases>,
+    corners: &[DVec3],
     size: f64,
 ) {
-    let corners = creases.map(|c| c.corners()).unwrap_or_default();
     if corners.is_empty() {
         return;
     }
     let key = |p: DVec3| (p / size).floor().to_array().map(|x| x as i64);
     let mut places: HashMap<[i64; 3], Vec<DVec3>> = HashMap::new();
-    for &p in &corners {
+    for &p in corners {
         places.entry(key(p)).or_default().push(p);
     }
     let near = |p: DVec3| {

@@ -31,7 +31,7 @@ mod sweep;
 mod winding;
 
 pub use creases::MeshCreases;
-pub use directed::Directed;
+pub use directed::{Directed, Thin};
 pub use grid_field::{Body, GradientRule, GridParams, ScalarGrid, sample_grid};
 pub use lattice::{Lattice, LatticeError, Spacing};
 pub use mesh_field::MeshField;
@@ -189,6 +189,12 @@ pub trait Creases: Sync {
 
     /// The place of a bend inside the cell from `low` to `high` nearest to `guess`.
     fn bend(&self, _guess: DVec3, _low: DVec3, _high: DVec3) -> Option<DVec3> {
+        None
+    }
+
+    /// The corner that the surfaces of `hits` have within `reach` of `guess`, where the source can be asked for it but
+    /// does not list its corners.
+    fn corner_near(&self, _guess: DVec3, _reach: f64, _hits: &[(DVec3, DVec3)]) -> Option<DVec3> {
         None
     }
 
