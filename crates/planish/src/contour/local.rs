@@ -135,7 +135,11 @@ impl<'a> Local<'a> {
         let has = |t: &u32, x: u32| self.mesh.triangles[*t as usize].contains(&x);
         let (dying, moving): (Vec<u32>, Vec<u32>) = of_v.iter().partition(|t| has(t, w));
         // The link condition, on closed stars only.
-        if dying.len() != 2 || shared != 2 || near_v.len() != of_v.len() || near_w.len() != of_w.len() || moving.is_empty()
+        if dying.len() != 2
+            || shared != 2
+            || near_v.len() != of_v.len()
+            || near_w.len() != of_w.len()
+            || moving.is_empty()
         {
             return false;
         }
@@ -161,8 +165,7 @@ impl<'a> Local<'a> {
             *triangle = triangle.map(|x| if x == v { w } else { x });
         }
         self.mesh.points[w as usize] = at;
-        let kept =
-            self.is_wide(&changed, &areas) && self.leaning(&all) <= leaning && self.is_embedded(&changed);
+        let kept = self.is_wide(&changed, &areas) && self.leaning(&all) <= leaning && self.is_embedded(&changed);
         if !kept {
             for (&t, saved) in all.iter().zip(saved) {
                 self.mesh.triangles[t as usize] = saved;
@@ -246,9 +249,8 @@ impl<'a> Local<'a> {
     /// Leaning triangles at `w` that a flip towards `v` would take.
     fn leaning_between(&self, v: u32, w: u32) -> usize {
         let ring = self.neighbours(v);
-        let opposite = |t: &&u32| {
-            self.mesh.triangles[**t as usize].iter().filter(|x| ring.binary_search(x).is_ok()).count() == 2
-        };
+        let opposite =
+            |t: &&u32| self.mesh.triangles[**t as usize].iter().filter(|x| ring.binary_search(x).is_ok()).count() == 2;
         let found: Vec<u32> = self.star(w).iter().filter(opposite).copied().collect();
         self.leaning(&found)
     }

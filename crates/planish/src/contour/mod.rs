@@ -231,7 +231,8 @@ pub fn extract(
     if octree.is_some() {
         cells.par_sort_unstable_by_key(|c| [c.0[2], c.0[1], c.0[0]]);
     }
-    let polished = polish::polish(&mut mesh, field, base, cells, &wishes, creases, &mut kinds, &mut edges, limits.sharp);
+    let polished =
+        polish::polish(&mut mesh, field, base, cells, &wishes, creases, &mut kinds, &mut edges, limits.sharp);
     (counts.moved, counts.kept) = (polished.moved, polished.kept);
     let mut extracted = Extracted { mesh, tags: tags(kinds, edges), counts };
     drop_unused(&mut extracted);

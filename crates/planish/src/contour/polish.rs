@@ -145,7 +145,8 @@ pub fn polish(
     merge_thin(&mut local, &mut lines, kinds, thin);
 
     mesh.triangles.retain(|t| *t != GONE);
-    *edges = lines.0.iter().flat_map(|(&v, beside)| beside.iter().filter(move |&&w| v < w).map(move |&w| [v, w])).collect();
+    *edges =
+        lines.0.iter().flat_map(|(&v, beside)| beside.iter().filter(move |&&w| v < w).map(move |&w| [v, w])).collect();
     Polished { moved: count.saturating_sub(kept), kept }
 }
 
@@ -202,7 +203,8 @@ fn together(local: &mut Local, lines: &Lines, targets: &HashMap<u32, DVec3>, ope
         let mut at = 0;
         while at < group.len() {
             for w in lines.beside(group[at]) {
-                if open.binary_search(&w).is_ok() && !group.contains(&w) && !seen.contains(&w) && group.len() < TOGETHER {
+                if open.binary_search(&w).is_ok() && !group.contains(&w) && !seen.contains(&w) && group.len() < TOGETHER
+                {
                     group.push(w);
                 }
             }
@@ -321,7 +323,8 @@ fn ask_corners(
         ring.extend(ring.clone().iter().flat_map(|&w| local.neighbours(w)));
         ring.sort_unstable();
         ring.dedup();
-        let hits: Vec<(DVec3, DVec3)> = ring.iter().filter_map(|&w| Some((local.position(w), local.normal(w)?))).collect();
+        let hits: Vec<(DVec3, DVec3)> =
+            ring.iter().filter_map(|&w| Some((local.position(w), local.normal(w)?))).collect();
         let Some(corner) = creases.corner_near(local.position(v), size, &hits) else { continue };
         if corners.iter().any(|c| c.distance(corner) < TAKEN * size) {
             continue;
@@ -346,13 +349,7 @@ fn ask_corners(
 }
 
 /// Vertices that pose as corners beside a corner of the source are merged into the one that is there.
-fn gather(
-    local: &mut Local,
-    lines: &mut Lines,
-    kinds: &mut [FeatureKind],
-    corners: &[DVec3],
-    size: f64,
-) {
+fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corners: &[DVec3], size: f64) {
     if corners.is_empty() {
         return;
     }
@@ -363,7 +360,11 @@ fn gather(
     }
     let near = |p: DVec3| {
         let [x, y, z] = key(p);
-        (0..27).filter_map(|n| places.get(&[x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1])).flatten().copied().collect::<Vec<DVec3>>()
+        (0..27)
+            .filter_map(|n| places.get(&[x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]))
+            .flatten()
+            .copied()
+            .collect::<Vec<DVec3>>()
     };
     let vertices: Vec<u32> = lines.0.keys().copied().collect();
     for v in vertices {
@@ -382,10 +383,21 @@ fn gather(
         }
         // The vertex at the nearest corner, if there is one within reach of a flip.
         let mut ring = local.neighbours(v);
-        ring.extend(local.star(v).to_vec().iter().flat_map(|&t| local.mesh.triangles[t as usize]).flat_map(|w| local.neighbours(w)).collect::<Vec<_>>());
+        ring.extend(
+            local
+                .star(v)
+                .to_vec()
+                .iter()
+                .flat_map(|&t| local.mesh.triangles[t as usize])
+                .flat_map(|w| local.neighbours(w))
+                .collect::<Vec<_>>(),
+        );
         ring.sort_unstable();
         ring.dedup();
-        let taken = |w: u32| kinds[w as usize] == FeatureKind::Corner && near(local.position(w)).iter().any(|c| c.distance(local.position(w)) < TAKEN * size);
+        let taken = |w: u32| {
+            kinds[w as usize] == FeatureKind::Corner
+                && near(local.position(w)).iter().any(|c| c.distance(local.position(w)) < TAKEN * size)
+        };
         let goal = ring
             .into_iter()
             .filter(|&w| w != v && taken(w) && local.position(w).distance(p) < CALL * size)
@@ -407,7 +419,9 @@ fn join_ends(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], sharp:
         }
         let joins = |w: u32, lines: &Lines| {
             let beside = lines.beside(w);
-            w != v && !beside.contains(&v) && (beside.len() == 1 || (kinds[w as usize] == FeatureKind::Corner && !beside.is_empty()))
+            w != v
+                && !beside.contains(&v)
+                && (beside.len() == 1 || (kinds[w as usize] == FeatureKind::Corner && !beside.is_empty()))
         };
         let ring = local.neighbours(v);
         if let Some(&w) = ring.iter().find(|&&w| joins(w, lines) && local.is_sharp(v, w, sharp)) {

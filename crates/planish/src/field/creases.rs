@@ -162,14 +162,7 @@ fn cell_of(lattice: &Lattice, p: DVec3) -> [i64; 3] {
 }
 
 /// Cuts an edge with all planes between its ends.
-fn cut(
-    mesh: &TriMesh,
-    ends: [u32; 2],
-    normals: [DVec3; 2],
-    tagged: bool,
-    lattice: &Lattice,
-    cuts: &mut [Vec<Cut>; 3],
-) {
+fn cut(mesh: &TriMesh, ends: [u32; 2], normals: [DVec3; 2], tagged: bool, lattice: &Lattice, cuts: &mut [Vec<Cut>; 3]) {
     let [a, b] = ends.map(|v| mesh.points[v as usize]);
     for axis in 0..3 {
         let (low, high) = (a[axis].min(b[axis]), a[axis].max(b[axis]));
