@@ -37,8 +37,10 @@ struct Cut {
 
 /// A sharp line that turns by more than this at a vertex has a corner there (cosine of 35 degrees).
 const BEND: f64 = 0.82;
-/// Sharp lines go on over edges whose normals have a cosine below this (5 degrees), and other such edges are bends:
-/// facets larger than a cell keep their edges.
+/// Sharp lines go on over edges whose normals have a cosine below this (15 degrees): the facets of a coarse mesh turn by
+/// less.
+const FADING: f64 = 0.966;
+/// Other edges whose normals have a cosine below this (5 degrees) are bends: facets larger than a cell keep their edges.
 const FAINT: f64 = 0.9962;
 /// Normals of two hits may differ by less than those beside the faint edge between them (cosine of 4 degrees).
 const FAINT_HITS: f64 = 0.9976;
@@ -122,7 +124,7 @@ impl MeshCreases {
 fn carry_on(mesh: &TriMesh, lines: &mut Vec<u32>, faint: &[(f64, u32)]) {
     let ends_of = |h: u32| [mesh.origin(h), mesh.origin(next(h))];
     let mut at: BTreeMap<u32, Vec<(f64, u32)>> = BTreeMap::new();
-    for &(cosine, h) in faint {
+    for &(cosine, h) in faint.iter().filter(|f| f.0 < FADING) {
         for v in ends_of(h) {
             at.entry(v).or_default().push((cosine, h));
         }
