@@ -427,7 +427,7 @@ fn facets_larger_than_a_cell_keep_their_edges_without_being_features() {
         sum += mesh.area(t) * true_normal.dot(mesh.normal(t)).clamp(-1.0, 1.0).acos().to_degrees();
         area += mesh.area(t);
     }
-    assert!(sum / area < 0.3, "normals are off by {} degrees", sum / area);
+    assert!(sum / area < 0.6, "normals are off by {} degrees", sum / area);
     // Only the two rims are features.
     let z = prism.bounds().size().z / 2.0;
     let center = prism.bounds().center().z;

@@ -104,6 +104,10 @@ impl<'a> Local<'a> {
     }
 
     fn shift_if(&mut self, moves: &[(u32, DVec3)], upright: bool) -> bool {
+        // What is too far from the seeds has no star that could be checked.
+        if moves.iter().any(|m| self.star(m.0).is_empty()) {
+            return false;
+        }
         let mut changed: Vec<u32> = moves.iter().flat_map(|m| self.star(m.0)).copied().collect();
         changed.sort_unstable();
         changed.dedup();

@@ -96,7 +96,11 @@ pub fn polish(
         lines.join(a, b);
     }
     let special = |v: u32, beside: &[u32]| beside.len() != 2 || kinds[v as usize] == FeatureKind::Corner;
-    seeds.extend(lines.0.iter().filter(|(v, beside)| special(**v, beside)).map(|(v, _)| *v));
+    for (&v, beside) in lines.0.iter().filter(|(v, beside)| special(**v, beside)) {
+        // A corner may call the next vertices of the lines.
+        seeds.push(v);
+        seeds.extend(beside.iter().flat_map(|&w| lines.beside(w)).chain(beside.iter().copied()));
+    }
     if seeds.is_empty() {
         return Polished::default();
     }
