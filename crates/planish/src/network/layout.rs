@@ -109,17 +109,31 @@ pub enum LayoutError {
 /// # Errors
 /// `NotManifold` for a mesh that needs repair, `Stuck` if its faces are degenerate beyond use.
 pub fn layout(mesh: &TriMesh, params: &LayoutParams, observer: &dyn Observer) -> Result<Network, LayoutError> {
-    layout_around(mesh, &[], &[], params, observer)
+    layout_around(mesh, &[], &[], &[], params, observer)
+}
+
+/// As [`layout`], where the sharp edges are known: the half-edges `tagged` are the sharp ones, whatever the angles say;
+/// short and loose lines of them are left out as with any. Empty if nothing is known.
+/// # Errors
+/// As [`layout`].
+pub fn layout_tagged(
+    mesh: &TriMesh,
+    tagged: &[bool],
+    params: &LayoutParams,
+    observer: &dyn Observer,
+) -> Result<Network, LayoutError> {
+    layout_around(mesh, &[], &[], tagged, params, observer)
 }
 
 /// As [`layout`], around lines that are given: the half-edges `lines` become patch boundaries like feature lines,
-/// the vertices `corners` of them corners. Both may be empty.
+/// the vertices `corners` of them corners; `tagged` as in [`layout_tagged`]. All may be empty.
 /// # Errors
 /// As [`layout`].
 pub(super) fn layout_around(
     mesh: &TriMesh,
     lines: &[bool],
     corners: &[bool],
+    tagged: &[bool],
     params: &LayoutParams,
     observer: &dyn Observer,
 ) -> Result<Network, LayoutError> {
@@ -128,7 +142,7 @@ pub(super) fn layout_around(
     let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
     let side = (area / params.patches.max(1) as f64).sqrt();
     let mut edge = EDGE_TO_SIDE * side;
-    let (mut sharp, _) = lines::feature_lines(mesh, &adjacency, params);
+    let (mut sharp, _) = lines::feature_lines(mesh, &adjacency, tagged, params);
     sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
     let mut fixed = vec![false; mesh.points.len()];
     for h in 0..sharp.len() as u32 {
