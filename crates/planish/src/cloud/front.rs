@@ -27,7 +27,11 @@ const VARIATION: f64 = 0.25;
 /// Weight of noise over radius (a_2).
 const ROUGHNESS: f64 = 1.0;
 /// What a carried-on sheet must explain, in squared noise levels: the freedom of its choice.
-const PRICE: f64 = 14.0;
+pub(super) const PRICE: f64 = 14.0;
+/// And for every change of its direction by one within the ball: what is flat is likelier than what is round.
+pub(super) const VARIATION_PRICE: f64 = 10.0;
+/// Most sheets at one site whose signs are not known yet.
+const MOST: usize = 3;
 /// What a fit of its own must explain: six parameters, each worth two.
 const OWN_PRICE: f64 = 12.0;
 /// A fit of its own is not questioned if its points cost at most this much each, in squared noise levels.
@@ -252,8 +256,8 @@ fn choose(
         }
     }
     let all: Vec<Seen> =
-        asked.iter().map(|a| Seen { residuals: residuals(&a.0), normal: a.0.distance(p).1 }).collect();
-    let Some(found) = nest(&all, true, PRICE) else { return alone };
+        asked.iter().map(|a| Seen { residuals: residuals(&a.0), normal: a.0.distance(p).1, price: PRICE }).collect();
+    let Some(found) = nest(&all, true, MOST) else { return alone };
     if found.cost + PRICE * (found.order.len() - 1) as f64 > (good + PRICE * (found.order.len() - 1) as f64).min(own_cost + OWN_PRICE) {
         return alone;
     }

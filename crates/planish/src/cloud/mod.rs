@@ -23,7 +23,6 @@ mod sites;
 mod survey;
 
 pub use cells::Cell;
-pub(crate) use cells::MOST as MOST_SHEETS;
 pub use dipoles::Dipoles;
 pub use project::{Cleaned, ProjectParams, project};
 pub use quadric::Quadric;

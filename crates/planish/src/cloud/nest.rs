@@ -25,6 +25,8 @@ pub(super) struct Seen {
     pub residuals: Vec<f64>,
     /// Unit normal in the middle of the points.
     pub normal: DVec3,
+    /// What it must explain to be chosen, in squared noise levels.
+    pub price: f64,
 }
 
 /// Nested maxima and minima.
@@ -38,72 +40,106 @@ pub(super) struct Nesting {
     pub concave: u8,
     /// Sum of squared residuals, each at most the square of [`LIMIT`], and of what folds of the surface cost.
     pub cost: f64,
+    /// Cost and the prices of its sheets.
+    pub total: f64,
 }
+
+/// Structures are compared on about this many points; the best of each step is then asked of all.
+const ENOUGH: usize = 80;
 
 /// Sum of squared residuals (in noise levels), each at most the square of [`LIMIT`].
 pub(super) fn cost(residuals: &[f64]) -> f64 {
     residuals.iter().map(|d| (d * d).min(LIMIT * LIMIT)).sum()
 }
 
-/// The nesting of least cost plus price.
+/// The nesting of least cost plus prices, of at most `most` sheets.
 ///
 /// * `asked` - the sheets; the first wins ties
 /// * `free` - the signs of the sheets are not known to fit each other
-/// * `price` - what one more sheet must explain
-pub(super) fn nest(asked: &[Seen], free: bool, price: f64) -> Option<Nesting> {
-    let first = (0..asked.len()).map(|i| (cost(&asked[i].residuals), i)).min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let mut best = Nesting { order: vec![first.1], flipped: 0, concave: 0, cost: first.0 };
-    let mut value = vec![0.0; asked[0].residuals.len()];
+pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
+    let first = (0..asked.len())
+        .map(|i| (cost(&asked[i].residuals) + asked[i].price, i))
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let price = |order: &[usize]| order.iter().map(|&k| asked[k].price).sum::<f64>();
+    let mut best =
+        Nesting { order: vec![first.1], flipped: 0, concave: 0, cost: first.0 - asked[first.1].price, total: first.0 };
+    let count = asked[0].residuals.len();
+    let step = count.div_ceil(ENOUGH).max(1);
+    let mut value = vec![0.0; count];
     // One sheet after the other, each the best that can be joined to those chosen, in all nestings of the set.
-    while best.order.len() < MOST {
+    while best.order.len() < most.min(MOST) {
+        let least: Vec<f64> = (0..count)
+            .map(|k| best.order.iter().map(|&s| asked[s].residuals[k].powi(2)).fold(LIMIT * LIMIT, f64::min))
+            .collect();
+        // No nesting explains more than the union.
+        let mut bound: Vec<(f64, usize)> = (0..asked.len())
+            .filter(|i| !best.order.contains(i))
+            .map(|i| {
+                let union: f64 = asked[i].residuals.iter().zip(&least).map(|(r, l)| (r * r).min(*l)).sum();
+                (union + asked[i].price + price(&best.order), i)
+            })
+            .filter(|b| b.0 < best.total)
+            .collect();
+        bound.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut next: Option<Nesting> = None;
-        for i in (0..asked.len()).filter(|i| !best.order.contains(i)) {
+        for (union, i) in bound {
+            let limit = next.as_ref().map_or(best.total, |n| n.total);
+            if union >= limit {
+                break;
+            }
             let mut set = best.order.clone();
             set.push(i);
-            // No nesting explains more than the union.
-            let union: f64 = (0..value.len())
-                .map(|k| set.iter().map(|&s| asked[s].residuals[k].powi(2)).fold(LIMIT * LIMIT, f64::min))
-                .sum();
-            if union + price >= best.cost || next.as_ref().is_some_and(|n| union >= n.cost) {
-                continue;
-            }
+            let priced = price(&set);
+            let mut found: Option<Nesting> = None;
             for order in orders(&set) {
                 let joints = order.len() - 1;
                 let signs = if free { 1u8 << joints } else { 1 };
                 for flips in 0..signs {
                     for ops in 0..1u8 << joints {
                         let (flipped, concave) = (flips << 1, ops << 1);
-                        evaluate(asked, &order, flipped, concave, &mut value);
-                        let most = next.as_ref().map_or(best.cost - price, |n| n.cost);
-                        let mut total = cost(&value);
-                        if total < most {
-                            total += folds(asked, &order, flipped, concave);
-                        }
-                        if total < most {
-                            next = Some(Nesting { order: order.clone(), flipped, concave, cost: total });
+                        let part = evaluate(asked, &order, flipped, concave, step, &mut value);
+                        if found.as_ref().is_none_or(|n| part < n.cost) {
+                            found = Some(Nesting { order: order.clone(), flipped, concave, cost: part, total: 0.0 });
                         }
                     }
                 }
             }
+            let Some(mut found) = found else { continue };
+            found.cost = evaluate(asked, &found.order, found.flipped, found.concave, 1, &mut value);
+            if found.cost + priced < limit {
+                found.cost += folds(asked, &found.order, found.flipped, found.concave);
+                found.total = found.cost + priced;
+                if found.total < limit {
+                    next = Some(found);
+                }
+            }
         }
         match next {
-            Some(n) if n.cost + price < best.cost => best = n,
-            _ => break,
+            Some(n) => best = n,
+            None => break,
         }
     }
     Some(best)
 }
 
-fn evaluate(asked: &[Seen], order: &[usize], flipped: u8, concave: u8, value: &mut [f64]) {
-    value.copy_from_slice(&asked[order[0]].residuals);
+/// Cost of every `step`-th point.
+fn evaluate(asked: &[Seen], order: &[usize], flipped: u8, concave: u8, step: usize, value: &mut [f64]) -> f64 {
+    let mut count = 0;
+    for (v, r) in value.iter_mut().zip(asked[order[0]].residuals.iter().step_by(step)) {
+        *v = *r;
+        count += 1;
+    }
+    let value = &mut value[..count];
     for (k, &i) in order.iter().enumerate().skip(1) {
         let sign = sign(flipped, k);
+        let others = asked[i].residuals.iter().step_by(step);
         if concave >> k & 1 == 1 {
-            value.iter_mut().zip(&asked[i].residuals).for_each(|(v, r)| *v = v.min(sign * r));
+            value.iter_mut().zip(others).for_each(|(v, r)| *v = v.min(sign * r));
         } else {
-            value.iter_mut().zip(&asked[i].residuals).for_each(|(v, r)| *v = v.max(sign * r));
+            value.iter_mut().zip(others).for_each(|(v, r)| *v = v.max(sign * r));
         }
     }
+    cost(value)
 }
 
 fn sign(flipped: u8, k: usize) -> f64 {
@@ -174,14 +210,14 @@ mod tests {
             })
             .collect();
         let planes = [DVec3::Z, DVec3::X, DVec3::Y];
-        planes.map(|normal| Seen { residuals: points.iter().map(|p| p.dot(normal)).collect(), normal }).to_vec()
+        planes.map(|normal| Seen { residuals: points.iter().map(|p| p.dot(normal)).collect(), normal, price: 14.0 }).to_vec()
     }
 
     #[test]
     fn a_plane_an_edge_and_a_corner_need_one_two_and_three_sheets() {
         for faces in 1..=3 {
             let all = corner(faces);
-            let found = nest(&all, false, 14.0).unwrap();
+            let found = nest(&all, false, 4).unwrap();
             let mut order = found.order.clone();
             order.sort_unstable();
             assert_eq!(order, (0..faces).collect::<Vec<_>>());
@@ -195,10 +231,10 @@ mod tests {
         let mut all = corner(3);
         all[1].normal = -all[1].normal;
         all[1].residuals.iter_mut().for_each(|r| *r = -*r);
-        let found = nest(&all, true, 14.0).unwrap();
+        let found = nest(&all, true, 4).unwrap();
         assert_eq!(found.order.len(), 3);
         assert!(found.cost < 1.2 * 300.0);
-        assert!(nest(&all, false, 14.0).unwrap().cost > found.cost + 100.0);
+        assert!(nest(&all, false, 4).unwrap().cost > found.cost + 100.0);
     }
 
     #[test]
@@ -206,8 +242,8 @@ mod tests {
         for seed in 0..20 {
             let r: Vec<f64> = (0..200).map(|k| gauss(200 * seed + k)).collect();
             let all = [0.0, -1.0, 1.0, -2.5, 2.5]
-                .map(|o| Seen { residuals: r.iter().map(|d| d + o).collect(), normal: DVec3::Z });
-            assert_eq!(nest(&all, true, 14.0).unwrap().order, [0]);
+                .map(|o| Seen { residuals: r.iter().map(|d| d + o).collect(), normal: DVec3::Z, price: 14.0 });
+            assert_eq!(nest(&all, true, 4).unwrap().order, [0]);
         }
     }
 }

@@ -9,7 +9,7 @@
 //! the field is unknown, or, where holes are to be closed, follows the winding number of the samples.
 
 use super::Field;
-use crate::cloud::{Cell, Dipoles, MOST_SHEETS, Quadric, Samples};
+use crate::cloud::{Cell, Dipoles, Samples};
 use crate::geom::Aabb;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -31,7 +31,6 @@ const ASKED: usize = 64;
 pub struct SampleField {
     /// In the order of the tree.
     cells: Vec<Cell>,
-    sheets: Vec<[Quadric; MOST_SHEETS]>,
     nodes: Vec<Node>,
     bounds: Aabb,
     /// Widest support.
@@ -60,10 +59,6 @@ impl SampleField {
         if !cells.is_empty() {
             build(&mut cells, 0, &mut nodes);
         }
-        let sheets = cells
-            .iter()
-            .map(|c| c.sheets.map(|i| samples.samples[i as usize].quadric))
-            .collect();
         let widest = cells.iter().map(|s| s.support).fold(0.0, f64::max);
         let mut bounds = Aabb::of(samples.samples.iter().map(|s| &s.center));
         bounds.min -= DVec3::splat(0.5 * widest);
@@ -71,7 +66,7 @@ impl SampleField {
         let closing = close.then(|| {
             Dipoles::new(&samples.samples.iter().map(|s| (s.center, s.normal * s.area)).collect::<Vec<_>>())
         });
-        SampleField { cells, sheets, nodes, bounds, widest, noise_deg: samples.normal_noise_deg, closing }
+        SampleField { cells, nodes, bounds, widest, noise_deg: samples.normal_noise_deg, closing }
     }
 
     /// Calls `visit(index, squared distance over squared support)` for all cells whose support holds `p`.
@@ -103,7 +98,8 @@ impl SampleField {
 
     /// Value and unit normal of a cell.
     fn cell(&self, i: usize, p: DVec3) -> (f64, DVec3) {
-        let (c, sheets) = (&self.cells[i], &self.sheets[i]);
+        let c = &self.cells[i];
+        let sheets = &c.sheets;
         let mut best = sheets[0].distance(p);
         for k in 1..c.count as usize {
             let next = sheets[k].distance(p);
