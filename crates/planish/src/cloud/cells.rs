@@ -28,9 +28,12 @@ const WORSE: f64 = 4.0;
 const PASSES: usize = 2;
 /// Squared bias of a cell in the blend for the cost of its points beyond one.
 const BIAS: f64 = 0.5;
+/// Points of a cell at most: these many tell the sheets apart.
+const ENOUGH: usize = 200;
 /// Candidates at most.
 const ASKED: usize = 16;
-/// A cell with one sheet is taken as it is if its points cost at most this much each, in squared noise levels.
+/// A cell with one sheet is taken as it is if its points cost at most this much each, in squared noise levels, and what
+/// chance adds.
 const PLAIN: f64 = 1.05;
 /// Of one sheet if the normals differ by less than this cosine (8 degrees) and the offsets by less than so many levels.
 const SAME_TURN: f64 = 0.99;
@@ -166,6 +169,9 @@ fn find(place: &Place, site: u32, tree: &KdTree, candidates: &[Candidate], aroun
     let &Place { center, support, noise } = place;
     let mut ball = Vec::new();
     tree.within(center, HEARD * support, |_, q, _| ball.push(q));
+    let all_points = ball;
+    let step = all_points.len().div_ceil(ENOUGH).max(1);
+    let ball: Vec<DVec3> = all_points.iter().copied().step_by(step).collect();
     let count = ball.len().max(1) as f64;
     let residuals = |q: &Quadric| -> Vec<f64> { ball.iter().map(|&x| q.distance(x).0 / noise).collect() };
     // Candidates, those of the site first, then by distance.
@@ -179,7 +185,7 @@ fn find(place: &Place, site: u32, tree: &KdTree, candidates: &[Candidate], aroun
     {
         let c = &candidates[first.1 as usize];
         let total = cost(&residuals(&c.quadric));
-        if c.owner == site && total < PLAIN * count {
+        if c.owner == site && total < PLAIN * count + count.sqrt() {
             let sheets = vec![(c.quadric, c.at, c.error)];
             return Some(Found { sheets, concave: 0, total, cost: total / count, plain: true });
         }
@@ -216,14 +222,15 @@ fn find(place: &Place, site: u32, tree: &KdTree, candidates: &[Candidate], aroun
     // Every point tells of the sheet that decides at it, and of no other; then once more.
     let rounds = if sheets.len() > 1 { REFINED } else { 0 };
     for _ in 0..rounds {
-        let better = refined(&sheets, found.concave, place, &ball);
+        let better = refined(&sheets, found.concave, place, &all_points);
         let next = ball.iter().map(|&q| (joined(&better, found.concave, q).1 / noise).powi(2).min(LIMIT * LIMIT)).sum();
         if next > spent + WORSE {
             break;
         }
         (sheets, spent) = (better, next);
     }
-    Some(Found { sheets, concave: found.concave, total: spent + prices, cost: spent / count, plain: false })
+    let plain = sheets.len() == 1 && spent < PLAIN * count + count.sqrt();
+    Some(Found { sheets, concave: found.concave, total: spent + prices, cost: spent / count, plain })
 }
 
 /// The sheet that decides at a point and its signed distance.

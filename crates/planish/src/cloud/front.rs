@@ -31,7 +31,7 @@ pub(super) const PRICE: f64 = 14.0;
 /// And for every change of its direction by one within the ball: what is flat is likelier than what is round.
 pub(super) const VARIATION_PRICE: f64 = 10.0;
 /// Most sheets at one site whose signs are not known yet.
-const MOST: usize = 3;
+const MOST: usize = 2;
 /// What a fit of its own must explain: six parameters, each worth two.
 const OWN_PRICE: f64 = 12.0;
 /// A fit of its own is not questioned if its points cost at most this much each, in squared noise levels.
@@ -61,6 +61,10 @@ const STRAY: f64 = 0.011;
 /// Ratio of one ball to the next when a sheet grows, and how often it grows at most.
 const WIDEN: f64 = 1.35;
 const STEPS: usize = 3;
+
+/// A ball of so many points leaves a tenth of the noise; if it is this many noise levels wide it grows no further.
+pub(super) const PLENTY: usize = 700;
+pub(super) const WIDE_ENOUGH: f64 = 10.0;
 
 /// A fitted sample of the surface: not oriented yet.
 #[derive(Clone, Copy, Debug)]
@@ -321,6 +325,10 @@ fn widen(
                 ball.push(Weighted { y, weight });
             }
         });
+        // Enough points: more of them cost more than they tell.
+        if step > 0 && ball.len() > PLENTY && r > WIDE_ENOUGH * noise {
+            break;
+        }
         let Some(found) = sheet(p, r, &ball, Some(&guess), noise / r, Some(if step == 0 { 2 } else { 1 })) else {
             if best.is_none() && step < STEPS {
                 continue;

@@ -10,7 +10,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Distance between sites over the radius of the fits: the blend then meets about eight fits everywhere.
-pub(super) const APART: f64 = 0.42;
+pub(super) const APART: f64 = 0.5;
 /// Sites stand no closer than for this share of the usual radius: creases have narrow balls, not finer shapes.
 const USUAL: f64 = 0.8;
 /// One point in this many is surveyed to learn the radii.
