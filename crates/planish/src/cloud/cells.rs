@@ -3,8 +3,8 @@
 //! Every site asks which nested maxima and minima (`nest`) of the oriented samples around explain its points. The blend of
 //! these functions keeps edges sharp, and where one site errs its neighbours outvote it.
 
-use super::front::{PRICE, VARIATION_PRICE};
 use super::fit::{Weighted, sheet};
+use super::front::{PRICE, VARIATION_PRICE};
 use super::nest::{self, LIMIT, Seen, cost, nest};
 use super::sites::{Sites, in_pieces};
 use super::{Quadric, Sample};
@@ -216,7 +216,8 @@ fn find(place: &Place, site: u32, tree: &KdTree, candidates: &[Candidate], aroun
         })
         .collect();
     let found = nest(&all, false, MOST)?;
-    let mut sheets: Vec<(Quadric, DVec3, f64)> = found.order.iter().map(|&k| (asked[k].quadric, asked[k].at, asked[k].error)).collect();
+    let mut sheets: Vec<(Quadric, DVec3, f64)> =
+        found.order.iter().map(|&k| (asked[k].quadric, asked[k].at, asked[k].error)).collect();
     let prices = found.total - found.cost;
     let mut spent = found.cost;
     // Every point tells of the sheet that decides at it, and of no other; then once more.
@@ -246,12 +247,7 @@ fn joined(sheets: &[(Quadric, DVec3, f64)], concave: u8, p: DVec3) -> (usize, f6
 }
 
 /// Every sheet fitted again to the points at which it decides.
-fn refined(
-    sheets: &[(Quadric, DVec3, f64)],
-    concave: u8,
-    place: &Place,
-    ball: &[DVec3],
-) -> Vec<(Quadric, DVec3, f64)> {
+fn refined(sheets: &[(Quadric, DVec3, f64)], concave: u8, place: &Place, ball: &[DVec3]) -> Vec<(Quadric, DVec3, f64)> {
     let radius = HEARD * place.support;
     let mut points: Vec<Vec<Weighted>> = vec![Vec::new(); sheets.len()];
     for &q in ball {

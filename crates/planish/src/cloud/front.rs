@@ -262,7 +262,9 @@ fn choose(
     let all: Vec<Seen> =
         asked.iter().map(|a| Seen { residuals: residuals(&a.0), normal: a.0.distance(p).1, price: PRICE }).collect();
     let Some(found) = nest(&all, true, MOST) else { return alone };
-    if found.cost + PRICE * (found.order.len() - 1) as f64 > (good + PRICE * (found.order.len() - 1) as f64).min(own_cost + OWN_PRICE) {
+    if found.cost + PRICE * (found.order.len() - 1) as f64
+        > (good + PRICE * (found.order.len() - 1) as f64).min(own_cost + OWN_PRICE)
+    {
         return alone;
     }
     // The points nearest to each sheet tell where it begins to grow.

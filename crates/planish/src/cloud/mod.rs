@@ -8,6 +8,7 @@
 //!
 //! The blend (§4.2, eq. 4) is `field::SampleField`. Where a step departs from the paper its file says so.
 
+mod blend;
 mod cells;
 mod dense;
 mod dipoles;
@@ -22,6 +23,7 @@ mod quadric;
 mod sites;
 mod survey;
 
+pub use blend::{Blend, Blended};
 pub use cells::Cell;
 pub use dipoles::Dipoles;
 pub use project::{Cleaned, ProjectParams, project};
@@ -203,17 +205,14 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
     let (points, ids) = distinct(cloud)?;
     let tree = KdTree::new(&points);
     let part = |from: f64, to: f64| Part { observer, from, to };
-    let t0 = std::time::Instant::now();
     let sites = sites::choose(&points, &tree, &part(0.0, 0.45)).ok_or(CloudError::Cancelled)?;
     if sites.point.is_empty() {
         return Err(CloudError::NoSurface { points: points.len() });
     }
-    eprintln!("TT sites {:.2}", t0.elapsed().as_secs_f64());
     let fits = front::grow(&points, &tree, &sites, &part(0.45, 0.85)).ok_or(CloudError::Cancelled)?;
     if fits.is_empty() {
         return Err(CloudError::NoSurface { points: points.len() });
     }
-    eprintln!("TT front {:.2}", t0.elapsed().as_secs_f64());
     let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
     let fit_tree = KdTree::new(&centers);
     let votes = link::votes(&fits, &fit_tree);
@@ -246,11 +245,9 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
             }
         })
         .collect();
-    eprintln!("TT orient {:.2}", t0.elapsed().as_secs_f64());
     let of_site: Vec<u32> = fits.iter().map(|f| f.site).collect();
     let cells =
         cells::cells(&points, &tree, &sites, &samples, &of_site, &part(0.9, 1.0)).ok_or(CloudError::Cancelled)?;
-    eprintln!("TT cells {:.2}", t0.elapsed().as_secs_f64());
     observer.progress(1.0);
     let middle = |mut v: Vec<f64>| {
         v.sort_unstable_by(f64::total_cmp);

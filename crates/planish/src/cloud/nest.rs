@@ -59,9 +59,8 @@ pub(super) fn cost(residuals: &[f64]) -> f64 {
 /// * `asked` - the sheets; the first wins ties
 /// * `free` - the signs of the sheets are not known to fit each other
 pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
-    let first = (0..asked.len())
-        .map(|i| (cost(&asked[i].residuals) + asked[i].price, i))
-        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let first =
+        (0..asked.len()).map(|i| (cost(&asked[i].residuals) + asked[i].price, i)).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let price = |order: &[usize]| order.iter().map(|&k| asked[k].price).sum::<f64>();
     let mut best =
         Nesting { order: vec![first.1], flipped: 0, concave: 0, cost: first.0 - asked[first.1].price, total: first.0 };
@@ -215,7 +214,9 @@ mod tests {
             })
             .collect();
         let planes = [DVec3::Z, DVec3::X, DVec3::Y];
-        planes.map(|normal| Seen { residuals: points.iter().map(|p| p.dot(normal)).collect(), normal, price: 14.0 }).to_vec()
+        planes
+            .map(|normal| Seen { residuals: points.iter().map(|p| p.dot(normal)).collect(), normal, price: 14.0 })
+            .to_vec()
     }
 
     #[test]
@@ -246,8 +247,11 @@ mod tests {
     fn noise_alone_does_not_pay_for_a_second_sheet_one_or_two_and_a_half_levels_away() {
         for seed in 0..20 {
             let r: Vec<f64> = (0..200).map(|k| gauss(200 * seed + k)).collect();
-            let all = [0.0, -1.0, 1.0, -2.5, 2.5]
-                .map(|o| Seen { residuals: r.iter().map(|d| d + o).collect(), normal: DVec3::Z, price: 14.0 });
+            let all = [0.0, -1.0, 1.0, -2.5, 2.5].map(|o| Seen {
+                residuals: r.iter().map(|d| d + o).collect(),
+                normal: DVec3::Z,
+                price: 14.0,
+            });
             assert_eq!(nest(&all, true, 4).unwrap().order, [0]);
         }
     }

@@ -117,7 +117,8 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
             }
             scratch.y.extend_from_slice(points);
             let j = first + k;
-            if j > 0 && (radius(j) > reach || (scratch.y.len() > PLENTY && GROWTH.powi(j as i32) > WIDE_ENOUGH * usual)) {
+            if j > 0 && (radius(j) > reach || (scratch.y.len() > PLENTY && GROWTH.powi(j as i32) > WIDE_ENOUGH * usual))
+            {
                 break 'rounds;
             }
             let Some(height) = framed_height(&sums.matrix(), Frame::of_moments(&sums)) else { continue };
