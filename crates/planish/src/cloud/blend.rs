@@ -7,7 +7,7 @@
 //!
 //! Departs from [X03]: one blend over all quadrics rounds every crease by the width of the supports.
 
-use super::{Cell, Quadric};
+use super::Cell;
 use crate::geom::Aabb;
 use glam::DVec3;
 

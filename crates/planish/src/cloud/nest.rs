@@ -157,22 +157,25 @@ fn folds(asked: &[Seen], order: &[usize], flipped: u8, concave: u8) -> f64 {
             turn[j][k] = sign(flipped, j) * sign(flipped, k) * asked[order[j]].normal.dot(asked[order[k]].normal);
         }
     }
-    // Twice the logarithms of 1 to 4.
-    const PRICES: [f64; MOST] = [0.0, 1.386_294_361_119_890_6, 2.197_224_577_336_22, 2.772_588_722_239_781];
     let mut price = 0.0;
     for q in 0..asked[order[0]].residuals.len() {
         let mut at = [0.0; MOST];
         (0..m).for_each(|k| at[k] = sign(flipped, k) * asked[order[k]].residuals[q]);
-        // The foot of the point on sheet k is part of the surface if the nesting vanishes there.
-        let on = (0..m).filter(|&k| {
+        // The foot of the point on sheet k is part of the surface if the nesting vanishes there. Sheets at right angles
+        // do not lie above each other; a foot on the edge itself would count as if they did.
+        let own = (0..m).fold(0, |a, k| if at[k].abs() < at[a].abs() { k } else { a });
+        let mut layers = 1.0;
+        for k in (0..m).filter(|&k| k != own) {
             let foot = |j: usize| if j == k { 0.0 } else { at[j] - at[k] * turn[j][k] };
             let mut f = foot(0);
             for j in 1..m {
                 f = if concave >> j & 1 == 1 { f.min(foot(j)) } else { f.max(foot(j)) };
             }
-            f.abs() < ON
-        });
-        price += PRICES[on.count().max(1) - 1];
+            if f.abs() < ON {
+                layers += turn[k][own].abs();
+            }
+        }
+        price += 2.0 * f64::ln(layers);
     }
     price
 }

@@ -16,6 +16,9 @@ const BESIDE: f64 = 0.5;
 /// The winding number decides where it is this far from one half.
 const CERTAIN: f64 = 0.3;
 
+/// Points in a row that are asked by one thread.
+const CHUNK: usize = 64;
+
 /// The blended field of oriented samples.
 pub struct SampleField {
     blend: Blend,
@@ -41,7 +44,16 @@ impl SampleField {
 
     /// Value and unit gradient at `p`; NaN where nothing is known.
     pub fn evaluate(&self, p: DVec3) -> (f64, DVec3) {
-        let Some(here) = self.blend.at(p) else { return self.beyond(p) };
+        let (value, normal, _) = self.evaluate_at(p, true);
+        (value, normal)
+    }
+
+    /// And whether `p` is in the midst of data; where no cell reaches the gradient only if asked for.
+    fn evaluate_at(&self, p: DVec3, slope: bool) -> (f64, DVec3, bool) {
+        let Some(here) = self.blend.at(p) else {
+            let (value, normal) = self.beyond(p, slope);
+            return (value, normal, false);
+        };
         // Away from the data the samples together know better than a fit carried on beyond its points.
         if here.aside > BESIDE * BESIDE
             && let Some(dipoles) = &self.closing
@@ -50,18 +62,21 @@ impl SampleField {
             let outside = winding < 0.5;
             if outside != (here.value >= 0.0) && (winding - 0.5).abs() > CERTAIN {
                 let size = here.value.abs().max(0.01 * self.widest);
-                return (if outside { size } else { -size }, here.normal);
+                return (if outside { size } else { -size }, here.normal, false);
             }
         }
-        (here.value, here.normal)
+        (here.value, here.normal, here.aside <= BESIDE * BESIDE)
     }
 
     /// Where no cell reaches.
-    fn beyond(&self, p: DVec3) -> (f64, DVec3) {
+    fn beyond(&self, p: DVec3, slope: bool) -> (f64, DVec3) {
         match &self.closing {
             None => (f64::NAN, DVec3::ZERO),
             Some(dipoles) => {
                 let value = |p: DVec3| (0.5 - dipoles.number(p, 0.0)) * self.widest;
+                if !slope {
+                    return (value(p), DVec3::ZERO);
+                }
                 let e = 1e-3 * self.widest;
                 let along = |d: DVec3| value(p + d * e) - value(p - d * e);
                 let g = DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z));
@@ -77,7 +92,7 @@ impl Field for SampleField {
     }
 
     fn value(&self, p: DVec3) -> f64 {
-        self.evaluate(p).0
+        self.evaluate_at(p, false).0
     }
 
     fn gradient(&self, p: DVec3) -> DVec3 {
@@ -85,12 +100,28 @@ impl Field for SampleField {
     }
 
     fn values(&self, points: &[DVec3], values: &mut [f64]) {
-        values.par_iter_mut().zip(points).for_each(|(v, &p)| *v = self.evaluate(p).0);
+        values.par_chunks_mut(CHUNK).zip(points.par_chunks(CHUNK)).for_each(|(values, points)| {
+            // What the value at one point leaves at the next: the same side, and no distance is too long.
+            let mut left: Option<(DVec3, f64)> = None;
+            for (v, &p) in values.iter_mut().zip(points) {
+                if let Some((q, d)) = left {
+                    let rest = d.abs() - STEEP * p.distance(q);
+                    if rest > 0.0 {
+                        *v = rest.copysign(d);
+                        continue;
+                    }
+                }
+                let (value, _, amid) = self.evaluate_at(p, false);
+                *v = value;
+                // Where holes stay open the next point may be beside the data.
+                left = (amid && self.closing.is_some()).then_some((p, value));
+            }
+        });
     }
 
     fn crosses(&self, aabb: &Aabb) -> bool {
         let reach = aabb.diagonal() / 2.0;
-        let value = self.evaluate(aabb.center()).0;
+        let value = self.value(aabb.center());
         if value.is_nan() {
             return self.blend.reached(aabb.min, aabb.max);
         }
