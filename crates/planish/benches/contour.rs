@@ -3,29 +3,38 @@
 //! * `contour/plain|sharp/<mesh>_<n>` - field and extraction, with the zone around sharp edges
 //! * `contour/grid_plain/sphere_257` - a dense scalar grid, cells per second
 //! * `decimate/ratio_0.1/<mesh>`, `smooth/noise_0.1%/fandisk`
+//! * `milling/513/10000_moves`
 //!
-//! Meshes that are not there are skipped.
+//! Meshes that are not there are skipped. Arguments choose by parts of ids. Writes what it measured to
+//! `bench/runs/<date>-<machine>-contour.json`: seconds of wall clock, distances in percent of the diagonal, degrees.
 
 #![allow(clippy::print_stderr)] // a bench tells its figures on the terminal
 
 #[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "record/mod.rs"]
+mod record;
 #[path = "../tests/common/zone.rs"]
 mod zone;
 
 use planish::contour::{self, ContourParams};
-use planish::field::{GridParams, Lattice, MeshField, ScalarGrid, Spacing, sample_grid};
+use planish::field::{GridParams, Lattice, MeshField, Milling, Move, ScalarGrid, Spacing, Tool, sample_grid};
+use planish::geom::Aabb;
 use planish::geom::random;
 use planish::mesh::{
     CompareParams, DecimateParams, SmoothParams, compare, decimate, diagnose, self_intersections, smooth,
 };
 use planish::{DVec3, Silent};
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 /// Times are the least of so many rounds: what others do on the machine only ever adds.
 const ROUNDS: usize = 5;
 
+type Figures = BTreeMap<String, BTreeMap<&'static str, f64>>;
+
 fn main() {
+    let mut figures = Figures::new();
     let only: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     let wanted = |id: &str| only.is_empty() || only.iter().any(|o| id.contains(o.as_str()));
     for (name, n) in [
@@ -38,18 +47,22 @@ fn main() {
         ("turbine_blade", 257),
     ] {
         if wanted(&format!("contour/{name}_{n}")) {
-            mesh(name, n);
+            mesh(name, n, &mut figures);
         }
     }
     if wanted("contour/grid_plain/sphere_257") {
-        grid();
+        grid(&mut figures);
     }
     if wanted("decimate") {
-        decimation("turbine_blade");
+        decimation("turbine_blade", &mut figures);
     }
     if wanted("smooth") {
-        smoothing();
+        smoothing(&mut figures);
     }
+    if wanted("milling/513/10000_moves") {
+        milling(&mut figures);
+    }
+    record::write("contour", &figures);
 }
 
 fn least<T>(mut work: impl FnMut() -> T) -> (T, f64) {
@@ -63,7 +76,7 @@ fn least<T>(mut work: impl FnMut() -> T) -> (T, f64) {
     (result.expect("at least one round"), best)
 }
 
-fn mesh(name: &str, n: usize) {
+fn mesh(name: &str, n: usize, figures: &mut Figures) {
     let Some(mesh) = common::data_mesh(&format!("{name}.ply")) else { return };
     let ((field, lattice, creases), fill) = least(|| {
         let field = MeshField::new(&mesh).expect("a sound mesh");
@@ -93,10 +106,24 @@ fn mesh(name: &str, n: usize) {
             d.degenerate_faces,
             self_intersections(&found.mesh).len()
         );
+        let own = [
+            ("field_s", fill),
+            ("extraction_s", seconds),
+            ("triangles", d.triangles as f64),
+            ("zone_deg", z.normal_deg),
+            ("zone_beyond_30_percent", z.off_30),
+            ("edge_rms_percent", z.edge_rms),
+            ("edge_max_percent", z.edge_max),
+            ("surface_rms_percent", z.rms),
+            ("surface_max_percent", z.max),
+            ("degenerate", d.degenerate_faces as f64),
+            ("self_intersections", self_intersections(&found.mesh).len() as f64),
+        ];
+        figures.insert(format!("contour/{kind}/{name}_{n}"), own.into());
     }
 }
 
-fn grid() {
+fn grid(figures: &mut Figures) {
     let n = 258;
     let at = |i: usize| i as f64 / (n - 1) as f64 * 2.4 - 1.2;
     let values = (0..n * n * n).map(|v| {
@@ -116,10 +143,15 @@ fn grid() {
             cells / (fill + seconds),
             found.mesh.triangles.len()
         );
+        let id = format!("contour/grid_{}/sphere_257", if params.plain { "plain" } else { "sharp" });
+        figures.insert(
+            id,
+            [("hits_s", fill), ("extraction_s", seconds), ("mcells_per_s", cells / (fill + seconds))].into(),
+        );
     }
 }
 
-fn decimation(name: &str) {
+fn decimation(name: &str, figures: &mut Figures) {
     let Some(mesh) = common::data_mesh(&format!("{name}.ply")) else { return };
     let start = Instant::now();
     let found = decimate(&mesh, None, &DecimateParams::default(), &Silent).expect("a manifold");
@@ -135,9 +167,19 @@ fn decimation(name: &str) {
         d.manifold,
         found.self_intersections
     );
+    figures.insert(
+        format!("decimate/ratio_0.1/{name}"),
+        [
+            ("seconds", seconds),
+            ("rms_percent", 100.0 * off.both_rel.rms),
+            ("max_percent", 100.0 * off.both_rel.max),
+            ("self_intersections", found.self_intersections as f64),
+        ]
+        .into(),
+    );
 }
 
-fn smoothing() {
+fn smoothing(figures: &mut Figures) {
     let Some(mesh) = common::data_mesh("fandisk.ply") else { return };
     let size = 0.001 * mesh.bounds().diagonal();
     let mut rough = mesh.clone();
@@ -157,5 +199,29 @@ fn smoothing() {
             100.0 * found.noise / mesh.bounds().diagonal(),
             self_intersections(m).len()
         );
+        figures.insert(
+            format!("smooth/noise_0.1_percent/fandisk/{what}"),
+            [("seconds", seconds), ("rms_percent", z.rms), ("zone_deg", z.normal_deg)].into(),
+        );
     }
+}
+
+/// A stock of 513 cells, a ball-ended tool in 10 000 short sloped moves over it.
+fn milling(figures: &mut Figures) {
+    let stock = Aabb { min: DVec3::new(0.0, 0.0, -20.0), max: DVec3::new(100.0, 100.0, 0.0) };
+    let at = |k: usize| {
+        let (row, column) = (k / 100, k % 100);
+        let column = if row % 2 == 0 { column } else { 99 - column };
+        let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
+        DVec3::new(x, y, -6.0 + 4.0 * (0.11 * x).sin() * (0.13 * y).cos())
+    };
+    let moves = (0..10_000).map(|k| Move { from: at(k), to: at(k + 1), tool: 0 }).collect();
+    let start = Instant::now();
+    let job = Milling::new(stock, vec![Tool::Ball { radius: 1.5 }], moves);
+    let sampling = contour::Sampling { spacing: Spacing::Resolution(513), memory: 8 << 30 };
+    let made = contour::from_field(&job, sampling, &ContourParams::default(), &Silent).expect("a surface");
+    let seconds = start.elapsed().as_secs_f64();
+    let d = diagnose(&made.extracted.mesh);
+    eprintln!("milling/513/10000_moves: {seconds:.2} s, {} triangles, watertight {}", d.triangles, d.watertight);
+    figures.insert("milling/513/10000_moves".into(), [("seconds", seconds), ("triangles", d.triangles as f64)].into());
 }

@@ -8,6 +8,9 @@
 
 #![allow(clippy::print_stderr)] // a bench tells its figures on the terminal
 
+#[path = "record/mod.rs"]
+mod record;
+
 use glam::DVec3;
 use planish::mesh::shapes;
 use planish::pipeline::{self, PipelineParams, StageRecord};
@@ -15,7 +18,6 @@ use planish::surface::{self, Resolution};
 use planish::{Model, Silent};
 use std::collections::BTreeMap;
 use std::hint::black_box;
-use std::process::Command;
 use std::time::Instant;
 
 /// Parts: name, triangles, rounds. What others do on the machine only ever adds, so the least of the rounds counts;
@@ -54,7 +56,7 @@ fn main() {
     let (stream, fit) = grid_fit();
     seconds.insert("reference/stream/grid_1024x1024".into(), stream);
     seconds.insert("fit/65x100/grid_1024x1024".into(), fit);
-    let machine = machine();
+    let machine = record::machine();
     let record = serde_json::json!({
         "planish": env!("CARGO_PKG_VERSION"),
         "machine": machine,
@@ -66,7 +68,7 @@ fn main() {
     });
     let text = serde_json::to_string_pretty(&record).expect("numbers and names") + "\n";
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../bench/runs");
-    let path = format!("{folder}/{}-{machine}.json", output("date", &["+%Y-%m-%d"]));
+    let path = format!("{folder}/{}-{machine}.json", record::output("date", &["+%Y-%m-%d"]));
     std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, &text)).expect("bench/runs can be written");
     eprintln!("{text}{path}");
 }
@@ -126,22 +128,4 @@ fn slope(curve: &[(f64, f64)]) -> Option<f64> {
     let (mx, my) = logs.iter().fold((0.0, 0.0), |m, l| (m.0 + l.0 / n, m.1 + l.1 / n));
     let (xy, xx) = logs.iter().fold((0.0, 0.0), |s, l| (s.0 + (l.0 - mx) * (l.1 - my), s.1 + (l.0 - mx).powi(2)));
     Some(xy / xx)
-}
-
-/// The processor in small letters with dashes, and its number of cores.
-fn machine() -> String {
-    let facts = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let line = facts.lines().find(|l| l.starts_with("model name")).and_then(|l| l.split(':').nth(1));
-    let name = line.map(str::trim).map_or_else(|| output("uname", &["-m"]), str::to_owned);
-    let words: Vec<String> = name
-        .split(|c: char| !c.is_ascii_alphanumeric())
-        .filter(|w| !w.is_empty() && !["R", "TM", "CPU"].contains(w))
-        .map(str::to_lowercase)
-        .collect();
-    format!("{}-{}cores", words.join("-"), std::thread::available_parallelism().map_or(1, |n| n.get()))
-}
-
-fn output(program: &str, arguments: &[&str]) -> String {
-    let done = Command::new(program).args(arguments).output();
-    done.map(|d| String::from_utf8_lossy(&d.stdout).trim().to_owned()).unwrap_or_else(|_| "unknown".into())
 }

@@ -12,7 +12,7 @@ pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
 pub use scan::{ScanError, ScanMeshed, ScanParams, mesh_scan, sample_figures, scan_figures, voxel_for};
 
 use crate::grid::{self, FeatureError, GridError, GridParams};
-use crate::mesh::{self, CompareError, MeshError, Repairs, TriMesh};
+use crate::mesh::{self, CompareError, FeatureTags, MeshError, Repairs, TriMesh};
 use crate::model::Model;
 use crate::network::{self, ImprintError, LayoutError, LayoutParams, Network};
 use crate::relief::{self, ReliefError};
@@ -108,11 +108,25 @@ pub fn fit(
     params: &PipelineParams,
     observer: &dyn PipelineObserver,
 ) -> Result<Fitted, PipelineError> {
-    run(input, network, params, observer).map_err(|e| or_cancelled(e, observer))
+    fit_tagged(input, None, network, params, observer)
+}
+
+/// As [`fit`]; an automatic network follows the sharp edges of `tags` where there are any.
+/// # Errors
+/// As [`fit`].
+pub fn fit_tagged(
+    input: &TriMesh,
+    tags: Option<&FeatureTags>,
+    network: Option<Network>,
+    params: &PipelineParams,
+    observer: &dyn PipelineObserver,
+) -> Result<Fitted, PipelineError> {
+    run(input, tags, network, params, observer).map_err(|e| or_cancelled(e, observer))
 }
 
 fn run(
     input: &TriMesh,
+    tags: Option<&FeatureTags>,
     network: Option<Network>,
     params: &PipelineParams,
     observer: &dyn PipelineObserver,
@@ -121,7 +135,7 @@ fn run(
     let (mesh, repairs) = repair(input, &mut clock)?;
     let network = match network {
         Some(network) => network,
-        None => draw(&mesh, &params.layout, &mut clock)?,
+        None => draw(input, tags, &mesh, &params.layout, &mut clock)?,
     };
     let patches = clock.stage("imprint", |_| network::imprint(&mesh, &network), |p| [("patches", p.len())])?;
     let grids = clock.stage(
@@ -165,10 +179,22 @@ pub fn layout(
     params: &LayoutParams,
     observer: &dyn PipelineObserver,
 ) -> Result<Drafted, PipelineError> {
+    layout_tagged(input, None, params, observer)
+}
+
+/// As [`layout`]; the network follows the sharp edges of `tags` where there are any.
+/// # Errors
+/// As [`fit`].
+pub fn layout_tagged(
+    input: &TriMesh,
+    tags: Option<&FeatureTags>,
+    params: &LayoutParams,
+    observer: &dyn PipelineObserver,
+) -> Result<Drafted, PipelineError> {
     let mut clock = Clock::new(observer, &WEIGHTS[..2]);
     let draft = |clock: &mut Clock| {
         let (mesh, repairs) = repair(input, clock)?;
-        let network = draw(&mesh, params, clock)?;
+        let network = draw(input, tags, &mesh, params, clock)?;
         Ok::<_, PipelineError>((mesh, repairs, network))
     };
     let (mesh, repairs, network) = draft(&mut clock).map_err(|e| or_cancelled(e, observer))?;
@@ -275,8 +301,16 @@ fn repair(input: &TriMesh, clock: &mut Clock) -> Result<(TriMesh, Repairs), Pipe
     Ok(clock.stage("repair", |_| mesh::repair(input), |(mesh, _)| [("triangles", mesh.triangles.len())])?)
 }
 
-fn draw(mesh: &TriMesh, params: &LayoutParams, clock: &mut Clock) -> Result<Network, PipelineError> {
-    Ok(clock.stage("layout", |o| network::layout(mesh, params, o), |n| [("patches", n.patches.len())])?)
+fn draw(
+    input: &TriMesh,
+    tags: Option<&FeatureTags>,
+    mesh: &TriMesh,
+    params: &LayoutParams,
+    clock: &mut Clock,
+) -> Result<Network, PipelineError> {
+    let tagged = tags.map(|tags| tags.half_edges(input, mesh)).unwrap_or_default();
+    let counts = |n: &Network| [("patches", n.patches.len())];
+    Ok(clock.stage("layout", |o| network::layout_tagged(mesh, &tagged, params, o), counts)?)
 }
 
 /// The stages from the grids to the reliefs.

@@ -93,6 +93,15 @@ fn corners_of_a_torus_of_60_patches_are_square_within_20_degrees_in_the_mean() {
 }
 
 #[test]
+fn a_pinhole_in_a_sphere_of_24_patches_adds_at_most_16() {
+    let mut mesh = shapes::sphere(1.0, 5);
+    let whole = layout(&mesh, &params(24), &Silent).unwrap().patches.len();
+    mesh.triangles.remove(7);
+    let pierced = layout(&mesh, &params(24), &Silent).unwrap().patches.len();
+    assert!(pierced <= whole + 16, "{pierced} patches, {whole} without the hole");
+}
+
+#[test]
 fn layouts_are_equal_on_1_and_4_threads() {
     let mesh = shapes::demo(7, 6000);
     let on = |threads: usize| {

@@ -23,6 +23,7 @@ pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
         command: "demo",
         path: Path::new(PART),
         input: &part,
+        tags: None,
         network: None,
         params: PipelineParams::default(),
         demanded: None,

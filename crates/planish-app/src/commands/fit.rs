@@ -34,12 +34,13 @@ pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
 /// A model of a mesh.
 fn anew(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
     let params = args.stages.params(session.common.seed)?;
-    let (input, read) = session.step("read", || files::mesh(&args.input))?;
+    let ((input, tags), read) = session.step("read", || files::tagged_mesh(&args.input))?;
     let network = files::optional_network(args.network.as_deref(), &input)?;
     let job = Job {
         command: "fit",
         path: &args.input,
         input: &input,
+        tags: tags.as_ref(),
         network: network.zip(args.network.as_deref()),
         params,
         demanded: args.stages.demanded_tolerance(),

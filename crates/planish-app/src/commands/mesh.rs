@@ -89,6 +89,9 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let mut report = Report::new("mesh", input);
     report.stages = vec![read, record, write];
     figures(&made, &mut report);
+    if let Source::Mesh(input) = &source {
+        thin_walls(&made, input, &mut report);
+    }
     if let Some(scanned) = &scanned {
         pipeline::scan_figures(scanned, &mut report.quality, &mut report.warnings);
     }
@@ -210,6 +213,38 @@ fn figures(made: &Meshed, report: &mut Report) {
         );
         report.warnings.push(Warning::new("clamped_features", text, ""));
     }
+}
+
+/// A surface passes so many of its lattice edges more than once at sharp edges alone; beyond, walls are too thin.
+const THIN_SHARE: f64 = 0.02;
+
+/// Tells of walls and gaps of a mesh that are thinner than the voxel.
+fn thin_walls(made: &Meshed, input: &TriMesh, report: &mut Report) {
+    let thin = made.thin;
+    report.quality.insert("mesh.thin_edges".into(), Figure::Count(thin.edges as u64));
+    if thin.edges > 0 {
+        report.quality.insert("mesh.thin_width".into(), Figure::Number(thin.width));
+    }
+    let facts = diagnose(input);
+    let pieces = report.quality.get("mesh.components").and_then(|f| match f {
+        Figure::Count(n) => Some(*n),
+        _ => None,
+    });
+    let broken = facts.watertight && pieces.is_some_and(|n| n != facts.components as u64);
+    if thin.edges == 0 || !(broken || thin.share > THIN_SHARE) {
+        return;
+    }
+    let unit = report.input.units.as_str();
+    let mut text = format!(
+        "Walls or gaps thinner than the voxel: the surface passes {} edges of the lattice more than once, {} {unit} apart in the median.",
+        count(thin.edges as u64),
+        number(thin.width)
+    );
+    if let (true, Some(n)) = (broken, pieces) {
+        text += &format!(" The result has {} pieces where the input has {}.", count(n), count(facts.components as u64));
+    }
+    text += &format!(" Half of them need a voxel of {} {unit}.", number(thin.width));
+    report.warnings.push(Warning::new("thin_walls", text, ""));
 }
 
 fn table(args: &Mesh, made: &Meshed, report: &Report) -> Summary {

@@ -7,7 +7,7 @@ use crate::files;
 use crate::pictures;
 use crate::products::Staged;
 use crate::summary::Summary;
-use planish::mesh::TriMesh;
+use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{HistoryEntry, Model};
 use planish::network::Network;
 use planish::pipeline::{self, Fitted, PipelineParams, StageRecord};
@@ -20,23 +20,24 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
     let params = args.stages.params(session.common.seed)?;
     let mut before = Vec::new();
     let mut extra = None;
-    let input = if planish_io::is_scan(&args.input) {
+    let (input, tags) = if planish_io::is_scan(&args.input) {
         let (scan, read) = session.step("read", || files::scan(&args.input, &args.scan))?;
         let (mesh, more, records) = from_scan(session, &args.input, &scan, args.holes.choice(), &staged)?;
         before.push(read);
         before.extend(records);
         extra = Some(more);
-        mesh
+        (mesh, None)
     } else {
-        let (mesh, read) = session.step("read", || files::mesh(&args.input))?;
+        let (tagged, read) = session.step("read", || files::tagged_mesh(&args.input))?;
         before.push(read);
-        mesh
+        tagged
     };
     let network = files::optional_network(args.network.as_deref(), &input)?;
     let job = Job {
         command: "run",
         path: &args.input,
         input: &input,
+        tags: tags.as_ref(),
         network: network.zip(args.network.as_deref()),
         params,
         demanded: args.stages.demanded_tolerance(),
@@ -106,6 +107,8 @@ pub struct Job<'a> {
     pub path: &'a Path,
     /// The mesh.
     pub input: &'a TriMesh,
+    /// Its sharp edges, where the file tells them.
+    pub tags: Option<&'a FeatureTags>,
     /// A network of the user's own, with its path.
     pub network: Option<(Network, &'a Path)>,
     /// Parameters of all stages.
@@ -151,7 +154,7 @@ pub fn fitted(session: &Session, job: Job, before: Vec<StageRecord>) -> Result<(
     let mut report = Report::new(job.command, files::mesh_facts(job.path, job.input, units));
     let (network, network_path) = job.network.unzip();
     let Fitted { mut model, stages, quality, seams, warnings } =
-        pipeline::fit(job.input, network, &job.params, &session.bars)
+        pipeline::fit_tagged(job.input, job.tags, network, &job.params, &session.bars)
             .map_err(|e| pipeline_failure(job.path, network_path, e))?;
     report.stages = before;
     report.stages.extend(stages);

@@ -26,6 +26,8 @@ pub struct Corner {
     pub edge: u8,
     /// Face in which the segment to the next vertex lies.
     pub face: u8,
+    /// True for a face point on a feature line; others are bends that are no features.
+    pub tagged: bool,
 }
 
 /// Edge of a vertex that lies inside a face.

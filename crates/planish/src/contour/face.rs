@@ -11,6 +11,7 @@ use super::patch::{Wish, edge_point, joined};
 use super::walk::{Cell, walk};
 use crate::field::{Creases, Directed};
 use crate::geom::predicates::segments_meet;
+use crate::mesh::FeatureKind;
 use glam::{DVec2, DVec3};
 
 /// A face point and the hits that it joins.
@@ -21,6 +22,8 @@ struct FacePoint {
     /// Names of the two hits, the lesser first.
     hits: [u32; 2],
     p: DVec3,
+    /// False for a bend that is no feature.
+    tagged: bool,
 }
 
 /// All face points, by the axis of their face's normal and the row of its least node.
@@ -75,12 +78,17 @@ pub fn face_points(
                     let hit = &field.axes[e / 4].hits[cell.hit[e] as usize];
                     (base[e / 4] + cell.hit[e], edge_point(field, cell, e, hit.t), hit.normal)
                 });
-                if a.2.dot(b.2) >= limits.sharp {
-                    continue;
-                }
-                if let Some((p, wish)) = place(field, cell, axis, refine, (a.1, a.2), (b.1, b.2)) {
+                let cosine = a.2.dot(b.2);
+                let found_at = if cosine < limits.sharp {
+                    place(field, cell, axis, refine, (a.1, a.2), (b.1, b.2)).map(|(p, wish)| (p, wish, true))
+                } else if cosine < limits.faint {
+                    faint(field, cell, axis, refine, (a.1, a.2), (b.1, b.2)).map(|(p, tagged)| (p, None, tagged))
+                } else {
+                    None
+                };
+                if let Some((p, wish, tagged)) = found_at {
                     let hits = [a.0.min(b.0), a.0.max(b.0)];
-                    let point = FacePoint { at: cell.at[0] as u32, hits, p };
+                    let point = FacePoint { at: cell.at[0] as u32, hits, p, tagged };
                     found[segments - 1] = Some((point, wish));
                 }
             }
@@ -97,6 +105,27 @@ pub fn face_points(
         }
     });
     part
+}
+
+/// Where a bend that only the source knows passes the face, and whether it is a feature.
+fn faint(
+    field: &Directed,
+    cell: &Cell,
+    axis: usize,
+    refine: Option<&dyn Creases>,
+    a: (DVec3, DVec3),
+    b: (DVec3, DVec3),
+) -> Option<(DVec3, bool)> {
+    let [i, j, k] = cell.at;
+    let (low, mut high) = (field.lattice.node(i, j, k), field.lattice.node(i + 1, j + 1, k + 1));
+    high[axis] = low[axis];
+    let (mut p, tagged) = refine?.faint_point(axis, low, high, a, b)?;
+    p[axis] = low[axis];
+    let clear = (0..3).filter(|&u| u != axis).all(|u| {
+        let margin = CLEAR * (high[u] - low[u]);
+        p[u] > low[u] + margin && p[u] < high[u] - margin
+    });
+    clear.then_some((p, tagged))
 }
 
 /// Where the tangents of two hits meet in the plane of the face, kept in the face; and where they meet indeed, if that is
@@ -212,6 +241,11 @@ impl FacePoints {
         self.points.iter().map(Vec::len).sum()
     }
 
+    /// For all, in the order of their names, what they mark.
+    pub fn kinds(&self) -> impl Iterator<Item = FeatureKind> + '_ {
+        self.points.iter().flatten().map(|p| if p.tagged { FeatureKind::Edge } else { FeatureKind::None })
+    }
+
     /// All positions in the order of their names.
     pub fn positions(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.points.iter().flatten().map(|p| p.p)
@@ -223,20 +257,21 @@ impl FacePoints {
         self.points[axis].get((id - self.base[axis]) as usize).map_or(DVec3::NAN, |p| p.p)
     }
 
-    /// Name and position of the face point in face `face` of a cell between two hits.
-    pub fn find(&self, field: &Directed, cell: &Cell, face: usize, a: u32, b: u32) -> Option<(u32, DVec3)> {
+    /// Name, position and whether it is a feature of the face point in face `face` of a cell between two hits.
+    pub fn find(&self, field: &Directed, cell: &Cell, face: usize, a: u32, b: u32) -> Option<(u32, DVec3, bool)> {
         let axis = face / 2;
         let mut at = cell.at;
         at[axis] += face & 1;
         self.lookup(axis, field.lattice.row(at[1], at[2]), at[0] as u32, [a.min(b), a.max(b)])
     }
 
-    fn lookup(&self, axis: usize, row: usize, at: u32, hits: [u32; 2]) -> Option<(u32, DVec3)> {
+    fn lookup(&self, axis: usize, row: usize, at: u32, hits: [u32; 2]) -> Option<(u32, DVec3, bool)> {
         let start = self.start[axis].get(row)?;
         let end = self.start[axis].get(row + 1)?;
         let points = &self.points[axis][*start as usize..*end as usize];
         let first = points.partition_point(|p| p.at < at);
         let n = points[first..].iter().take_while(|p| p.at == at).position(|p| p.hits == hits)?;
-        Some((self.base[axis] + *start + (first + n) as u32, points[first + n].p))
+        let point = &points[first + n];
+        Some((self.base[axis] + *start + (first + n) as u32, point.p, point.tagged))
     }
 }

@@ -17,6 +17,7 @@ mod cell;
 mod certificate;
 mod face;
 mod feature;
+mod local;
 mod octree;
 mod patch;
 mod polish;
@@ -114,6 +115,8 @@ pub struct Thresholds {
     pub sharp: f64,
     /// Sine above which a feature is a corner.
     pub corner: f64,
+    /// Cosine below which the source may know of a feature: at least `sharp`.
+    pub faint: f64,
 }
 
 /// Layers of cells that a task takes at once.
@@ -134,7 +137,8 @@ pub fn extract(
     params: &ContourParams,
     observer: &dyn Observer,
 ) -> Result<Extracted, ContourError> {
-    let limits = thresholds(field, params);
+    let creases = creases.filter(|_| !params.plain);
+    let limits = thresholds(field, creases, params);
     let hits = field.hit_count();
     if hits as u64 >= INNER as u64 {
         return Err(ContourError::TooLarge { vertices: hits });
@@ -144,7 +148,6 @@ pub fn extract(
     let layers = field.lattice.cells[2];
     let chunks: Vec<(usize, usize)> =
         (0..layers).step_by(LAYERS).map(|from| (from, (from + LAYERS).min(layers))).collect();
-    let creases = creases.filter(|_| !params.plain);
 
     let parts: Option<Vec<face::Part>> = if params.plain {
         Some(Vec::new())
@@ -167,7 +170,7 @@ pub fn extract(
             cells
         });
         // Standard cells have no features to keep, but no reason to bend either.
-        let sharp = if params.plain { SMOOTH } else { limits.sharp };
+        let sharp = if params.plain { SMOOTH } else { limits.faint };
         Octree::new(field, base, cells.collect(), sharp, tolerance)
     });
     let patcher = Patcher { field, limits: &limits, faces: &faces, refine: creases, base };
@@ -201,7 +204,7 @@ pub fn extract(
     let mut points = hit_positions(field);
     points.extend(faces.positions());
     let mut kinds = vec![FeatureKind::None; hits];
-    kinds.resize(outer, FeatureKind::Edge);
+    kinds.extend(faces.kinds());
     let mut counts = ContourCounts::default();
     let mut triangles = Vec::with_capacity(sheets.iter().map(|s| s.triangles.len()).sum());
     let mut edges = Vec::new();
@@ -228,8 +231,9 @@ pub fn extract(
     if octree.is_some() {
         cells.par_sort_unstable_by_key(|c| [c.0[2], c.0[1], c.0[0]]);
     }
-    counts.moved = polish::polish(&mut mesh, field, base, cells, &wishes);
-    counts.kept = wishes.len() - counts.moved;
+    let polished =
+        polish::polish(&mut mesh, field, base, cells, &wishes, creases, &mut kinds, &mut edges, limits.sharp);
+    (counts.moved, counts.kept) = (polished.moved, polished.kept);
     let mut extracted = Extracted { mesh, tags: tags(kinds, edges), counts };
     drop_unused(&mut extracted);
     extracted.tags.mark(&mut extracted.mesh);
@@ -237,12 +241,13 @@ pub fn extract(
     Ok(extracted)
 }
 
-fn thresholds(field: &Directed, params: &ContourParams) -> Thresholds {
+fn thresholds(field: &Directed, creases: Option<&dyn Creases>, params: &ContourParams) -> Thresholds {
     if params.plain {
-        return Thresholds { sharp: -2.0, corner: 2.0 };
+        return Thresholds { sharp: -2.0, corner: 2.0, faint: -2.0 };
     }
     let noise = (NOISE * field.noise_deg).min(180.0).to_radians().cos();
-    Thresholds { sharp: params.sharp.min(noise), corner: params.corner }
+    let sharp = params.sharp.min(noise);
+    Thresholds { sharp, corner: params.corner, faint: creases.map_or(sharp, |c| c.faint().max(sharp)) }
 }
 
 fn tags(vertices: Vec<FeatureKind>, edges: Vec<[u32; 2]>) -> FeatureTags {

@@ -228,7 +228,7 @@ impl<'a> Octree<'a> {
                     faces |= ((p[axis] == low[axis]) as u8) << (2 * axis)
                         | ((p[axis] == high[axis]) as u8) << (2 * axis + 1);
                 }
-                Corner { id, p, n: self.normal(id), faces, edge: 0, face: 0 }
+                Corner { id, p, n: self.normal(id), faces, edge: 0, face: 0, tagged: false }
             })
             .collect();
         let first = sheet.triangles.len() as u32;

@@ -161,7 +161,7 @@ impl Patcher<'_> {
                 rest &= !(1 << e);
                 let (id, p, n) = self.hit(cell, e);
                 let face = chain.face[e];
-                scratch.corners.push(Corner { id, p, n, faces: EDGE_FACES[e], edge: e as u8, face });
+                scratch.corners.push(Corner { id, p, n, faces: EDGE_FACES[e], edge: e as u8, face, tagged: false });
                 e = chain.next[e] as usize;
                 if e == first {
                     break;
@@ -184,11 +184,11 @@ impl Patcher<'_> {
         for (k, c) in l.iter().enumerate() {
             out.push(*c);
             let next = &l[(k + 1) % l.len()];
-            if c.n.dot(next.n) < self.limits.sharp
-                && let Some((id, p)) = self.faces.find(self.field, cell, c.face as usize, c.id, next.id)
+            if c.n.dot(next.n) < self.limits.faint
+                && let Some((id, p, tagged)) = self.faces.find(self.field, cell, c.face as usize, c.id, next.id)
             {
                 let n = DVec3::ZERO;
-                out.push(Corner { id, p, n, faces: 1 << c.face, edge: FACE_POINT, face: c.face });
+                out.push(Corner { id, p, n, faces: 1 << c.face, edge: FACE_POINT, face: c.face, tagged });
             }
         }
         out
@@ -208,6 +208,17 @@ impl Patcher<'_> {
         scratch.normals.extend(l.iter().map(|c| c.n));
         let mut shape = classify(&scratch.normals, self.limits.sharp, self.limits.corner);
         if shape == Shape::Smooth {
+            // A bend that only the source knows.
+            if self.limits.faint > self.limits.sharp
+                && (0..l.len()).any(|k| l[k].n.dot(l[(k + 1) % l.len()].n) < self.limits.faint)
+            {
+                let with = self.with_face_points(cell, l);
+                if with.len() > l.len() {
+                    *l = with;
+                    self.bend(l, scratch, sheet, [low, high]);
+                    return;
+                }
+            }
             if !flat(l, &mut scratch.local) {
                 let p = inside(center(l), low, high).0;
                 fan(l, self.inner(sheet, p, FeatureKind::None), &mut scratch.local);
@@ -217,7 +228,7 @@ impl Patcher<'_> {
         scratch.planes.clear();
         scratch.planes.extend(l.iter().map(|c| (c.p, c.n)));
         *l = self.with_face_points(cell, l);
-        let points: Vec<DVec3> = l.iter().filter(|c| c.edge == FACE_POINT).map(|c| c.p).collect();
+        let points: Vec<DVec3> = l.iter().filter(|c| c.tagged).map(|c| c.p).collect();
         let hits = scratch.planes.iter().map(|p| p.0).sum::<DVec3>() / scratch.planes.len() as f64;
         let middle = if points.len() >= 2 { points.iter().sum::<DVec3>() / points.len() as f64 } else { hits };
         let near = if shape == Shape::Edge { middle } else { hits };
@@ -260,7 +271,24 @@ impl Patcher<'_> {
         if let Some(wish) = wish {
             sheet.wishes.push((id, wish));
         }
-        for c in l.iter().filter(|c| c.edge == FACE_POINT) {
+        for c in l.iter().filter(|c| c.tagged) {
+            sheet.edges.push([id, c.id]);
+        }
+        fan(l, id, &mut scratch.local);
+    }
+
+    /// The patch of a loop that is smooth by its hits, but that bends or feature lines pass of which the source knows.
+    fn bend(&self, l: &[Corner], scratch: &mut Scratch, sheet: &mut Sheet, [low, high]: [DVec3; 2]) {
+        let points: Vec<DVec3> = l.iter().filter(|c| c.edge == FACE_POINT).map(|c| c.p).collect();
+        let middle = points.iter().sum::<DVec3>() / points.len() as f64;
+        let found = self.refine.and_then(|r| r.bend(middle, low, high)).unwrap_or(middle);
+        let mut apex = inside(found, low, high).0;
+        if turned(l, apex) {
+            apex = inside(center(l), low, high).0;
+        }
+        let tagged = l.iter().any(|c| c.tagged);
+        let id = self.inner(sheet, apex, if tagged { FeatureKind::Edge } else { FeatureKind::None });
+        for c in l.iter().filter(|c| c.tagged) {
             sheet.edges.push([id, c.id]);
         }
         fan(l, id, &mut scratch.local);

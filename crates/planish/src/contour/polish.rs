@@ -1,166 +1,479 @@
-//! Feature vertices that belong outside their cell are moved there, if exact signs allow it.
+//! Feature vertices that belong outside their cell are brought there, if exact signs allow it.
 //!
 //! A sharp edge may poke through a face of a cell without changing the side of a node: the hits then show two
 //! surfaces that meet beyond the cell, and the certified mesh has a vertex that was clamped ([K01] lets it lie outside,
-//! and folds can follow). Here it is moved after all, one vertex after the other, and each move is kept only if no
-//! triangle around the vertex then meets any other triangle nearby in more than they share. So the certificate holds
-//! after every step.
+//! and folds can follow). Here it is moved after all. A line that passes close to an edge of the lattice is clamped in
+//! the cell on its wrong side, in three vertices where one would do: they move together, or are merged along the line.
+//! Each step is kept only if the mesh stays embedded ([`Local`]), so the certificate holds.
+//!
+//! 1. corners of the source that no vertex took     2. vertices that were clamped: together, one by one, merged
+//! 3. what is left: a part of the way     4. loose ends of lines joined, by a flip if need be
+//! 5. triangles without area: merged away
 
+use super::local::{CellRange, GONE, Local};
 use super::patch::Wish;
-use crate::field::Directed;
-use crate::geom::predicates::triangles_meet;
-use crate::mesh::TriMesh;
+use crate::field::{Creases, Directed};
+use crate::mesh::{DEGENERATE_AREA, FeatureKind, TriMesh};
 use glam::DVec3;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// Parts of the way that are tried.
+/// Parts of the way that are tried in the end.
 const WAYS: [f64; 3] = [1.0, 0.6, 0.3];
 /// Rounds: a neighbour that moved may make room.
 const ROUNDS: usize = 8;
+/// So many vertices move together at most.
+const TOGETHER: usize = 24;
+/// A corner that a vertex is this near to is taken, in cells.
+const TAKEN: f64 = 1e-6;
+/// A corner calls vertices of lines from this distance, in cells, and so many of them at most.
+const CALL: f64 = 0.9;
+const CALLED: usize = 4;
 
-struct Polish<'a> {
-    mesh: &'a mut TriMesh,
-    field: &'a Directed,
-    /// First name of the hits of each axis.
-    base: [u32; 3],
-    /// Cells in the order of z, y, x with the range of their triangles.
-    cells: Vec<([u32; 3], u32, u32)>,
+/// What was done.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Polished {
+    /// Feature vertices that came where they belong, also by being merged with one that is there.
+    pub moved: usize,
+    /// Feature vertices that did not.
+    pub kept: usize,
 }
 
-/// Moves the vertices of `wishes`; returns how many arrived where they belong.
+/// Where lines run: for each feature vertex those beside it on its lines.
+struct Lines(BTreeMap<u32, Vec<u32>>);
+
+impl Lines {
+    fn join(&mut self, v: u32, w: u32) {
+        for (a, b) in [(v, w), (w, v)] {
+            let list = self.0.entry(a).or_default();
+            if !list.contains(&b) {
+                list.push(b);
+            }
+        }
+    }
+
+    fn beside(&self, v: u32) -> Vec<u32> {
+        self.0.get(&v).cloned().unwrap_or_default()
+    }
+
+    fn merge(&mut self, v: u32, w: u32) {
+        for x in self.0.remove(&v).unwrap_or_default() {
+            let list = self.0.entry(x).or_default();
+            list.retain(|&y| y != v);
+            if x != w {
+                if !list.contains(&w) {
+                    list.push(w);
+                }
+                let own = self.0.entry(w).or_default();
+                if !own.contains(&x) {
+                    own.push(x);
+                }
+            }
+        }
+    }
+}
+
+/// Brings the vertices of `wishes` to their places, and merges triangles without area away.
+/// * `cells` - all cells with triangles, in the order of z, y, x
+/// * `kinds`, `edges` - the features; changed along with the mesh
 pub fn polish(
     mesh: &mut TriMesh,
     field: &Directed,
     base: [u32; 3],
-    cells: Vec<([u32; 3], u32, u32)>,
+    cells: Vec<CellRange>,
     wishes: &[Wish],
-) -> usize {
-    if wishes.is_empty() {
-        return 0;
+    creases: Option<&dyn Creases>,
+    kinds: &mut [FeatureKind],
+    edges: &mut Vec<[u32; 2]>,
+    sharp: f64,
+) -> Polished {
+    let calls = calls(mesh, field, creases, kinds);
+    let thin = thin(mesh);
+    let mut seeds: Vec<u32> = wishes.iter().map(|w| w.0).collect();
+    seeds.extend(calls.iter().flat_map(|c| &c.1));
+    seeds.extend(thin.iter().flat_map(|&t| mesh.triangles[t as usize]));
+    let mut lines = Lines(BTreeMap::new());
+    for &[a, b] in edges.iter() {
+        lines.join(a, b);
     }
-    let stars = stars(mesh, wishes);
-    let starts: Vec<DVec3> = wishes.iter().map(|(v, _)| mesh.points[*v as usize]).collect();
-    let polish = Polish { mesh, field, base, cells };
-    let mut open: Vec<usize> = (0..wishes.len()).collect();
-    let mut arrived = vec![false; wishes.len()];
+    let special = |v: u32, beside: &[u32]| beside.len() != 2 || kinds[v as usize] == FeatureKind::Corner;
+    for (&v, beside) in lines.0.iter().filter(|(v, beside)| special(**v, beside)) {
+        // A corner may call the next vertices of the lines.
+        seeds.push(v);
+        seeds.extend(beside.iter().flat_map(|&w| lines.beside(w)).chain(beside.iter().copied()));
+    }
+    if seeds.is_empty() {
+        return Polished::default();
+    }
+    let mut local = Local::new(mesh, field, base, cells, &seeds);
+    let mut targets: HashMap<u32, DVec3> = wishes.iter().copied().collect();
+    let count = targets.len();
+    let mut open: Vec<u32> = wishes.iter().map(|w| w.0).collect();
+    open.sort_unstable();
+    open.dedup();
+
+    let mut arrived: Vec<u32> = Vec::new();
+    for (p, vertices) in &calls {
+        let free = |v: u32, arrived: &[u32]| !arrived.contains(&v);
+        if let Some(&v) = vertices.iter().find(|&&v| free(v, &arrived) && local.shift(&[(v, *p)])) {
+            kinds[v as usize] = FeatureKind::Corner;
+            arrived.push(v);
+            open.retain(|&o| o != v);
+        } else if let Some(&v) = vertices.iter().find(|&&v| free(v, &arrived)) {
+            // It may come later, when others made room.
+            kinds[v as usize] = FeatureKind::Corner;
+            targets.insert(v, *p);
+            if open.binary_search(&v).is_err() {
+                open.push(v);
+                open.sort_unstable();
+            }
+        }
+    }
     for _ in 0..ROUNDS {
-        open.retain(|&w| {
-            let (v, target) = wishes[w];
-            let start = polish.mesh.points[v as usize];
-            for way in WAYS {
-                polish.mesh.points[v as usize] = if way == 1.0 { target } else { start.lerp(target, way) };
-                if polish.allowed(&stars[w]) {
-                    arrived[w] = way == 1.0;
-                    return way != 1.0;
+        let before = open.len();
+        together(&mut local, &lines, &targets, &mut open);
+        open.retain(|&v| !local.shift(&[(v, targets[&v])]));
+        merge_along(&mut local, &mut lines, kinds, &targets, &mut open);
+        open.retain(|&v| !local.flip_and_shift(v, targets[&v]));
+        if open.is_empty() || open.len() == before {
+            break;
+        }
+    }
+    let mut corners = creases.map(|c| c.corners()).unwrap_or_default();
+    if let Some(creases) = creases.filter(|_| corners.is_empty()) {
+        corners = ask_corners(&mut local, &lines, kinds, creases, &mut open, field.lattice.step.max_element());
+    }
+    approach(&mut local, &targets, &mut open);
+    let kept = open.len();
+    gather(&mut local, &mut lines, kinds, &corners, field.lattice.step.max_element());
+    join_ends(&mut local, &mut lines, kinds, sharp);
+    merge_thin(&mut local, &mut lines, kinds, thin);
+
+    mesh.triangles.retain(|t| *t != GONE);
+    *edges =
+        lines.0.iter().flat_map(|(&v, beside)| beside.iter().filter(move |&&w| v < w).map(move |&w| [v, w])).collect();
+    Polished { moved: count.saturating_sub(kept), kept }
+}
+
+/// Corners of the source that no vertex is at, each with the nearest vertices of lines.
+fn calls(
+    mesh: &TriMesh,
+    field: &Directed,
+    creases: Option<&dyn Creases>,
+    kinds: &[FeatureKind],
+) -> Vec<(DVec3, Vec<u32>)> {
+    let corners = creases.map(|c| c.corners()).unwrap_or_default();
+    if corners.is_empty() {
+        return Vec::new();
+    }
+    let l = &field.lattice;
+    let cell = |p: DVec3| ((p - l.origin) / l.step).floor().to_array().map(|x| x as i64);
+    let mut vertices: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    for v in (0..kinds.len()).filter(|&v| kinds[v] != FeatureKind::None) {
+        vertices.entry(cell(mesh.points[v])).or_default().push(v as u32);
+    }
+    let size = l.step.max_element();
+    let around = |p: DVec3| {
+        let [x, y, z] = cell(p);
+        let cells = (0..27).map(|n| [x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]);
+        let mut near: Vec<(f64, u32)> = cells
+            .filter_map(|c| vertices.get(&c))
+            .flatten()
+            .map(|&v| (mesh.points[v as usize].distance(p), v))
+            .filter(|n| n.0 < CALL * size)
+            .collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near
+    };
+    let near: Vec<_> = corners.iter().map(|&p| around(p)).collect();
+    let taken: BTreeSet<u32> = near.iter().flatten().filter(|n| n.0 <= TAKEN * size).map(|n| n.1).collect();
+    let mut calls = Vec::new();
+    for (p, near) in corners.into_iter().zip(near) {
+        if near.first().is_some_and(|n| n.0 > TAKEN * size) {
+            calls.push((p, near.iter().map(|n| n.1).filter(|v| !taken.contains(v)).take(CALLED).collect()));
+        }
+    }
+    calls
+}
+
+/// Neighbours on a line move together.
+fn together(local: &mut Local, lines: &Lines, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32>) {
+    let mut seen: Vec<u32> = Vec::new();
+    let mut arrived: Vec<u32> = Vec::new();
+    for &first in open.iter() {
+        if seen.contains(&first) {
+            continue;
+        }
+        let mut group = vec![first];
+        let mut at = 0;
+        while at < group.len() {
+            for w in lines.beside(group[at]) {
+                if open.binary_search(&w).is_ok() && !group.contains(&w) && !seen.contains(&w) && group.len() < TOGETHER
+                {
+                    group.push(w);
                 }
             }
-            polish.mesh.points[v as usize] = start;
-            true
-        });
+            at += 1;
+        }
+        seen.extend(&group);
+        if group.len() > 1 {
+            let moves: Vec<(u32, DVec3)> = group.iter().map(|&v| (v, targets[&v])).collect();
+            if local.shift(&moves) {
+                arrived.extend(group);
+            }
+        }
     }
-    // A vertex that moved before its neighbours turns triangles for a while. Where that stayed, it goes back.
-    for _ in 0..ROUNDS {
-        for (w, &(v, _)) in wishes.iter().enumerate() {
-            let here = polish.mesh.points[v as usize];
-            let turned = polish.turned_in(&stars[w]);
-            if turned == 0 || here == starts[w] {
+    open.retain(|v| !arrived.contains(v));
+}
+
+/// Vertices that find no room are merged with their neighbours on the line.
+fn merge_along(
+    local: &mut Local,
+    lines: &mut Lines,
+    kinds: &[FeatureKind],
+    targets: &HashMap<u32, DVec3>,
+    open: &mut Vec<u32>,
+) {
+    let mut at = 0;
+    while at < open.len() {
+        let v = open[at];
+        let is_corner = |v: u32| kinds[v as usize] == FeatureKind::Corner;
+        let is_open = |v: u32, open: &[u32]| open.binary_search(&v).is_ok();
+        let mut done = false;
+        for w in lines.beside(v) {
+            if is_corner(v) {
+                // Others make room for a corner.
+                if !is_corner(w) && local.merge(w, v, targets[&v]) {
+                    lines.merge(w, v);
+                    open.retain(|&o| o != w && o != v);
+                    done = true;
+                    break;
+                }
                 continue;
             }
-            polish.mesh.points[v as usize] = starts[w];
-            if polish.turned_in(&stars[w]) < turned && polish.allowed(&stars[w]) {
-                arrived[w] = false;
+            let places = if is_open(w, open) {
+                let own = (!is_corner(w)).then(|| targets[&v]);
+                [Some(targets[&w]), own]
             } else {
-                polish.mesh.points[v as usize] = here;
+                [Some(local.position(w)), None]
+            };
+            if places.into_iter().flatten().any(|p| local.merge(v, w, p)) {
+                lines.merge(v, w);
+                open.retain(|&o| o != w && o != v);
+                done = true;
+                break;
             }
         }
-    }
-    arrived.into_iter().filter(|&a| a).count()
-}
-
-/// Triangles around each vertex that wants to move.
-fn stars(mesh: &TriMesh, wishes: &[Wish]) -> Vec<Vec<u32>> {
-    let mut which = vec![u32::MAX; mesh.points.len()];
-    for (w, (v, _)) in wishes.iter().enumerate() {
-        which[*v as usize] = w as u32;
-    }
-    let mut stars = vec![Vec::new(); wishes.len()];
-    for (t, triangle) in mesh.triangles.iter().enumerate() {
-        for &v in triangle {
-            if let Some(star) = stars.get_mut(which[v as usize] as usize) {
-                star.push(t as u32);
-            }
+        if !done {
+            at += 1;
+        } else {
+            at = at.min(open.len());
         }
     }
-    stars
 }
 
-impl Polish<'_> {
-    /// True if the triangles of `star`, as they are now, meet nothing.
-    fn allowed(&self, star: &[u32]) -> bool {
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for &t in star {
-            let corners = self.mesh.corners(t as usize);
-            low = corners.into_iter().fold(low, DVec3::min);
-            high = corners.into_iter().fold(high, DVec3::max);
-        }
-        let all = self.near(low, high);
-        star.iter().all(|&s| {
-            let (p, names) = (self.mesh.corners(s as usize), self.mesh.triangles[s as usize]);
-            let (low, high) = (p[0].min(p[1]).min(p[2]), p[0].max(p[1]).max(p[2]));
-            all.iter().filter(|&&t| t != s).all(|&t| {
-                let q = self.mesh.corners(t as usize);
-                let apart = q[0].min(q[1]).min(q[2]).cmpgt(high).any() || q[0].max(q[1]).max(q[2]).cmplt(low).any();
-                apart || !triangles_meet(p, names, q, self.mesh.triangles[t as usize])
+/// A part of the way, also where triangles lean for a while; where they stay turned the vertex goes back.
+fn approach(local: &mut Local, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32>) {
+    let starts: Vec<(u32, DVec3)> = open.iter().map(|&v| (v, local.position(v))).collect();
+    for _ in 0..ROUNDS {
+        let before = open.len();
+        open.retain(|&v| {
+            let (start, target) = (local.position(v), targets[&v]);
+            !WAYS.into_iter().any(|way| {
+                let p = if way == 1.0 { target } else { start.lerp(target, way) };
+                local.shift_leaning(&[(v, p)]) && way == 1.0
             })
-        })
-    }
-
-    /// Triangles of `star` that face against their hits.
-    fn turned_in(&self, star: &[u32]) -> usize {
-        star.iter().filter(|&&t| self.turned(t, self.mesh.corners(t as usize))).count()
-    }
-
-    /// True if a triangle faces against the normals of all hits among its corners.
-    fn turned(&self, t: u32, corners: [DVec3; 3]) -> bool {
-        let n = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        let normals = self.mesh.triangles[t as usize].iter().filter_map(|&v| self.normal(v));
-        let mut any = false;
-        for m in normals {
-            if m.dot(n) > 0.0 {
-                return false;
-            }
-            any = true;
+        });
+        if open.len() == before {
+            break;
         }
-        any
     }
-
-    fn normal(&self, v: u32) -> Option<DVec3> {
-        let axis = (0..3).rev().find(|&a| v >= self.base[a])?;
-        self.field.axes[axis].hits.get((v - self.base[axis]) as usize).map(|h| h.normal)
-    }
-
-    /// Triangles that may reach into a box: those of its cells and of the next around, as moved vertices leave their
-    /// cell by one at most.
-    fn near(&self, low: DVec3, high: DVec3) -> Vec<u32> {
-        let l = &self.field.lattice;
-        let cell = |p: DVec3| ((p - l.origin) / l.step).floor();
-        let (a, b) = (cell(low) - 1.0, cell(high) + 1.0);
-        let clamp = |x: f64, axis: usize| x.clamp(0.0, l.cells[axis] as f64) as u32;
-        let mut found = Vec::new();
-        for z in clamp(a.z, 2)..=clamp(b.z, 2) {
-            for y in clamp(a.y, 1)..=clamp(b.y, 1) {
-                let (x0, x1) = (clamp(a.x, 0), clamp(b.x, 0));
-                let first = self.cells.partition_point(|(c, ..)| [c[2], c[1], c[0]] < [z, y, x0]);
-                for &(c, first, end) in &self.cells[first..] {
-                    if c[2] != z || c[1] != y || c[0] > x1 {
-                        break;
-                    }
-                    found.extend(first..end);
+    for _ in 0..ROUNDS {
+        for &(v, start) in &starts {
+            let here = local.position(v);
+            let turned = local.turned(v);
+            if turned == 0 || here == start || local.star(v).is_empty() {
+                continue;
+            }
+            if local.shift_leaning(&[(v, start)]) {
+                if local.turned(v) >= turned {
+                    local.shift_leaning(&[(v, here)]);
+                } else if !open.contains(&v) {
+                    open.push(v);
                 }
             }
         }
-        // Merged cells name their triangles in each of their parts.
-        found.sort_unstable();
-        found.dedup();
-        found
+    }
+}
+
+/// Asks the source for the corners near vertices where lines end, meet or seem to have a corner, and brings the nearest
+/// vertex of a line there. Returns the corners.
+fn ask_corners(
+    local: &mut Local,
+    lines: &Lines,
+    kinds: &mut [FeatureKind],
+    creases: &dyn Creases,
+    open: &mut Vec<u32>,
+    size: f64,
+) -> Vec<DVec3> {
+    let special: Vec<u32> = lines
+        .0
+        .iter()
+        .filter(|(v, beside)| beside.len() != 2 || kinds[**v as usize] == FeatureKind::Corner)
+        .map(|(v, _)| *v)
+        .collect();
+    let mut corners: Vec<DVec3> = Vec::new();
+    for v in special {
+        let mut ring = local.neighbours(v);
+        ring.extend(ring.clone().iter().flat_map(|&w| local.neighbours(w)));
+        ring.sort_unstable();
+        ring.dedup();
+        let hits: Vec<(DVec3, DVec3)> =
+            ring.iter().filter_map(|&w| Some((local.position(w), local.normal(w)?))).collect();
+        let Some(corner) = creases.corner_near(local.position(v), size, &hits) else { continue };
+        if corners.iter().any(|c| c.distance(corner) < TAKEN * size) {
+            continue;
+        }
+        corners.push(corner);
+        let mut near: Vec<(f64, u32)> = ring
+            .iter()
+            .filter(|w| !lines.beside(**w).is_empty())
+            .map(|&w| (local.position(w).distance(corner), w))
+            .collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let taken = near.first().is_some_and(|n| n.0 < TAKEN * size);
+        for &(_, w) in near.iter().take(CALLED).filter(|_| !taken) {
+            if local.shift(&[(w, corner)]) || local.flip_and_shift(w, corner) {
+                kinds[w as usize] = FeatureKind::Corner;
+                open.retain(|&o| o != w);
+                break;
+            }
+        }
+    }
+    corners
+}
+
+/// Vertices that pose as corners beside a corner of the source are merged into the one that is there.
+fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corners: &[DVec3], size: f64) {
+    if corners.is_empty() {
+        return;
+    }
+    let key = |p: DVec3| (p / size).floor().to_array().map(|x| x as i64);
+    let mut places: HashMap<[i64; 3], Vec<DVec3>> = HashMap::new();
+    for &p in corners {
+        places.entry(key(p)).or_default().push(p);
+    }
+    let near = |p: DVec3| {
+        let [x, y, z] = key(p);
+        (0..27)
+            .filter_map(|n| places.get(&[x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]))
+            .flatten()
+            .copied()
+            .collect::<Vec<DVec3>>()
+    };
+    let vertices: Vec<u32> = lines.0.keys().copied().collect();
+    for v in vertices {
+        let p = local.position(v);
+        let around = near(p);
+        if around.iter().any(|c| c.distance(p) < TAKEN * size) {
+            kinds[v as usize] = FeatureKind::Corner;
+        }
+    }
+    let vertices: Vec<u32> = lines.0.keys().copied().filter(|&v| kinds[v as usize] == FeatureKind::Corner).collect();
+    for &v in &vertices {
+        let p = local.position(v);
+        let around = near(p);
+        if around.is_empty() || around.iter().any(|c| c.distance(p) < TAKEN * size) {
+            continue;
+        }
+        // The vertex at the nearest corner, if there is one within reach of a flip.
+        let mut ring = local.neighbours(v);
+        ring.extend(
+            local
+                .star(v)
+                .to_vec()
+                .iter()
+                .flat_map(|&t| local.mesh.triangles[t as usize])
+                .flat_map(|w| local.neighbours(w))
+                .collect::<Vec<_>>(),
+        );
+        ring.sort_unstable();
+        ring.dedup();
+        let taken = |w: u32| {
+            kinds[w as usize] == FeatureKind::Corner
+                && near(local.position(w)).iter().any(|c| c.distance(local.position(w)) < TAKEN * size)
+        };
+        let goal = ring
+            .into_iter()
+            .filter(|&w| w != v && taken(w) && local.position(w).distance(p) < CALL * size)
+            .min_by(|a, b| local.position(*a).distance(p).total_cmp(&local.position(*b).distance(p)).then(a.cmp(b)));
+        if let Some(w) = goal
+            && local.flip_and_merge(v, w)
+        {
+            lines.merge(v, w);
+        }
+    }
+}
+
+/// Joins loose ends of lines with what they end beside: over an edge that is there, or that a flip makes.
+fn join_ends(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], sharp: f64) {
+    let ends: Vec<u32> = lines.0.iter().filter(|(_, beside)| beside.len() == 1).map(|(v, _)| *v).collect();
+    for v in ends {
+        if lines.beside(v).len() != 1 || local.star(v).is_empty() {
+            continue;
+        }
+        let joins = |w: u32, lines: &Lines| {
+            let beside = lines.beside(w);
+            w != v
+                && !beside.contains(&v)
+                && (beside.len() == 1 || (kinds[w as usize] == FeatureKind::Corner && !beside.is_empty()))
+        };
+        let ring = local.neighbours(v);
+        if let Some(&w) = ring.iter().find(|&&w| joins(w, lines) && local.is_sharp(v, w, sharp)) {
+            lines.join(v, w);
+            continue;
+        }
+        // Vertices opposite over an edge of the star.
+        for w in local.beyond(v) {
+            if joins(w, lines) && local.flip_to(v, w) {
+                if local.is_sharp(v, w, sharp) {
+                    lines.join(v, w);
+                }
+                break;
+            }
+        }
+    }
+}
+
+/// Triangles of next to no area.
+fn thin(mesh: &TriMesh) -> Vec<u32> {
+    use rayon::prelude::*;
+    let least = 2.0 * DEGENERATE_AREA * mesh.bounds().diagonal().powi(2);
+    (0..mesh.triangles.len() as u32).into_par_iter().filter(|&t| !(mesh.area(t as usize) > least)).collect()
+}
+
+/// Merges the ends of the shortest edge of each triangle without area.
+fn merge_thin(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], thin: Vec<u32>) {
+    for t in thin {
+        let names = local.mesh.triangles[t as usize];
+        if names == GONE {
+            continue;
+        }
+        let mut sides: Vec<(f64, u32, u32)> = (0..3)
+            .map(|k| (names[k], names[(k + 1) % 3]))
+            .flat_map(|(a, b)| [(a, b), (b, a)])
+            .map(|(a, b)| (local.position(a).distance(local.position(b)), a, b))
+            .collect();
+        sides.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        for (_, v, w) in sides {
+            let free = match kinds[v as usize] {
+                FeatureKind::None => true,
+                FeatureKind::Edge => lines.beside(v).contains(&w),
+                FeatureKind::Corner => false,
+            };
+            if free && local.merge(v, w, local.position(w)) {
+                lines.merge(v, w);
+                break;
+            }
+        }
     }
 }

@@ -19,6 +19,8 @@ pub struct FieldCreases<'a> {
 const ROUNDS: [f64; 3] = [0.3, 0.03, 0.002];
 /// The surface is sought on both sides of the tangent, within this fraction of the distance.
 const SPAN: f64 = 0.7;
+/// All surfaces pass a corner within this fraction of the search's reach.
+const OFF_CORNER: f64 = 1e-6;
 /// Normals that still belong to the same surface (cosine).
 const SAME: f64 = 0.8;
 
@@ -120,5 +122,27 @@ impl Creases for FieldCreases<'_> {
             found = solve(&planes, found, Shape::Edge);
         }
         (found.distance(p) < reach).then_some(found)
+    }
+    fn corner_near(&self, guess: DVec3, reach: f64, hits: &[(DVec3, DVec3)]) -> Option<DVec3> {
+        let normals: Vec<DVec3> = hits.iter().map(|h| h.1).collect();
+        if classify(&normals, self.sharp, self.corner) != Shape::Corner {
+            return None;
+        }
+        let mut p = solve(hits, guess, Shape::Corner);
+        for share in ROUNDS {
+            if !(p.distance(guess) < reach) {
+                return None;
+            }
+            let planes: Vec<_> = hits.iter().filter_map(|&hit| self.again(p, hit, share, None)).collect();
+            let normals: Vec<DVec3> = planes.iter().map(|p| p.1).collect();
+            if classify(&normals, self.sharp, self.corner) != Shape::Corner {
+                return None;
+            }
+            p = solve(&planes, p, Shape::Corner);
+        }
+        // Where three surfaces do not meet in a point there is none.
+        let off = |&(s, n): &(DVec3, DVec3)| n.dot(p - s).abs() > OFF_CORNER * reach;
+        let last: Vec<_> = hits.iter().filter_map(|&hit| self.again(p, hit, ROUNDS[2], None)).collect();
+        (p.distance(guess) < reach && !last.iter().any(off)).then_some(p)
     }
 }

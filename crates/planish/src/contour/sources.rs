@@ -2,7 +2,7 @@
 
 use super::{ContourError, ContourParams, Extracted, FieldCreases, extract};
 use crate::field::{
-    Directed, Field, FieldError, GridParams, Lattice, LatticeError, MeshField, Part, ScalarGrid, Spacing, sample,
+    Directed, Field, FieldError, GridParams, Lattice, LatticeError, MeshField, Part, ScalarGrid, Spacing, Thin, sample,
     sample_grid,
 };
 use crate::mesh::TriMesh;
@@ -50,6 +50,8 @@ pub struct Meshed {
     pub lattice: Lattice,
     /// Hits that had to be guessed.
     pub mended: usize,
+    /// What is too thin for the lattice; known of meshes only.
+    pub thin: Thin,
 }
 
 /// Two halves of the work as parts of one.
@@ -150,5 +152,5 @@ fn lattice_of(field: &dyn Field, sampling: Sampling) -> Result<Lattice, MeshingE
 }
 
 fn meshed(extracted: Extracted, directed: &Directed) -> Meshed {
-    Meshed { extracted, lattice: directed.lattice, mended: directed.mended }
+    Meshed { extracted, lattice: directed.lattice, mended: directed.mended, thin: directed.thin }
 }

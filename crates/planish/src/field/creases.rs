@@ -8,6 +8,7 @@ use super::{Creases, Lattice};
 use crate::geom::Bvh;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use glam::DVec3;
+use std::collections::BTreeMap;
 
 /// Sharp edges of one mesh on one lattice.
 pub struct MeshCreases {
@@ -18,6 +19,9 @@ pub struct MeshCreases {
     corners: Vec<([i64; 3], DVec3)>,
     /// The sharp edges as triangles without area.
     lines: Option<Bvh>,
+    /// The same of all edges that bend, and the vertices where they meet, sorted by cell.
+    bends: Option<Bvh>,
+    knots: Vec<([i64; 3], DVec3)>,
 }
 
 #[derive(Clone, Copy)]
@@ -27,10 +31,21 @@ struct Cut {
     p: DVec3,
     /// Normals of the two faces beside the edge.
     normals: [DVec3; 2],
+    /// False for a bend that is no feature.
+    tagged: bool,
 }
 
 /// A sharp line that turns by more than this at a vertex has a corner there (cosine of 35 degrees).
 const BEND: f64 = 0.82;
+/// Sharp lines go on over edges whose normals have a cosine below this (15 degrees): the facets of a coarse mesh turn by
+/// less.
+const FADING: f64 = 0.966;
+/// Other edges whose normals have a cosine below this (5 degrees) are bends: facets larger than a cell keep their edges.
+const FAINT: f64 = 0.9962;
+/// Normals of two hits may differ by less than those beside the faint edge between them (cosine of 4 degrees).
+const FAINT_HITS: f64 = 0.9976;
+/// A hit beside a faint edge has the normal of its side within this (cosine of 18 degrees).
+const FAINT_AGREE: f64 = 0.95;
 /// Normals of the hits and of the faces beside the edge agree if their cosine is above this: facets of curved surfaces
 /// turn within a cell.
 const AGREE: f64 = 0.75;
@@ -38,40 +53,109 @@ const AGREE: f64 = 0.75;
 const REACH: f64 = 0.9;
 
 impl MeshCreases {
-    /// Collects the sharp edges of `mesh`: those between faces whose normals have a cosine below `sharp`, and those of
-    /// one face only.
+    /// Collects the sharp edges of `mesh`: those between faces whose normals have a cosine below `sharp`, and where a
+    /// line of them ends, the edges that carry it on while it fades (hysteresis as in Canny 1986, *A Computational
+    /// Approach to Edge Detection*).
     /// * `turn` - -1 if the mesh is inside out
     pub fn new(mesh: &TriMesh, turn: f64, lattice: &Lattice, sharp: f64) -> MeshCreases {
         let adjacency = Adjacency::new(mesh);
         let mut cuts: [Vec<Cut>; 3] = Default::default();
         let mut edges: Vec<[u32; 2]> = Vec::new();
+        let normals = |h: u32| {
+            let g = adjacency.opposite[h as usize];
+            [mesh.normal(h as usize / 3) * turn, mesh.normal(g as usize / 3) * turn]
+        };
+        let mut sharp_edges: Vec<u32> = Vec::new();
+        let mut faint_edges: Vec<(f64, u32)> = Vec::new();
         for h in 0..adjacency.opposite.len() as u32 {
             let g = adjacency.opposite[h as usize];
             if g == NONE || g < h {
                 continue;
             }
-            let normals = [mesh.normal(h as usize / 3) * turn, mesh.normal(g as usize / 3) * turn];
-            if normals[0].dot(normals[1]) >= sharp || normals.contains(&DVec3::ZERO) {
+            let n = normals(h);
+            let cosine = n[0].dot(n[1]);
+            if cosine >= sharp.max(FAINT) || n.contains(&DVec3::ZERO) {
                 continue;
             }
-            let ends = [mesh.origin(h), mesh.origin(next(h))];
-            edges.push(ends);
-            cut(mesh, ends, normals, lattice, &mut cuts);
+            if cosine < sharp {
+                sharp_edges.push(h);
+            } else {
+                faint_edges.push((cosine, h));
+            }
+        }
+        carry_on(mesh, &mut sharp_edges, &faint_edges);
+        sharp_edges.sort_unstable();
+        faint_edges.retain(|(_, h)| sharp_edges.binary_search(h).is_err());
+        let ends = |h: u32| [mesh.origin(h), mesh.origin(next(h))];
+        for &h in &sharp_edges {
+            edges.push(ends(h));
+            cut(mesh, ends(h), normals(h), true, lattice, &mut cuts);
+        }
+        let mut bent = edges.clone();
+        for &(_, h) in &faint_edges {
+            bent.push(ends(h));
+            cut(mesh, ends(h), normals(h), false, lattice, &mut cuts);
         }
         for list in &mut cuts {
             list.sort_by(|a, b| {
                 a.key.cmp(&b.key).then_with(|| a.p.to_array().partial_cmp(&b.p.to_array()).unwrap_or(a.key.cmp(&b.key)))
             });
         }
-        let lines = (!edges.is_empty()).then(|| {
-            let points = edges.iter().flatten().map(|&v| mesh.points[v as usize]).collect();
-            let flat = (0..edges.len() as u32).map(|e| [2 * e, 2 * e + 1, 2 * e + 1]).collect();
-            Bvh::new(&TriMesh::new(points, flat))
-        });
-        let mut corners: Vec<([i64; 3], DVec3)> =
-            corners(mesh, &edges).into_iter().map(|p| (cell_of(lattice, p), p)).collect();
-        corners.sort_by_key(|c| c.0);
-        MeshCreases { lattice: *lattice, cuts, corners, lines }
+        let tree = |edges: &[[u32; 2]]| {
+            (!edges.is_empty()).then(|| {
+                let points = edges.iter().flatten().map(|&v| mesh.points[v as usize]).collect();
+                let flat = (0..edges.len() as u32).map(|e| [2 * e, 2 * e + 1, 2 * e + 1]).collect();
+                Bvh::new(&TriMesh::new(points, flat))
+            })
+        };
+        let by_cell = |points: Vec<DVec3>| {
+            let mut all: Vec<([i64; 3], DVec3)> = points.into_iter().map(|p| (cell_of(lattice, p), p)).collect();
+            all.sort_by_key(|c| c.0);
+            all
+        };
+        let corners_of_lines = by_cell(corners(mesh, &edges));
+        let knots = by_cell(corners(mesh, &bent));
+        let (lines, bends) = (tree(&edges), tree(&bent));
+        MeshCreases { lattice: *lattice, cuts, corners: corners_of_lines, lines, bends, knots }
+    }
+}
+
+/// Adds to lines that end the faint edge that goes on most nearly straight and is the sharpest, again and again.
+fn carry_on(mesh: &TriMesh, lines: &mut Vec<u32>, faint: &[(f64, u32)]) {
+    let ends_of = |h: u32| [mesh.origin(h), mesh.origin(next(h))];
+    let mut at: BTreeMap<u32, Vec<(f64, u32)>> = BTreeMap::new();
+    for &(cosine, h) in faint.iter().filter(|f| f.0 < FADING) {
+        for v in ends_of(h) {
+            at.entry(v).or_default().push((cosine, h));
+        }
+    }
+    let mut degree: BTreeMap<u32, usize> = BTreeMap::new();
+    for v in lines.iter().flat_map(|&h| ends_of(h)) {
+        *degree.entry(v).or_default() += 1;
+    }
+    let point = |v: u32| mesh.points[v as usize];
+    let mut open: Vec<(u32, u32)> = Vec::new();
+    for &h in lines.iter() {
+        let [a, b] = ends_of(h);
+        open.extend([(a, b), (b, a)].into_iter().filter(|(_, end)| degree[end] == 1));
+    }
+    while let Some((from, end)) = open.pop() {
+        let way = (point(end) - point(from)).normalize_or_zero();
+        let beyond = |h: u32| {
+            let [a, b] = ends_of(h);
+            if a == end { b } else { a }
+        };
+        let straight = |h: u32| (point(beyond(h)) - point(end)).normalize_or_zero().dot(way) > BEND;
+        let found = at.get(&end).into_iter().flatten().filter(|(_, h)| straight(*h)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some(&(_, h)) = found else { continue };
+        let to = beyond(h);
+        lines.push(h);
+        *degree.entry(end).or_default() += 1;
+        let met = degree.entry(to).or_default();
+        *met += 1;
+        if *met == 1 {
+            open.push((end, to));
+        }
     }
 }
 
@@ -80,7 +164,7 @@ fn cell_of(lattice: &Lattice, p: DVec3) -> [i64; 3] {
 }
 
 /// Cuts an edge with all planes between its ends.
-fn cut(mesh: &TriMesh, ends: [u32; 2], normals: [DVec3; 2], lattice: &Lattice, cuts: &mut [Vec<Cut>; 3]) {
+fn cut(mesh: &TriMesh, ends: [u32; 2], normals: [DVec3; 2], tagged: bool, lattice: &Lattice, cuts: &mut [Vec<Cut>; 3]) {
     let [a, b] = ends.map(|v| mesh.points[v as usize]);
     for axis in 0..3 {
         let (low, high) = (a[axis].min(b[axis]), a[axis].max(b[axis]));
@@ -92,7 +176,7 @@ fn cut(mesh: &TriMesh, ends: [u32; 2], normals: [DVec3; 2], lattice: &Lattice, c
             let s = if high > low { ((level - a[axis]) / (b[axis] - a[axis])).clamp(0.0, 1.0) } else { 0.5 };
             let mut p = a.lerp(b, s);
             p[axis] = level;
-            cuts[axis].push(Cut { key: key(lattice, axis, plane as i64, p), p, normals });
+            cuts[axis].push(Cut { key: key(lattice, axis, plane as i64, p), p, normals, tagged });
             plane += 1.0;
         }
     }
@@ -130,7 +214,8 @@ impl Creases for MeshCreases {
         let mut best: Option<(f64, DVec3)> = None;
         for dv in -1..=1 {
             let first = cuts.partition_point(|c| c.key < [plane, v + dv, u - 1]);
-            for c in cuts[first..].iter().take_while(|c| c.key <= [plane, v + dv, u + 1]) {
+            let here = cuts[first..].iter().take_while(|c| c.key <= [plane, v + dv, u + 1]);
+            for c in here.filter(|c| c.tagged) {
                 let agree = |m: DVec3, n: DVec3| a.1.dot(m) > AGREE && b.1.dot(n) > AGREE;
                 if !agree(c.normals[0], c.normals[1]) && !agree(c.normals[1], c.normals[0]) {
                     continue;
@@ -168,5 +253,48 @@ impl Creases for MeshCreases {
     fn nearest(&self, p: DVec3, reach: f64, _hits: &[(DVec3, DVec3)]) -> Option<DVec3> {
         let hit = self.lines.as_ref()?.closest(p);
         (hit.distance < reach).then_some(hit.position)
+    }
+    fn faint(&self) -> f64 {
+        if self.bends.is_some() { FAINT_HITS } else { -1.0 }
+    }
+
+    fn faint_point(
+        &self,
+        axis: usize,
+        low: DVec3,
+        high: DVec3,
+        a: (DVec3, DVec3),
+        b: (DVec3, DVec3),
+    ) -> Option<(DVec3, bool)> {
+        let plane = ((low[axis] - self.lattice.origin[axis]) / self.lattice.step[axis]).round() as i64;
+        let [_, v, u] = key(&self.lattice, axis, plane, (low + high) / 2.0);
+        let cuts = &self.cuts[axis];
+        let first = cuts.partition_point(|c| c.key < [plane, v, u]);
+        let beside = |m: DVec3, n: DVec3| {
+            a.1.dot(m) > FAINT_AGREE && b.1.dot(n) > FAINT_AGREE && a.1.dot(m) >= a.1.dot(n) && b.1.dot(n) >= b.1.dot(m)
+        };
+        let mut here = cuts[first..]
+            .iter()
+            .take_while(|c| c.key == [plane, v, u])
+            .filter(|c| beside(c.normals[0], c.normals[1]) || beside(c.normals[1], c.normals[0]));
+        // More than one line through a face is for a smaller voxel.
+        let found = here.next()?;
+        here.next().is_none().then_some((found.p, found.tagged))
+    }
+
+    fn bend(&self, guess: DVec3, low: DVec3, high: DVec3) -> Option<DVec3> {
+        let cell = cell_of(&self.lattice, (low + high) / 2.0);
+        let first = self.knots.partition_point(|c| c.0 < cell);
+        let here = self.knots[first..].iter().take_while(|c| c.0 == cell).map(|c| c.1);
+        let knot = here.min_by(|p, q| p.distance_squared(guess).total_cmp(&q.distance_squared(guess)));
+        let near = || {
+            let hit = self.bends.as_ref()?.closest(guess);
+            (hit.distance < REACH * (high - low).max_element()).then_some(hit.position)
+        };
+        knot.or_else(near)
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        self.corners.iter().map(|c| c.1).collect()
     }
 }

@@ -59,6 +59,19 @@ pub struct Directed {
     pub values: Option<std::sync::Arc<Vec<f32>>>,
     /// Hits that had to be guessed because no source gave one between two sides.
     pub mended: usize,
+    /// What is too thin for the lattice, where the source can tell.
+    pub thin: Thin,
+}
+
+/// Walls and gaps that pass between two nodes of the lattice unseen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Thin {
+    /// Edges of the lattice that the surface passes more than once.
+    pub edges: usize,
+    /// Their share in all edges that it passes.
+    pub share: f64,
+    /// Median width between two passes, along the edge, world units.
+    pub width: f64,
 }
 
 /// The sides of all nodes: for each row the nodes where a new side begins.
@@ -278,7 +291,7 @@ impl Directed {
             }
             all
         });
-        Directed { lattice, axes, sides, noise_deg: 0.0, values: None, mended }
+        Directed { lattice, axes, sides, noise_deg: 0.0, values: None, mended, thin: Thin::default() }
     }
 }
 

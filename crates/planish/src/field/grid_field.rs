@@ -3,7 +3,7 @@
 //! [K01] §4.1: hits by linear interpolation along the edges, exactly where the trilinear interpolant passes them.
 //! Gradients by one of the paper's two estimates; the first keeps features sharper, the second is smoother.
 
-use super::directed::{self, Directed, Hit, Hits, Placed, Sides, changes_of};
+use super::directed::{self, Directed, Hit, Hits, Placed, Sides, Thin, changes_of};
 use super::{FieldError, Lattice};
 use crate::observe::Observer;
 use glam::DVec3;
@@ -136,7 +136,7 @@ pub fn sample_grid(grid: &ScalarGrid, params: &GridParams, observer: &dyn Observ
         let none = |axis: usize, at: [usize; 3]| hit(&value, &lattice, axis, at, params.gradient);
         Directed::assemble(lattice, sides, axes, &none)
     } else {
-        Directed { lattice, axes, sides, noise_deg: 0.0, values: None, mended: 0 }
+        Directed { lattice, axes, sides, noise_deg: 0.0, values: None, mended: 0, thin: Thin::default() }
     };
     field.values = Some(Arc::new(values));
     observer.progress(1.0);

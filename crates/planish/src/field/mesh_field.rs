@@ -12,7 +12,7 @@
 //! Meshes whose edges do not cancel (holes, cracks) take the sides from the generalised winding number
 //! ([`super::winding`]) and keep the rasterised hits; gaps are closed where it passes one half.
 
-use super::directed::{self, Directed, Hit, Hits, Placed, Sides};
+use super::directed::{self, Directed, Hit, Hits, Placed, Sides, Thin};
 use super::winding::Winding;
 use super::{FieldError, Lattice};
 use crate::geom::Aabb;
@@ -96,11 +96,12 @@ impl<'a> MeshField<'a> {
         if observer.cancelled() {
             return Err(FieldError::Cancelled);
         }
-        let field = if self.balanced {
+        let mut field = if self.balanced {
             self.by_counting(lattice, &crossings, &normals)
         } else {
             self.by_winding(lattice, &crossings, &normals, observer)?
         };
+        field.thin = thin(&crossings);
         observer.progress(1.0);
         Ok(field)
     }
@@ -176,6 +177,20 @@ impl<'a> MeshField<'a> {
         let missing = |axis: usize, at: [usize; 3]| super::sample::hit_on_edge(&winding, lattice, axis, at);
         Ok(Directed::assemble(*lattice, sides, axes, &missing))
     }
+}
+
+/// What the surface does between two nodes: edges that it passes there and back.
+fn thin(crossings: &[Vec<Crossing>; 3]) -> Thin {
+    let (mut widths, mut edges, mut all) = (Vec::new(), 0, 0);
+    for run in crossings.iter().flat_map(|c| c.chunk_by(|a, b| (a.line, a.edge) == (b.line, b.edge))) {
+        let before = widths.len();
+        widths.extend(run.windows(2).filter(|p| p[0].out != p[1].out).map(|p| p[1].x - p[0].x));
+        edges += (widths.len() > before) as usize;
+        all += 1;
+    }
+    let middle = widths.len() / 2;
+    let width = if widths.is_empty() { 0.0 } else { *widths.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    Thin { edges, share: edges as f64 / f64::max(all as f64, 1.0), width }
 }
 
 /// True if for every pair of positions as many edges run one way as the other.

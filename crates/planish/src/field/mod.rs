@@ -31,7 +31,7 @@ mod sweep;
 mod winding;
 
 pub use creases::MeshCreases;
-pub use directed::Directed;
+pub use directed::{Directed, Thin};
 pub use grid_field::{Body, GradientRule, GridParams, ScalarGrid, sample_grid};
 pub use lattice::{Lattice, LatticeError, Spacing};
 pub use mesh_field::MeshField;
@@ -167,4 +167,39 @@ pub trait Creases: Sync {
     /// The place of a feature nearest to `p`, within `reach`: where a vertex goes that had to stay in its cell. `hits`
     /// are the positions and normals around.
     fn nearest(&self, p: DVec3, reach: f64, hits: &[(DVec3, DVec3)]) -> Option<DVec3>;
+
+    /// Cosine of the normals of two hits above which the source knows no bend between them. Bends between the threshold
+    /// of the extraction and this are taken where [`Creases::faint_point`] knows them.
+    fn faint(&self) -> f64 {
+        -1.0
+    }
+
+    /// Where a bend fainter than the threshold passes the square from `low` to `high` in the plane of nodes
+    /// perpendicular to `axis`, between two hits, and whether it is part of a feature; `None` if there is none.
+    fn faint_point(
+        &self,
+        _axis: usize,
+        _low: DVec3,
+        _high: DVec3,
+        _a: (DVec3, DVec3),
+        _b: (DVec3, DVec3),
+    ) -> Option<(DVec3, bool)> {
+        None
+    }
+
+    /// The place of a bend inside the cell from `low` to `high` nearest to `guess`.
+    fn bend(&self, _guess: DVec3, _low: DVec3, _high: DVec3) -> Option<DVec3> {
+        None
+    }
+
+    /// The corner that the surfaces of `hits` have within `reach` of `guess`, where the source can be asked for it but
+    /// does not list its corners.
+    fn corner_near(&self, _guess: DVec3, _reach: f64, _hits: &[(DVec3, DVec3)]) -> Option<DVec3> {
+        None
+    }
+
+    /// The corners that are known, where features meet, bend or end; none where the source cannot list them.
+    fn corners(&self) -> Vec<DVec3> {
+        Vec::new()
+    }
 }

@@ -54,17 +54,10 @@ pub fn measure(grid: &Grid, patch: &PatchMesh) -> GridQuality {
         }
     }
     angles.sort_by(f64::total_cmp);
-    // Pieces of one face lie in its plane: any of them has its normal.
-    let mut normals: BTreeMap<u32, DVec3> = BTreeMap::new();
-    for (f, &face) in patch.face_origin.iter().enumerate() {
-        *normals.entry(face).or_default() += patch.mesh.area_vector(f);
-    }
-    let normal = |k: usize| normals.get(&grid.places[k].face).map_or(DVec3::ZERO, |n| n.normalize_or_zero());
-    let sheet = Sheet { points: &grid.points, normal: &normal, cols, rows };
     let (miss_max, miss_rms) = miss(grid, patch);
     let diagonal = Aabb::of(&patch.mesh.points).diagonal().max(f64::MIN_POSITIVE);
     GridQuality {
-        folds: sheet.folded_cells().len(),
+        folds: folds(grid, patch),
         spacing_cv: variations.iter().sum::<f64>() / variations.len() as f64,
         spacing_cv_worst: variations.iter().copied().fold(0.0, f64::max),
         angle_p95_deg: angles[(angles.len() * 95 / 100).min(angles.len() - 1)],
@@ -103,6 +96,17 @@ pub fn surface(points: &[DVec3], cols: usize, rows: usize) -> TriMesh {
         }
     }
     TriMesh::new(points.to_vec(), triangles)
+}
+
+/// Number of cells that turn over, see [`measure`].
+pub fn folds(grid: &Grid, patch: &PatchMesh) -> usize {
+    // Pieces of one face lie in its plane: any of them has its normal.
+    let mut normals: BTreeMap<u32, DVec3> = BTreeMap::new();
+    for (f, &face) in patch.face_origin.iter().enumerate() {
+        *normals.entry(face).or_default() += patch.mesh.area_vector(f);
+    }
+    let normal = |k: usize| normals.get(&grid.places[k].face).map_or(DVec3::ZERO, |n| n.normalize_or_zero());
+    Sheet { points: &grid.points, normal: &normal, cols: grid.cols, rows: grid.rows }.folded_cells().len()
 }
 
 /// Greatest and root mean square distance of the patch's vertices from the grid's surface.

@@ -1,6 +1,6 @@
 //! Grids of a whole network: sizes chosen, patches relaxed, and grids that miss detail made finer.
 
-use super::quality::miss;
+use super::quality::{folds, miss};
 use super::sizes::{bounds, total};
 use super::{Grid, GridError, GridParams, Job, choose_sizes, relax, relax_jobs};
 use crate::mesh::TriMesh;
@@ -15,6 +15,10 @@ const ROUNDS: usize = 3;
 /// of its spacing, so the root of what is too much tells how much finer it must be.
 const FACTOR: [f64; 2] = [1.25, 2.0];
 
+/// A grid with folds is refined as if it missed this many times what is allowed: cells turn over where relief is
+/// rougher than they are wide.
+const FOLDED: f64 = 2.0;
+
 /// Refinement may multiply the number of points by this ...
 const GROWTH: f64 = 3.0;
 /// ... and where it would do more, a miss must be this much greater to count, as often as needed.
@@ -27,7 +31,7 @@ const EVEN_BEND: f64 = 0.7;
 const FIRST_SHARE: f64 = 0.6;
 
 /// Resamples every patch of `network`, with sides as [`choose_sizes`] gives them and more where a grid misses its
-/// patch by more than `params.miss` of the diagonal of `input`, up to `params.max_side` and `params.max_points`.
+/// patch by more than `params.miss` of the diagonal of `input` or is folded, up to `params.max_side` and `params.max_points`.
 ///
 /// Where a grid still misses more after a few rounds, it is what is reached: [`super::measure`] tells.
 /// # Errors
@@ -50,7 +54,11 @@ pub fn resample(
         if observer.cancelled() {
             return Err(GridError::Cancelled);
         }
-        let misses: Vec<f64> = suspects.par_iter().map(|&p| miss(&grids[p], &patches[p]).0).collect();
+        let need = |&p: &usize| {
+            let folded = folds(&grids[p], &patches[p]) > 0;
+            miss(&grids[p], &patches[p]).0.max(if folded { FOLDED * allowed } else { 0.0 })
+        };
+        let misses: Vec<f64> = suspects.par_iter().map(need).collect();
         // Long chords carry one patch's need far: where that asks for too many points, only the worst are heeded.
         let (mut limit, mut wanted) = (allowed, finer(network, &chords, &grids, &suspects, &misses, allowed, most));
         while total(&wanted) > budget && wanted != sizes {

@@ -63,12 +63,14 @@ pub struct Smoothed {
     pub kept: usize,
 }
 
-/// Rounds of the normal filter, and of the vertices that follow.
-const NORMAL_ROUNDS: usize = 12;
-const VERTEX_ROUNDS: usize = 12;
+/// Rounds of the normal filter, and of the vertices that follow. More of them flatten curved parts: on the fandisk, the
+/// joint and the rocker arm with noise of 0.05, 0.1 and 0.2 % of the diagonal, twelve of each leave 0.9 to 4 times the
+/// error.
+const NORMAL_ROUNDS: usize = 6;
+const VERTEX_ROUNDS: usize = 8;
 /// Width of the filter over normals: so many times the noise of a normal, and at least and at most so much (length of
 /// the difference of two unit vectors).
-const RANGE: f64 = 1.6;
+const RANGE: f64 = 0.8;
 const RANGE_LEAST: f64 = 0.04;
 const RANGE_MOST: f64 = 0.55;
 /// Taubin's factors along lines: the second undoes the shrinking of the first.

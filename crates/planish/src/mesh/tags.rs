@@ -1,6 +1,7 @@
 //! Which vertices and edges of a mesh are features.
 
 use super::{Attribute, TriMesh};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// What a vertex marks.
@@ -47,6 +48,25 @@ impl FeatureTags {
             };
         }
         FeatureTags { vertices: kinds, edges }
+    }
+
+    /// Marks the half-edges of `mesh` that lie on the tagged edges of `input`, told by the positions of their ends: `mesh`
+    /// is `input` after a repair, which names its vertices anew.
+    pub fn half_edges(&self, input: &TriMesh, mesh: &TriMesh) -> Vec<bool> {
+        let key = |a: DVec3, b: DVec3| {
+            let (a, b) = (a.to_array().map(f64::to_bits), b.to_array().map(f64::to_bits));
+            if a < b { [a, b] } else { [b, a] }
+        };
+        let point = |v: u32| input.points.get(v as usize).copied().unwrap_or(DVec3::NAN);
+        let mut edges: Vec<[[u64; 3]; 2]> = self.edges.iter().map(|e| key(point(e[0]), point(e[1]))).collect();
+        edges.sort_unstable();
+        let ends = |h: u32| (mesh.points[mesh.origin(h) as usize], mesh.points[mesh.origin(super::next(h)) as usize]);
+        (0..3 * mesh.triangles.len() as u32)
+            .map(|h| {
+                let (a, b) = ends(h);
+                edges.binary_search(&key(a, b)).is_ok()
+            })
+            .collect()
     }
 
     /// The kinds as an attribute of the mesh.

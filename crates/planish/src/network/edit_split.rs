@@ -214,7 +214,7 @@ impl Editor<'_> {
                 kind[h as usize] = Some(self.network.curves[half / 2].kind);
             }
         }
-        let laid = layout_around(&drawn.cut.mesh, &drawn.barrier, &corner, params, observer)?;
+        let laid = layout_around(&drawn.cut.mesh, &drawn.barrier, &corner, &[], params, observer)?;
         let triangles = &drawn.cut.mesh.triangles;
         let to_input = |p: &FacePoint| place_on_input(self, &drawn.cut, p.face, p.bary);
         let mut network = Network { patches: laid.patches.clone(), ..Network::default() };

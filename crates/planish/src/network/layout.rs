@@ -3,9 +3,11 @@
 //! 1. feature lines and boundaries are fixed; long edges are split ([`refine`]);
 //! 2. a centroidal partition into disks between the fixed lines ([`partition`], [`outline`]);
 //! 3. all cells are made even and parted into quads ([`polygon`]);
-//! 4. nodes and arcs are relaxed and the connectivity is improved by changes inside the union of a few cells,
-//!    each drawn in a one-to-one map of that union ([`recut`]), so that nothing ever crosses or gets lost.
+//! 4. nodes, arcs and connectivity are improved by changes inside the union of a few cells, each drawn in a one-to-one
+//!    map of that union ([`recut`]), so that nothing ever crosses or gets lost; this happens on a coarser mesh of the
+//!    same surface, and the arcs are carried back ([`coarse`]).
 
+mod coarse;
 mod complex;
 mod fill;
 mod improve;
@@ -17,6 +19,7 @@ mod recut;
 mod refine;
 mod shape;
 mod slide;
+mod strands;
 mod tips;
 
 use super::imprint::Shared;
@@ -43,8 +46,14 @@ const COUNT_ATTEMPTS: usize = 3;
 /// features use up the number of patches elsewhere.
 const COVER: f64 = 2.4;
 
+/// Patches smaller than this part of the mean stand on specks and slivers and do not count as forced.
+const CROWDED: f64 = 0.05;
+
 /// Part of the patches of the first draft that counts as forced by the features.
 const FORCED: f64 = 0.85;
+
+/// Rounds of settling for each round of relaxing: a round redraws disjoint unions only.
+const SETTLING: usize = 4;
 
 /// Parameters of [`layout`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -60,7 +69,7 @@ pub struct LayoutParams {
     /// are closed ones half as long.
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "diagonal"))]
     pub feature_length: f64,
-    /// Rounds of relaxing corners and curves.
+    /// Rounds of making corners and curves even at the end.
     #[schemars(range(min = 0, max = 50))]
     pub smoothing: usize,
 }
@@ -100,17 +109,31 @@ pub enum LayoutError {
 /// # Errors
 /// `NotManifold` for a mesh that needs repair, `Stuck` if its faces are degenerate beyond use.
 pub fn layout(mesh: &TriMesh, params: &LayoutParams, observer: &dyn Observer) -> Result<Network, LayoutError> {
-    layout_around(mesh, &[], &[], params, observer)
+    layout_around(mesh, &[], &[], &[], params, observer)
+}
+
+/// As [`layout`], where the sharp edges are known: the half-edges `tagged` are the sharp ones, whatever the angles say;
+/// short and loose lines of them are left out as with any. Empty if nothing is known.
+/// # Errors
+/// As [`layout`].
+pub fn layout_tagged(
+    mesh: &TriMesh,
+    tagged: &[bool],
+    params: &LayoutParams,
+    observer: &dyn Observer,
+) -> Result<Network, LayoutError> {
+    layout_around(mesh, &[], &[], tagged, params, observer)
 }
 
 /// As [`layout`], around lines that are given: the half-edges `lines` become patch boundaries like feature lines,
-/// the vertices `corners` of them corners. Both may be empty.
+/// the vertices `corners` of them corners; `tagged` as in [`layout_tagged`]. All may be empty.
 /// # Errors
 /// As [`layout`].
 pub(super) fn layout_around(
     mesh: &TriMesh,
     lines: &[bool],
     corners: &[bool],
+    tagged: &[bool],
     params: &LayoutParams,
     observer: &dyn Observer,
 ) -> Result<Network, LayoutError> {
@@ -119,7 +142,7 @@ pub(super) fn layout_around(
     let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
     let side = (area / params.patches.max(1) as f64).sqrt();
     let mut edge = EDGE_TO_SIDE * side;
-    let (mut sharp, _) = lines::feature_lines(mesh, &adjacency, params);
+    let (mut sharp, _) = lines::feature_lines(mesh, &adjacency, tagged, params);
     sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
     let mut fixed = vec![false; mesh.points.len()];
     for h in 0..sharp.len() as u32 {
@@ -136,15 +159,14 @@ pub(super) fn layout_around(
                 && improve::quads(&mut bench)
             {
                 // Features may force more patches than asked for; shape is not given up for the number.
-                let patches = params.patches.max((FORCED * bench.complex.live_cells().count() as f64) as usize);
-                improve::relax(&mut bench, 1, observer)?;
-                let work_sharp = carry(&work, &work_adjacency, &sharp);
-                let ground = partition::Ground::new(&work.mesh, &work_adjacency, &work_sharp);
-                let tips = tips::tips(&ground, side);
-                tips::plant(&mut bench, &tips, patches);
-                improve::relax(&mut bench, 1, observer)?;
-                improve::improve(&mut bench, patches, observer)?;
-                improve::relax(&mut bench, params.smoothing, observer)?;
+                let forced = bench.shapes().iter().flatten().filter(|s| s.area > CROWDED * side * side).count();
+                let patches = params.patches.max((FORCED * forced as f64) as usize);
+                if let Some(improved) = improve_coarsely(&bench, side, patches, params, observer)? {
+                    bench = improved;
+                    improve::straighten(&mut bench, observer)?;
+                } else {
+                    make_good(&mut bench, side, patches, params, observer)?;
+                }
                 observer.progress(1.0);
                 return Ok(network(&work, &work_adjacency, &bench.complex));
             }
@@ -152,6 +174,44 @@ pub(super) fn layout_around(
         edge /= 2.0;
     }
     Err(LayoutError::Stuck { faces: mesh.triangles.len() })
+}
+
+/// Improves the complex of `bench` on a coarser mesh, where a change costs less. `None` if that mesh would not be much
+/// smaller or the way back fails.
+fn improve_coarsely<'a>(
+    bench: &Bench<'a>,
+    side: f64,
+    patches: usize,
+    params: &LayoutParams,
+    observer: &dyn Observer,
+) -> Result<Option<Bench<'a>>, LayoutError> {
+    let Some(mut coarse) = coarse::coarsen(bench.mesh, bench.adjacency, &bench.complex, side, observer) else {
+        return Ok(None);
+    };
+    let adjacency = Adjacency::new(&coarse.mesh);
+    let complex = std::mem::take(&mut coarse.complex);
+    let Some(mut on_coarse) = Bench::new(&coarse.mesh, &adjacency, complex) else { return Ok(None) };
+    make_good(&mut on_coarse, side, patches, params, observer)?;
+    let complex = coarse.refined(bench.mesh, bench.adjacency, &on_coarse.complex);
+    Ok(complex.and_then(|complex| Bench::new(bench.mesh, bench.adjacency, complex)))
+}
+
+/// Relaxes the cells and improves their connectivity, towards `patches` of them with sides of about `side`.
+fn make_good(
+    bench: &mut Bench,
+    side: f64,
+    patches: usize,
+    params: &LayoutParams,
+    observer: &dyn Observer,
+) -> Result<(), LayoutError> {
+    improve::relax(bench, observer)?;
+    let lines = bench.lines();
+    let tips = tips::tips(&partition::Ground::new(bench.mesh, bench.adjacency, &lines), side);
+    tips::plant(bench, &tips, patches);
+    improve::settle(bench, patches, SETTLING, observer)?;
+    improve::improve(bench, patches, observer)?;
+    improve::relax(bench, observer)?;
+    improve::settle(bench, patches, SETTLING * params.smoothing, observer)
 }
 
 fn check(mesh: &TriMesh) -> Result<(), LayoutError> {

@@ -10,7 +10,7 @@ mod layout;
 pub use diagnose::{Diagnosis, Fault, Region, diagnose, glance};
 pub use edit::{EditError, Editor};
 pub use imprint::{ImprintError, imprint};
-pub use layout::{LayoutError, LayoutParams, layout};
+pub use layout::{LayoutError, LayoutParams, layout, layout_tagged};
 
 use crate::mesh::{FacePoint, TriMesh};
 use serde::{Deserialize, Serialize};

@@ -12,6 +12,9 @@ use std::collections::BTreeMap;
 /// Pressure on the number of patches: what one patch too many costs when there are a tenth too many.
 const COUNT_COST: f64 = 2.0;
 
+/// Steps of a node to a better place, as parts of the way along its arcs.
+const STEPS: [f64; 2] = [0.35, 0.12];
+
 /// What the layout is measured by.
 pub(super) struct Scale<'a> {
     pub bench: &'a Bench<'a>,
@@ -46,12 +49,7 @@ impl<'a> Scale<'a> {
         if n < 4 || n % 2 == 1 || change.cells.iter().any(|&c| complex.loop_of(c).len() != 4) {
             return None;
         }
-        let mut before: f64 = change.cells.iter().map(|&c| self.costs[c as usize]).sum();
-        before += self.another * change.cells.len() as f64;
-        if let Some(node) = change.center {
-            let half = complex.star(node)[0];
-            before += self.sectors.cost(self.sectors.of[half as usize], 0.0);
-        }
+        let before = self.cost_of(change);
         let pin_before = change.center.map(|node| complex.nodes[node as usize]).filter(|n| n.stays).map(|n| n.vertex);
         let mut fill = Fill::new(self, change, &around)?;
         let mut best: Option<Gain> = None;
@@ -66,6 +64,57 @@ impl<'a> Scale<'a> {
             }
         }
         best
+    }
+
+    /// What the cells of a change cost as they are.
+    fn cost_of(&self, change: &Change) -> f64 {
+        let complex = &self.bench.complex;
+        let mut cost: f64 = change.cells.iter().map(|&c| self.costs[c as usize]).sum();
+        cost += self.another * change.cells.len() as f64;
+        if let Some(node) = change.center {
+            let half = complex.star(node)[0];
+            cost += self.sectors.cost(self.sectors.of[half as usize], 0.0);
+        }
+        cost
+    }
+
+    /// What drawing the lines and spokes of `change` gains, its node, unless pinned, where it gains most.
+    pub fn redrawn(&self, change: &Change) -> Option<Gain> {
+        let around = outline_with_cells(&self.bench.complex, change)?;
+        let mut fill = Fill::new(self, change, &around)?;
+        let n = around.len();
+        let mut least = fill.cost(&change.lines, &change.spokes);
+        let mut change = change.clone();
+        if !change.spokes.is_empty() && change.pin.is_none() {
+            let mut best = *fill.vertex.get(n)?;
+            let free = self.bench.embedding.free_vertices(&fill.union.disk);
+            for step in STEPS {
+                loop {
+                    let from = fill.union.uv[best as usize];
+                    let mut found = best;
+                    for &corner in &change.spokes {
+                        let target = from.lerp(fill.union.uv[fill.vertex[corner] as usize], step);
+                        let far = |v: u32| fill.union.uv[v as usize].distance_squared(target);
+                        let v = free.iter().copied().min_by(|&v, &w| far(v).total_cmp(&far(w)))?;
+                        if v == found || v == best {
+                            continue;
+                        }
+                        fill.move_node(v);
+                        if let Some(cost) =
+                            fill.cost(&change.lines, &change.spokes).filter(|&c| least.is_none_or(|l| c < l))
+                        {
+                            (least, found) = (Some(cost), v);
+                        }
+                    }
+                    if found == best {
+                        break;
+                    }
+                    best = found;
+                }
+            }
+            change.pin = Some(fill.union.disk.vertices[best as usize]);
+        }
+        Some((self.cost_of(&change) - least?, change))
     }
 
     /// What the sectors at the outline cost more when corner `i` goes from `cells[i]` cells to `now[i]`.
@@ -114,6 +163,14 @@ impl<'a> Fill<'a> {
             return None;
         }
         Some(Fill { scale, around, union, vertex, triangles, traces: RefCell::default(), costs: RefCell::default() })
+    }
+
+    /// Moves the node inside to a vertex of the disk.
+    fn move_node(&mut self, v: u32) {
+        let n = self.around.len();
+        self.vertex[n] = v;
+        self.traces.borrow_mut().retain(|&(i, j), _| i != n && j != n);
+        self.costs.borrow_mut().retain(|quad, _| !quad.contains(&n));
     }
 
     /// The fillings worth a look: the best one without a node inside, and those with one node, joined to every

@@ -5,7 +5,7 @@
 //! stay inside it.
 
 use super::LayoutError;
-use super::complex::Complex;
+use super::complex::{Complex, Node};
 use super::fill::{Gain, Scale};
 use super::polygon;
 use super::recut::{Bench, Change, outline};
@@ -20,11 +20,14 @@ use std::collections::BTreeMap;
 const LEAST_GAIN: f64 = 0.2;
 const GAIN_GROWTH: f64 = 1.25;
 
+/// The same for drawing anew, where nothing undoes it.
+const LEAST_SETTLING: f64 = 0.02;
+
 /// Rounds of changing the connectivity; most meshes settle earlier.
 const CHANGE_ROUNDS: usize = 20;
 
-/// Batches of relaxing between two rounds of changes: most neighbours of a change fit into the first few.
-const RELAX_BATCHES: usize = 1000;
+/// Rounds of drawing anew around changes before the next ones.
+const SETTLING: usize = 3;
 
 /// Parts every cell into quads. False if some cell could not be parted.
 pub(super) fn quads(bench: &mut Bench) -> bool {
@@ -33,79 +36,105 @@ pub(super) fn quads(bench: &mut Bench) -> bool {
     bench.complex.live_cells().all(|c| bench.complex.loop_of(c).len() == 4)
 }
 
-/// Relaxes all nodes and arcs in up to `rounds` rounds; after the first, those that moved and their neighbours.
-pub(super) fn relax(bench: &mut Bench, rounds: usize, observer: &dyn Observer) -> Result<(), LayoutError> {
-    let mut nodes: Vec<u32> = (0..bench.complex.nodes.len() as u32).collect();
-    for _ in 0..rounds {
-        let before: Vec<u32> = bench.complex.nodes.iter().map(|n| n.vertex).collect();
-        relax_some(bench, &nodes, usize::MAX, observer)?;
-        let moved = |n: u32| bench.complex.nodes[n as usize].vertex != before[n as usize];
-        let arcs = bench.complex.live_arcs().map(|a| bench.complex.arc(2 * a).nodes);
-        nodes = arcs.filter(|ends| ends.iter().any(|&n| moved(n))).flatten().collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-    }
+/// Relaxes all nodes and arcs once.
+pub(super) fn relax(bench: &mut Bench, observer: &dyn Observer) -> Result<(), LayoutError> {
+    let cancelled = || if observer.cancelled() { Err(LayoutError::Cancelled) } else { Ok(()) };
+    let nodes: Vec<u32> = (0..bench.complex.nodes.len() as u32).collect();
+    cancelled()?;
+    bench.sweep(&nodes, |complex, n| star_change(complex, &complex.star(n)));
+    straighten(bench, observer)?;
+    cancelled()?;
+    slide::slide(bench, &nodes);
     Ok(())
 }
 
-/// Relaxes `nodes` and the arcs at them once, each kind in at most `batches` batches.
-fn relax_some(bench: &mut Bench, nodes: &[u32], batches: usize, observer: &dyn Observer) -> Result<(), LayoutError> {
-    let cancelled = || if observer.cancelled() { Err(LayoutError::Cancelled) } else { Ok(()) };
-    cancelled()?;
-    bench.sweep(nodes, batches, |complex, n| star_change(complex, &complex.star(n)));
-    cancelled()?;
-    let mut wanted = vec![false; bench.complex.nodes.len()];
-    for &n in nodes {
-        wanted[n as usize] = true;
+/// Draws all smooth arcs anew, straight in the map of their two cells.
+pub(super) fn straighten(bench: &mut Bench, observer: &dyn Observer) -> Result<(), LayoutError> {
+    if observer.cancelled() {
+        return Err(LayoutError::Cancelled);
     }
-    let arcs: Vec<u32> = bench
-        .complex
-        .live_arcs()
-        .filter(|&a| bench.complex.arc(2 * a).nodes.iter().any(|&n| wanted[n as usize]))
-        .collect();
-    bench.sweep(&arcs, batches, arc_change);
-    cancelled()?;
-    slide::slide(bench, nodes, batches);
+    let arcs: Vec<u32> = bench.complex.live_arcs().collect();
+    bench.sweep(&arcs, arc_change);
     Ok(())
 }
 
 /// Changes the connectivity until nothing gets better, towards `patches` patches.
 pub(super) fn improve(bench: &mut Bench, patches: usize, observer: &dyn Observer) -> Result<(), LayoutError> {
-    let mut known = Known::new();
+    let (mut known, mut drawn) = (Known::new(), Known::new());
     let mut fresh = vec![true; bench.complex.nodes.len()];
     for round in 0..CHANGE_ROUNDS {
         observer.progress(0.3 + 0.5 * round as f64 / CHANGE_ROUNDS as f64);
         let least = LEAST_GAIN * GAIN_GROWTH.powi(round as i32);
-        let chosen = choose(bench, patches, least, &fresh, &mut known);
+        let scale = Scale::new(bench, patches);
+        let chosen = choose(bench, unions(&bench.complex), least, &fresh, &mut known, |union| scale.best(union));
         if chosen.is_empty() {
             break;
         }
-        let mut nodes: Vec<u32> = Vec::new();
-        for change in &chosen {
-            for &c in &change.cells {
-                nodes.extend(bench.complex.loop_of(c).iter().map(|&h| bench.complex.from(h)));
-            }
-        }
-        let before = bench.complex.nodes.len() as u32;
+        let mut touched = nodes_of(&bench.complex, &chosen);
         bench.apply(&chosen);
-        nodes.extend(before..bench.complex.nodes.len() as u32);
-        nodes.sort_unstable();
-        nodes.dedup();
-        relax_some(bench, &nodes, RELAX_BATCHES, observer)?;
-        fresh = vec![false; bench.complex.nodes.len()];
-        nodes.iter().for_each(|&n| fresh[n as usize] = true);
+        touched.resize(bench.complex.nodes.len(), true);
+        fresh = settle_some(bench, patches, SETTLING, touched.clone(), &mut drawn, observer)?;
+        fresh.iter_mut().zip(touched).for_each(|(fresh, touched)| *fresh |= touched);
     }
     Ok(())
+}
+
+/// Draws nodes and arcs anew where that makes cells better, as measured, in up to `rounds` rounds. Their connectivity
+/// stays, and no round makes anything worse.
+pub(super) fn settle(
+    bench: &mut Bench,
+    patches: usize,
+    rounds: usize,
+    observer: &dyn Observer,
+) -> Result<(), LayoutError> {
+    let fresh = vec![true; bench.complex.nodes.len()];
+    settle_some(bench, patches, rounds, fresh, &mut Known::new(), observer).map(|_| ())
+}
+
+/// The same around the nodes in `fresh`. Returns the nodes of cells that were drawn anew.
+fn settle_some(
+    bench: &mut Bench,
+    patches: usize,
+    rounds: usize,
+    mut fresh: Vec<bool>,
+    known: &mut Known,
+    observer: &dyn Observer,
+) -> Result<Vec<bool>, LayoutError> {
+    let mut all = vec![false; fresh.len()];
+    for _ in 0..rounds {
+        if observer.cancelled() {
+            return Err(LayoutError::Cancelled);
+        }
+        let complex = &bench.complex;
+        let arcs = complex.live_arcs().filter_map(|a| arc_change(complex, a));
+        let stars = complex.stars().into_iter().filter_map(|s| star_change(complex, &s));
+        let unions: Vec<Change> = arcs.chain(stars).collect();
+        let scale = Scale::new(bench, patches);
+        let chosen = choose(bench, unions, LEAST_SETTLING, &fresh, known, |union| scale.redrawn(union));
+        if chosen.is_empty() {
+            break;
+        }
+        fresh = nodes_of(&bench.complex, &chosen);
+        all.iter_mut().zip(&fresh).for_each(|(all, fresh)| *all |= fresh);
+        bench.apply(&chosen);
+    }
+    Ok(all)
+}
+
+/// Marks the nodes of the cells of `changes`.
+fn nodes_of(complex: &Complex, changes: &[Change]) -> Vec<bool> {
+    let mut nodes = vec![false; complex.nodes.len()];
+    for &h in changes.iter().flat_map(|change| &change.cells).flat_map(|&c| complex.loop_of(c)) {
+        nodes[complex.from(h) as usize] = true;
+    }
+    nodes
 }
 
 /// The best filling of each union, by the arcs that it removes.
 type Known = BTreeMap<Vec<u32>, Option<Gain>>;
 
-/// The changes that gain most, on disjoint sets of nodes. What is known of unions without a node in `fresh` is taken
-/// from `known`.
-fn choose(bench: &Bench, patches: usize, least: f64, fresh: &[bool], known: &mut Known) -> Vec<Change> {
-    let complex = &bench.complex;
-    let scale = Scale::new(bench, patches);
+/// The unions worth filling anew: pairs of cells, and the cells around a node.
+fn unions(complex: &Complex) -> Vec<Change> {
     let pairs = complex.live_arcs().filter(|&a| {
         let arc = complex.arc(2 * a);
         arc.kind == CurveKind::Smooth && arc.cells[0] != arc.cells[1]
@@ -113,15 +142,28 @@ fn choose(bench: &Bench, patches: usize, least: f64, fresh: &[bool], known: &mut
     let pairs =
         pairs.map(|a| Change { cells: complex.arc(2 * a).cells.to_vec(), removed: vec![a], ..Change::default() });
     let stars = complex.stars().into_iter().filter(|s| s.len() >= 2).filter_map(|s| star_change(complex, &s));
-    let unions: Vec<Change> = pairs.chain(stars).collect();
+    pairs.chain(stars).collect()
+}
+
+/// The changes of `unions` that gain most by `best`, and more than `least`, on disjoint sets of nodes. What is known of
+/// unions without a node in `fresh` is taken from `known`.
+fn choose(
+    bench: &Bench,
+    unions: Vec<Change>,
+    least: f64,
+    fresh: &[bool],
+    known: &mut Known,
+    best: impl Fn(&Change) -> Option<Gain> + Sync,
+) -> Vec<Change> {
+    let complex = &bench.complex;
     let nodes = |change: &Change| -> Vec<u32> {
         change.cells.iter().flat_map(|&c| complex.loop_of(c)).map(|&h| complex.from(h)).collect()
     };
     let gains: Vec<Option<Gain>> = unions
         .par_iter()
         .map(|union| match known.get(&union.removed) {
-            Some(gain) if !nodes(union).iter().any(|&n| fresh[n as usize]) => gain.clone(),
-            _ => scale.best(union).filter(|g| g.0 > least),
+            gain if !nodes(union).iter().any(|&n| fresh[n as usize]) => gain.cloned().flatten(),
+            _ => best(union).filter(|g| g.0 > least),
         })
         .collect();
     *known = unions.into_iter().map(|u| u.removed).zip(gains.iter().cloned()).collect();
@@ -156,12 +198,13 @@ pub(super) fn star_change(complex: &Complex, star: &[u32]) -> Option<Change> {
     if cells.len() != count {
         return None;
     }
-    let stays = complex.nodes[node as usize];
+    let Node { vertex, stays } = complex.nodes[node as usize];
     let mut change = Change {
         cells,
         removed: star.iter().map(|h| h / 2).collect(),
         center: Some(node),
-        pin: stays.stays.then_some(stays.vertex),
+        pin: stays.then_some(vertex),
+        stays,
         ..Change::default()
     };
     let around = outline(complex, &change)?;

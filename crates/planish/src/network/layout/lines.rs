@@ -23,7 +23,21 @@ const CLOSED_SHARE: f64 = 0.5;
 
 /// Marks the half-edges on sharp edges that belong to a line worth keeping, and counts the sharp edges left out.
 /// Noise makes short lines with loose ends and small meshes of lines; a part's edges close or meet others.
-pub(super) fn feature_lines(mesh: &TriMesh, adjacency: &Adjacency, params: &LayoutParams) -> (Vec<bool>, usize) {
+/// * `tagged` - the half-edges that are sharp, where somebody knows; else the angles tell
+pub(super) fn feature_lines(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    tagged: &[bool],
+    params: &LayoutParams,
+) -> (Vec<bool>, usize) {
+    if tagged.contains(&true) {
+        let inner = |h: usize| adjacency.opposite[h] != NONE;
+        let mut kept: Vec<bool> = tagged.iter().enumerate().map(|(h, &t)| t && inner(h)).collect();
+        let found = kept.iter().filter(|&&s| s).count();
+        drop_detail(mesh, adjacency, params.feature_length * mesh.bounds().diagonal(), &mut kept);
+        let left = kept.iter().filter(|&&s| s).count();
+        return (kept, (found - left) / 2);
+    }
     let sharp = sharp_edges(mesh, adjacency, params.sharp_angle_deg);
     let found = sharp.iter().filter(|&&s| s).count();
     let edges: f64 = (0..sharp.len() as u32).map(|h| length(mesh, h)).sum();

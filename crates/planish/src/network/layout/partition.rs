@@ -8,8 +8,9 @@ use super::LayoutError;
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
 use crate::observe::Observer;
 use glam::DVec3;
+use rayon::prelude::*;
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashMap};
+use std::collections::{BTreeMap, BinaryHeap, HashMap};
 
 /// Rounds of Lloyd relaxation; the cells hardly change after these.
 const LLOYD_ROUNDS: usize = 5;
@@ -195,6 +196,64 @@ impl<'a> Ground<'a> {
             .collect()
     }
 
+    /// For each cell marked `bad` the face where its front, growing from the site, first closes around a hole or a
+    /// handle: the nearest edge of the cell's cut graph, which is what no path from the site crosses, without its loose
+    /// ends.
+    fn meetings(&self, label: &[u32], distance: &[f64], barrier: &[bool], bad: &[bool]) -> Vec<u32> {
+        let is_cut = |h: u32| {
+            let o = self.adjacency.opposite[h as usize];
+            !barrier[h as usize]
+                && self.parent(distance, barrier, h / 3) != h
+                && self.parent(distance, barrier, o / 3) != o
+        };
+        let cut: Vec<u32> = (0..label.len() as u32)
+            .into_par_iter()
+            .filter(|&f| bad[label[f as usize] as usize])
+            .flat_map_iter(|f| (3 * f..3 * f + 3).filter(|&h| h < self.adjacency.opposite[h as usize] && is_cut(h)))
+            .collect();
+        let ends = |h: u32| [self.mesh.origin(h), self.mesh.origin(next(h))];
+        let mut at: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (i, &h) in cut.iter().enumerate() {
+            ends(h).iter().for_each(|&v| at.entry(v).or_default().push(i));
+        }
+        // The rim of a cell holds what ends there.
+        let rim = |v: u32| self.adjacency.fan(v).any(|h| barrier[h as usize] || barrier[previous(h) as usize]);
+        let mut loose: Vec<u32> =
+            at.iter().filter(|(v, edges)| edges.len() == 1 && !rim(**v)).map(|(&v, _)| v).collect();
+        let mut held = vec![true; cut.len()];
+        while let Some(v) = loose.pop() {
+            let Some(&i) = at[&v].iter().find(|&&i| held[i]) else { continue };
+            held[i] = false;
+            let other = ends(cut[i]).into_iter().find(|&w| w != v).expect("two ends");
+            if at[&other].iter().filter(|&&j| held[j]).count() == 1 && !rim(other) {
+                loose.push(other);
+            }
+        }
+        let cut = cut.into_iter().zip(held).filter(|x| x.1).map(|x| x.0);
+        let mut nearest: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
+        for f in cut.flat_map(|h| [h / 3, self.adjacency.opposite[h as usize] / 3]) {
+            let here = (distance[f as usize], f);
+            let best = nearest.entry(label[f as usize]).or_insert(here);
+            if here.0.total_cmp(&best.0).then(here.1.cmp(&best.1)).is_lt() {
+                *best = here;
+            }
+        }
+        nearest.into_values().map(|n| n.1).collect()
+    }
+
+    /// The half-edge of face `f` towards its site: the neighbour that is nearest to it. [`NONE`] at the site.
+    fn parent(&self, distance: &[f64], barrier: &[bool], f: u32) -> u32 {
+        let near = |h: u32| {
+            (distance[self.adjacency.opposite[h as usize] as usize / 3], self.adjacency.opposite[h as usize] / 3)
+        };
+        let own = (distance[f as usize], f);
+        let less = |a: (f64, u32), b: (f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).is_lt();
+        (3 * f..3 * f + 3)
+            .filter(|&h| !barrier[h as usize] && less(near(h), own))
+            .min_by(|&g, &h| near(g).0.total_cmp(&near(h).0).then(near(g).1.cmp(&near(h).1)))
+            .unwrap_or(NONE)
+    }
+
     /// Faces where a site is wanted because their cell is no disk or meets itself across a feature line.
     fn wanted(&self, label: &[u32], distance: &[f64], count: usize, eager: bool) -> Vec<u32> {
         let barrier = self.barriers(label);
@@ -232,14 +291,17 @@ impl<'a> Ground<'a> {
             }
         }
         let mut wanted = Vec::new();
+        let mut bad = vec![false; count];
         for c in 0..count as u32 {
             if euler[c as usize] != 1 {
+                bad[c as usize] = true;
                 wanted.push(far[c as usize].1);
             }
             if let Some(pair) = own.get(&c) {
                 wanted.extend(pair);
             }
         }
+        wanted.extend(self.meetings(label, distance, &barrier, &bad));
         if eager {
             let bad: Vec<u32> = wanted.iter().map(|&f| label[f as usize]).collect();
             wanted.extend((0..label.len() as u32).filter(|&f| f % 7 == 0 && bad.contains(&label[f as usize])));

@@ -31,8 +31,10 @@ pub(super) struct Change {
     pub spokes: Vec<usize>,
     /// The node that the new one replaces, if any.
     pub center: Option<u32>,
-    /// The vertex of the working mesh where the new node must stand, if it has no choice.
+    /// The vertex of the working mesh where the new node stands; in the middle, if none is given.
     pub pin: Option<u32>,
+    /// The new node keeps its place from now on.
+    pub stays: bool,
 }
 
 /// The complex cut into the working mesh.
@@ -289,6 +291,18 @@ impl Embedding {
         (0..complex.cells.len() as u32).into_par_iter().map(shape).collect()
     }
 
+    /// The vertices inside a disk that are vertices of the working mesh: places for a node.
+    pub fn free_vertices(&self, disk: &Disk) -> Vec<u32> {
+        let mut on_boundary = vec![false; disk.vertices.len()];
+        for &v in &disk.boundary {
+            on_boundary[v as usize] = true;
+        }
+        (0..disk.vertices.len() as u32)
+            .filter(|&v| !on_boundary[v as usize])
+            .filter(|&v| matches!(self.cut.origin[disk.vertices[v as usize] as usize], Place::Vertex(_)))
+            .collect()
+    }
+
     /// The vertex of the working mesh, inside the disk, nearest to the centroid of the disk's area.
     fn middle(&self, disk: &Disk, uv: &[DVec2]) -> Option<u32> {
         let at = |v: u32| self.cut.mesh.points[disk.vertices[v as usize] as usize];
@@ -300,18 +314,11 @@ impl Embedding {
             total += area;
         }
         let mean = sum / total;
-        let mut on_boundary = vec![false; disk.vertices.len()];
-        for &v in &disk.boundary {
-            on_boundary[v as usize] = true;
-        }
-        (0..disk.vertices.len() as u32)
-            .filter(|&v| !on_boundary[v as usize])
-            .filter(|&v| matches!(self.cut.origin[disk.vertices[v as usize] as usize], Place::Vertex(_)))
-            .min_by(|&v, &w| {
-                let key = |v: u32| (uv[v as usize].length() > INNER_RADIUS, at(v).distance_squared(mean));
-                let (a, b) = (key(v), key(w));
-                a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-            })
+        self.free_vertices(disk).into_iter().min_by(|&v, &w| {
+            let key = |v: u32| (uv[v as usize].length() > INNER_RADIUS, at(v).distance_squared(mean));
+            let (a, b) = (key(v), key(w));
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+        })
     }
 
     /// Where a line's meeting lies on the working mesh; `None` inside a face, where a chord will do.
@@ -437,6 +444,24 @@ impl<'a> Bench<'a> {
         self.embedding.shapes(&self.complex)
     }
 
+    /// The half-edges of the mesh on feature lines.
+    pub fn lines(&self) -> Vec<bool> {
+        let mut lines = vec![false; self.adjacency.opposite.len()];
+        for a in self.complex.live_arcs() {
+            let arc = self.complex.arc(2 * a);
+            for pair in arc.chain.windows(2).filter(|_| arc.kind == CurveKind::Feature) {
+                if let [Place::Vertex(v), Place::Vertex(w)] = *pair {
+                    for (from, to) in [(v, w), (w, v)] {
+                        if let Some(h) = half_edge(&self.mesh.triangles, self.adjacency, from, to) {
+                            lines[h as usize] = true;
+                        }
+                    }
+                }
+            }
+        }
+        lines
+    }
+
     /// Makes `changes`, whose cells must be disjoint, each if it can be drawn. Returns how many were made; where
     /// the result does not hold together, the change at fault is left out.
     pub fn apply(&mut self, changes: &[Change]) -> usize {
@@ -506,14 +531,11 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Makes the changes that `plan` builds for `items`, in at most `batches` batches of disjoint ones.
-    pub fn sweep(&mut self, items: &[u32], batches: usize, plan: impl Fn(&Complex, u32) -> Option<Change>) -> usize {
+    /// Makes the changes that `plan` builds for `items`, in batches of disjoint ones.
+    pub fn sweep(&mut self, items: &[u32], plan: impl Fn(&Complex, u32) -> Option<Change>) -> usize {
         let mut waiting = items.to_vec();
         let mut made = 0;
-        for _ in 0..batches {
-            if waiting.is_empty() {
-                break;
-            }
+        while !waiting.is_empty() {
             let mut taken = vec![false; self.complex.cells.len()];
             let (mut now, mut later) = (Vec::new(), Vec::new());
             for &item in &waiting {
@@ -583,11 +605,11 @@ fn replace(complex: &mut Complex, change: &Change, drawn: &Drawn) -> Vec<u32> {
     if !change.spokes.is_empty() {
         let center = match change.center {
             Some(node) => {
-                complex.nodes[node as usize] = Node { vertex: drawn.center, stays: change.pin.is_some() };
+                complex.nodes[node as usize] = Node { vertex: drawn.center, stays: change.stays };
                 node
             }
             None => {
-                complex.nodes.push(Node { vertex: drawn.center, stays: change.pin.is_some() });
+                complex.nodes.push(Node { vertex: drawn.center, stays: change.stays });
                 complex.nodes.len() as u32 - 1
             }
         };

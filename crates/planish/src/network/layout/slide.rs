@@ -28,15 +28,11 @@ pub(super) struct Slide {
     pub sides: Vec<(Change, Vec<(u32, usize)>)>,
 }
 
-/// Slides the nodes that lie inside a line once, in at most `batches` batches of disjoint ones. Returns how many
-/// moved.
-pub(super) fn slide(bench: &mut Bench, nodes: &[u32], batches: usize) -> usize {
+/// Slides the nodes that lie inside a line once, in batches of disjoint ones. Returns how many moved.
+pub(super) fn slide(bench: &mut Bench, nodes: &[u32]) -> usize {
     let mut waiting = nodes.to_vec();
     let mut made = 0;
-    for _ in 0..batches {
-        if waiting.is_empty() {
-            break;
-        }
+    while !waiting.is_empty() {
         let mut taken = vec![false; bench.complex.cells.len()];
         let (mut now, mut later) = (Vec::new(), Vec::new());
         for &node in &waiting {

@@ -167,7 +167,7 @@ fn best(bench: &Bench, scale: &Scale, tip: u32) -> Option<Gain> {
     }
     // Only a union that has the tip inside can have a node there.
     unions.retain(|change| cells.iter().all(|c| change.cells.contains(c)));
-    let found = unions.into_iter().filter_map(|change| scale.best(&Change { pin: Some(tip), ..change }));
+    let found = unions.into_iter().filter_map(|change| scale.best(&Change { pin: Some(tip), stays: true, ..change }));
     found.max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cells.cmp(&a.1.cells)))
 }
 

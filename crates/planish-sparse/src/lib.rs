@@ -1,4 +1,5 @@
-//! Sparse symmetric positive definite systems: the one file that knows faer.
+//! Sparse symmetric positive definite systems: the one crate that knows faer, so that nothing else waits for faer to be
+//! compiled.
 
 use faer::linalg::solvers::SolveCore;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};

@@ -1,0 +1,119 @@
+//! `planish mesh`, `smooth` and `decimate` as a user meets them.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+const PART: &str = "units = \"mm\"\n[solid.block]\nbox = { size = [4, 3, 2] }\n[solid.bore]\ncylinder = { radius = 0.8, height = 3 }\n[solid.part]\ndifference = [\"block\", \"bore\"]\n";
+const JOB: &str = "[stock]\nfrom = [0, 0, -2]\nto = [6, 4, 0]\n[[tool]]\nname = \"flat\"\nkind = \"flat\"\ndiameter = 1\n[[path]]\ntool = \"flat\"\ngcode = \"cut.nc\"\n";
+
+fn planish(args: &[&str], folder: &Path) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_planish"));
+    command.args(args).current_dir(folder).stdin(Stdio::null());
+    command.output().expect("the program starts")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn done(args: &[&str], folder: &Path) -> String {
+    let output = planish(args, folder);
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", text(&output.stderr));
+    text(&output.stdout)
+}
+
+/// The one error line of a command that must fail with status 3 and leave `out.ply` unwritten.
+fn refused(args: &[&str], folder: &Path) -> String {
+    let output = planish(args, folder);
+    assert_eq!(output.status.code(), Some(3), "{args:?}: {}", text(&output.stderr));
+    let line = text(&output.stderr);
+    assert!(line.starts_with("error: ") && line.lines().count() == 1, "{line}");
+    assert!(line.contains(" - hint: "), "{line}");
+    assert!(!folder.join("out.ply").exists(), "{args:?} left something");
+    line
+}
+
+fn number(report: &Path, key: &str) -> f64 {
+    let report: serde_json::Value = serde_json::from_str(&fs::read_to_string(report).unwrap()).unwrap();
+    report["quality"][key].as_f64().unwrap_or_else(|| panic!("{key} in {report}"))
+}
+
+#[test]
+fn a_part_is_meshed_decimated_and_smoothed_and_stays_closed_with_its_genus() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("part.toml"), PART).unwrap();
+    let said =
+        done(&["mesh", "part.toml", "-o", "part.ply", "--resolution", "32", "--report", "r.json"], folder.path());
+    assert!(said.contains("watertight, manifold"), "{said}");
+    assert_eq!(number(&at("r.json"), "mesh.genus"), 1.0);
+    let volume = 24.0 - std::f64::consts::PI * 0.64 * 2.0;
+    assert!((number(&at("r.json"), "mesh.volume") / volume - 1.0).abs() < 3e-3);
+    assert!(number(&at("r.json"), "mesh.feature_edges") > 100.0);
+    for (command, option, value, out) in
+        [("decimate", "--ratio", "0.2", "less.ply"), ("smooth", "--noise", "0.01", "even.ply")]
+    {
+        done(&[command, "part.ply", option, value, "-o", out, "--report", "s.json"], folder.path());
+        let facts = text(&planish(&["info", out], folder.path()).stdout);
+        assert!(facts.contains("watertight"), "{facts}");
+    }
+    assert!(fs::metadata(at("less.ply")).unwrap().len() * 3 < fs::metadata(at("part.ply")).unwrap().len());
+}
+
+#[test]
+fn the_same_part_has_the_same_bytes_on_1_and_2_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("part.toml"), PART).unwrap();
+    for threads in ["1", "2"] {
+        let out = format!("{threads}.ply");
+        done(&["mesh", "part.toml", "-o", &out, "--resolution", "30", "--threads", threads, "-q"], folder.path());
+    }
+    assert!(fs::read(folder.path().join("1.ply")).unwrap() == fs::read(folder.path().join("2.ply")).unwrap());
+}
+
+#[test]
+fn a_milling_job_reads_its_gcode_and_refuses_what_it_does_not_understand_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("job.toml"), JOB).unwrap();
+    fs::write(at("cut.nc"), "G21 G90\nG0 X1 Y2 Z1\nG1 Z-1 F100\nG1 X5\nM5\n").unwrap();
+    done(&["mesh", "job.toml", "-o", "slot.ply", "--resolution", "60", "--report", "r.json"], folder.path());
+    let slot = 4.0 * 1.0 + std::f64::consts::PI * 0.25;
+    let left = number(&at("r.json"), "mesh.volume");
+    assert!((left - (48.0 - slot)).abs() < 0.02 * slot, "{left}");
+    fs::write(at("cut.nc"), "G21 G90\nG0 X1 Y2 Z1\nG2 X5 Y2 I2 J0\n").unwrap();
+    let line = refused(&["mesh", "job.toml", "-o", "out.ply"], folder.path());
+    assert!(line.contains("cut.nc") && line.contains('3') && line.contains("G2"), "{line}");
+}
+
+#[test]
+fn faulty_scripts_volumes_and_sizes_are_status_3_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("part.toml", PART);
+    write("key.toml", &PART.replace("height = 3", "heigth = 3"));
+    write("name.toml", &PART.replace("\"bore\"]", "\"hole\"]"));
+    write("units.toml", &PART.replace("mm", "furlong"));
+    write("empty.toml", "[solid.a]\nsphere = { radius = 1 }\n[solid.b]\ndifference = [\"a\", \"a\"]\n");
+    write("short.nrrd", "NRRD0004\ntype: float\ndimension: 3\nsizes: 9 9 9\nencoding: raw\nendian: little\n\nabcd");
+    for (name, word) in [("key.toml", "heigth"), ("name.toml", "hole"), ("units.toml", "furlong"), ("empty.toml", "")] {
+        let line = refused(&["mesh", name, "-o", "out.ply", "--resolution", "20"], folder.path());
+        assert!(line.starts_with(&format!("error: {name}: ")) && line.contains(word), "{line}");
+    }
+    refused(&["mesh", "short.nrrd", "-o", "out.ply"], folder.path());
+    let line = refused(&["mesh", "part.toml", "-o", "out.ply", "--voxel", "0.0001", "--memory", "0.5"], folder.path());
+    assert!(line.contains("MB") && line.contains("larger voxel"), "{line}");
+}
+
+#[test]
+fn a_plate_thinner_than_the_voxel_is_told_with_the_voxel_that_it_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = "[solid.block]\nbox = { size = [4, 4, 4] }\n[solid.fin]\nbox = { size = [10, 4, 0.03] }\n[solid.part]\nunion = [\"block\", \"fin\"]\n";
+    fs::write(folder.path().join("fin.toml"), part).unwrap();
+    done(&["mesh", "fin.toml", "-o", "fin.ply", "--voxel", "0.012", "-q", "--memory", "4"], folder.path());
+    let output = planish(&["mesh", "fin.ply", "-o", "out.ply", "--voxel", "0.2"], folder.path());
+    assert_eq!(output.status.code(), Some(0));
+    let told = text(&output.stderr);
+    assert!(told.contains("thinner than the voxel") && told.contains("0.03"), "{told}");
+}

@@ -1,0 +1,436 @@
+//! Local changes of an extracted mesh: vertices moved and merged, each kept only if the mesh stays embedded.
+//!
+//! A change is allowed if no triangle that it touches then meets any other triangle in more than they share, by exact
+//! signs; so the certificate of the extraction holds after every step. What may be near is known from the cells: a
+//! triangle that was never touched lies in its cell.
+
+use crate::field::Directed;
+use crate::geom::predicates::triangles_meet;
+use crate::mesh::{DEGENERATE_AREA, TriMesh};
+use glam::DVec3;
+use std::collections::HashMap;
+
+/// A cell with the numbers of its first triangle and of that after the last.
+pub type CellRange = ([u32; 3], u32, u32);
+
+/// A triangle that is no more.
+pub const GONE: [u32; 3] = [u32::MAX; 3];
+/// Name of no star.
+const NONE: u32 = u32::MAX;
+/// A triangle leans if its normal has a cosine below this with those of all hits among its corners.
+const LEAN: f64 = 0.5;
+
+/// A mesh in the cells of its field, around some vertices.
+pub struct Local<'a> {
+    /// The mesh. Merged triangles stay as [`GONE`].
+    pub mesh: &'a mut TriMesh,
+    field: &'a Directed,
+    /// First name of the hits of each axis.
+    base: [u32; 3],
+    /// Cells in the order of z, y, x.
+    cells: Vec<CellRange>,
+    /// Number of each vertex's star.
+    which: Vec<u32>,
+    stars: Vec<Vec<u32>>,
+    /// Triangles that may have left their cell, by the cells of their boxes.
+    strays: HashMap<[i64; 3], Vec<u32>>,
+    least: f64,
+}
+
+impl<'a> Local<'a> {
+    /// Makes ready for changes of `seeds` and their neighbours.
+    /// * `cells` - all cells with triangles, in the order of z, y, x
+    pub fn new(
+        mesh: &'a mut TriMesh,
+        field: &'a Directed,
+        base: [u32; 3],
+        cells: Vec<CellRange>,
+        seeds: &[u32],
+    ) -> Local<'a> {
+        let mut which = vec![NONE; mesh.points.len()];
+        for &v in seeds {
+            which[v as usize] = 0;
+        }
+        // Seeds and their neighbours: a merge hands the star of one to the other.
+        let near: Vec<[u32; 3]> =
+            mesh.triangles.iter().filter(|t| t.iter().any(|&v| which[v as usize] == 0)).copied().collect();
+        let mut count = 0;
+        which.fill(NONE);
+        for &v in near.iter().flatten() {
+            if which[v as usize] == NONE {
+                which[v as usize] = count;
+                count += 1;
+            }
+        }
+        let mut stars = vec![Vec::new(); count as usize];
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            for &v in triangle {
+                if let Some(star) = stars.get_mut(which[v as usize] as usize) {
+                    star.push(t as u32);
+                }
+            }
+        }
+        let least = 2.0 * DEGENERATE_AREA * mesh.bounds().diagonal().powi(2);
+        Local { mesh, field, base, cells, which, stars, strays: HashMap::new(), least }
+    }
+
+    /// Triangles around a vertex near the seeds.
+    pub fn star(&self, v: u32) -> &[u32] {
+        self.stars.get(self.which[v as usize] as usize).map_or(&[], Vec::as_slice)
+    }
+
+    /// Neighbours of a vertex near the seeds, ascending.
+    pub fn neighbours(&self, v: u32) -> Vec<u32> {
+        let mut all: Vec<u32> =
+            self.star(v).iter().flat_map(|&t| self.mesh.triangles[t as usize]).filter(|&w| w != v).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// Position of a vertex.
+    pub fn position(&self, v: u32) -> DVec3 {
+        self.mesh.points[v as usize]
+    }
+
+    /// Moves vertices together, if the mesh stays embedded and no more triangles lean than before; returns whether.
+    pub fn shift(&mut self, moves: &[(u32, DVec3)]) -> bool {
+        self.shift_if(moves, true)
+    }
+
+    /// [`Local::shift`] that lets triangles lean.
+    pub fn shift_leaning(&mut self, moves: &[(u32, DVec3)]) -> bool {
+        self.shift_if(moves, false)
+    }
+
+    fn shift_if(&mut self, moves: &[(u32, DVec3)], upright: bool) -> bool {
+        // What is too far from the seeds has no star that could be checked.
+        if moves.iter().any(|m| self.star(m.0).is_empty()) {
+            return false;
+        }
+        let mut changed: Vec<u32> = moves.iter().flat_map(|m| self.star(m.0)).copied().collect();
+        changed.sort_unstable();
+        changed.dedup();
+        let leaning = self.leaning(&changed);
+        let areas: Vec<f64> = changed.iter().map(|&t| self.mesh.area(t as usize)).collect();
+        let before: Vec<DVec3> = moves.iter().map(|m| self.position(m.0)).collect();
+        for &(v, p) in moves {
+            self.mesh.points[v as usize] = p;
+        }
+        let kept = self.is_wide(&changed, &areas)
+            && (!upright || self.leaning(&changed) <= leaning)
+            && self.is_embedded(&changed);
+        if kept {
+            self.stray(&changed);
+        } else {
+            for (m, p) in moves.iter().zip(before) {
+                self.mesh.points[m.0 as usize] = p;
+            }
+        }
+        kept
+    }
+
+    /// Merges `v` into its neighbour `w`, which moves to `at`, if the mesh stays a manifold and embedded and no more
+    /// triangles lean than before; returns whether.
+    pub fn merge(&mut self, v: u32, w: u32, at: DVec3) -> bool {
+        let (of_v, of_w) = (self.star(v).to_vec(), self.star(w).to_vec());
+        let (near_v, near_w) = (self.neighbours(v), self.neighbours(w));
+        let shared = near_v.iter().filter(|x| near_w.binary_search(x).is_ok()).count();
+        let has = |t: &u32, x: u32| self.mesh.triangles[*t as usize].contains(&x);
+        let (dying, moving): (Vec<u32>, Vec<u32>) = of_v.iter().partition(|t| has(t, w));
+        // The link condition, on closed stars only.
+        if dying.len() != 2
+            || shared != 2
+            || near_v.len() != of_v.len()
+            || near_w.len() != of_w.len()
+            || moving.is_empty()
+        {
+            return false;
+        }
+        let from = self.position(w);
+        let all: Vec<u32> = {
+            let mut all = [of_v.as_slice(), of_w.as_slice()].concat();
+            all.sort_unstable();
+            all.dedup();
+            all
+        };
+        let leaning = self.leaning(&all);
+        let mut changed = moving.clone();
+        if at != from {
+            changed.extend(of_w.iter().filter(|t| !dying.contains(t)));
+        }
+        let areas: Vec<f64> = changed.iter().map(|&t| self.mesh.area(t as usize)).collect();
+        let saved: Vec<[u32; 3]> = all.iter().map(|&t| self.mesh.triangles[t as usize]).collect();
+        for &t in &dying {
+            self.mesh.triangles[t as usize] = GONE;
+        }
+        for &t in &moving {
+            let triangle = &mut self.mesh.triangles[t as usize];
+            *triangle = triangle.map(|x| if x == v { w } else { x });
+        }
+        self.mesh.points[w as usize] = at;
+        let kept = self.is_wide(&changed, &areas) && self.leaning(&all) <= leaning && self.is_embedded(&changed);
+        if !kept {
+            for (&t, saved) in all.iter().zip(saved) {
+                self.mesh.triangles[t as usize] = saved;
+            }
+            self.mesh.points[w as usize] = from;
+            return false;
+        }
+        for x in near_v.into_iter().chain([v]) {
+            if let Some(star) = self.stars.get_mut(self.which[x as usize] as usize) {
+                star.retain(|t| !dying.contains(t));
+            }
+        }
+        if let Some(star) = self.stars.get_mut(self.which[w as usize] as usize) {
+            star.extend(&moving);
+        }
+        if let Some(star) = self.stars.get_mut(self.which[v as usize] as usize) {
+            star.clear();
+        }
+        self.stray(&changed);
+        true
+    }
+
+    /// True if two vertices are neighbours.
+    pub fn are_neighbours(&self, v: u32, w: u32) -> bool {
+        self.star(v).iter().any(|&t| self.mesh.triangles[t as usize].contains(&w))
+    }
+
+    /// Makes `v` and `w` neighbours by a flip of the edge between them ([K01] fig. 9), if there is one, the mesh stays
+    /// embedded and no more triangles lean than before; returns whether.
+    pub fn flip_to(&mut self, v: u32, w: u32) -> bool {
+        self.flip_if(v, w, true).is_some()
+    }
+
+    /// [`Local::flip_to`] of the edge to some vertex opposite of `v`, and then [`Local::shift`] of `v`: a vertex may have
+    /// to reach over the next triangle to find its place. All or nothing.
+    pub fn flip_and_shift(&mut self, v: u32, to: DVec3) -> bool {
+        let from = self.position(v);
+        self.beyond(v).into_iter().any(|w| {
+            let leaning = self.leaning(self.star(v)) + self.leaning_between(v, w);
+            let Some([a, b]) = self.flip_if(v, w, false) else { return false };
+            if self.shift_leaning(&[(v, to)]) {
+                if self.leaning(self.star(v)) <= leaning {
+                    return true;
+                }
+                self.shift_leaning(&[(v, from)]);
+            }
+            self.flip_if(a, b, false);
+            false
+        })
+    }
+
+    /// Makes `v` and `w` neighbours by a flip if need be and merges them at the place of `w`. All or nothing.
+    pub fn flip_and_merge(&mut self, v: u32, w: u32) -> bool {
+        if self.are_neighbours(v, w) {
+            return self.merge(v, w, self.position(w));
+        }
+        let Some([a, b]) = self.flip_if(v, w, false) else { return false };
+        let merged = self.merge(v, w, self.position(w));
+        if !merged {
+            self.flip_if(a, b, false);
+        }
+        merged
+    }
+
+    /// Vertices opposite of `v` over the edges of its star, ascending.
+    pub fn beyond(&self, v: u32) -> Vec<u32> {
+        let ring = self.neighbours(v);
+        let mut beyond: Vec<u32> = ring
+            .iter()
+            .flat_map(|&a| self.star(a))
+            .map(|&t| self.mesh.triangles[t as usize])
+            .filter(|t| !t.contains(&v) && t.iter().filter(|x| ring.binary_search(x).is_ok()).count() == 2)
+            .flatten()
+            .filter(|w| ring.binary_search(w).is_err())
+            .collect();
+        beyond.sort_unstable();
+        beyond.dedup();
+        beyond
+    }
+
+    /// Leaning triangles at `w` that a flip towards `v` would take.
+    fn leaning_between(&self, v: u32, w: u32) -> usize {
+        let ring = self.neighbours(v);
+        let opposite =
+            |t: &&u32| self.mesh.triangles[**t as usize].iter().filter(|x| ring.binary_search(x).is_ok()).count() == 2;
+        let found: Vec<u32> = self.star(w).iter().filter(opposite).copied().collect();
+        self.leaning(&found)
+    }
+
+    /// Returns the edge that was flipped.
+    fn flip_if(&mut self, v: u32, w: u32, upright: bool) -> Option<[u32; 2]> {
+        let shared = |s: &[u32; 3], t: &[u32; 3]| s.iter().filter(|x| t.contains(x)).count() == 2;
+        let found = self.star(v).iter().find_map(|&s| {
+            let own = self.mesh.triangles[s as usize];
+            let other = self.star(w).iter().find(|&&t| shared(&own, &self.mesh.triangles[t as usize]));
+            other.map(|&t| (s, t))
+        });
+        let (s, t) = found?;
+        let (one, two) = (self.mesh.triangles[s as usize], self.mesh.triangles[t as usize]);
+        if self.are_neighbours(v, w) {
+            return None;
+        }
+        // v a b and w b a become v a w and w b v.
+        let at = one.iter().position(|&x| x == v).unwrap_or(0);
+        let (a, b) = (one[(at + 1) % 3], one[(at + 2) % 3]);
+        let leaning = self.leaning(&[s, t]);
+        let areas = [s, t].map(|t| self.mesh.area(t as usize));
+        self.mesh.triangles[s as usize] = [v, a, w];
+        self.mesh.triangles[t as usize] = [w, b, v];
+        let kept = self.is_wide(&[s, t], &areas)
+            && (!upright || self.leaning(&[s, t]) <= leaning)
+            && self.is_embedded(&[s, t]);
+        if !kept {
+            self.mesh.triangles[s as usize] = one;
+            self.mesh.triangles[t as usize] = two;
+            return None;
+        }
+        let mut change = |x: u32, lost: Option<u32>, won: Option<u32>| {
+            if let Some(star) = self.stars.get_mut(self.which[x as usize] as usize) {
+                star.retain(|t| Some(*t) != lost);
+                star.extend(won);
+            }
+        };
+        change(v, None, Some(t));
+        change(w, None, Some(s));
+        change(a, Some(t), None);
+        change(b, Some(s), None);
+        self.stray(&[s, t]);
+        Some([a, b])
+    }
+
+    /// True if the triangles beside the edge from `v` to `w` turn by more than `cosine`.
+    pub fn is_sharp(&self, v: u32, w: u32, cosine: f64) -> bool {
+        let beside: Vec<DVec3> = self
+            .star(v)
+            .iter()
+            .filter(|&&t| self.mesh.triangles[t as usize].contains(&w))
+            .map(|&t| self.mesh.normal(t as usize))
+            .collect();
+        beside.len() == 2 && beside[0].dot(beside[1]) < cosine
+    }
+
+    /// True if no triangle has too little area, or less than it had if that was too little already.
+    fn is_wide(&self, changed: &[u32], before: &[f64]) -> bool {
+        changed.iter().zip(before).all(|(&t, &b)| {
+            let area = self.mesh.area(t as usize);
+            area > self.least || area > b
+        })
+    }
+
+    /// Triangles that lean away from the normals of all hits among their corners; those that face against them weigh
+    /// twice.
+    fn leaning(&self, triangles: &[u32]) -> usize {
+        triangles
+            .iter()
+            .map(|&t| {
+                let names = self.mesh.triangles[t as usize];
+                if names == GONE {
+                    return 0;
+                }
+                let n = self.mesh.normal(t as usize);
+                let best = names.iter().filter_map(|&v| self.normal(v)).map(|m| m.dot(n)).fold(f64::NAN, f64::max);
+                (best <= LEAN) as usize + (best <= 0.0) as usize
+            })
+            .sum()
+    }
+
+    /// Triangles around `v` that face against their hits.
+    pub fn turned(&self, v: u32) -> usize {
+        let against = |t: u32| {
+            let n = self.mesh.normal(t as usize);
+            let names = self.mesh.triangles[t as usize];
+            names.iter().filter_map(|&v| self.normal(v)).map(|m| m.dot(n)).fold(f64::NAN, f64::max) <= 0.0
+        };
+        self.star(v).iter().filter(|&&t| against(t)).count()
+    }
+
+    /// Normal of a hit; none for other vertices.
+    pub fn normal(&self, v: u32) -> Option<DVec3> {
+        let axis = (0..3).rev().find(|&a| v >= self.base[a])?;
+        self.field.axes[axis].hits.get((v - self.base[axis]) as usize).map(|h| h.normal)
+    }
+
+    /// True if the changed triangles, as they are now, meet nothing and not each other.
+    fn is_embedded(&self, changed: &[u32]) -> bool {
+        let bounds = |t: u32| {
+            let [a, b, c] = self.mesh.corners(t as usize);
+            (a.min(b).min(c), a.max(b).max(c))
+        };
+        let meet = |s: u32, (low, high): (DVec3, DVec3), t: u32| {
+            let (l, h) = bounds(t);
+            !(l.cmpgt(high).any() || h.cmplt(low).any())
+                && triangles_meet(
+                    self.mesh.corners(s as usize),
+                    self.mesh.triangles[s as usize],
+                    self.mesh.corners(t as usize),
+                    self.mesh.triangles[t as usize],
+                )
+        };
+        let mut sorted = changed.to_vec();
+        sorted.sort_unstable();
+        changed.iter().enumerate().all(|(n, &s)| {
+            let own = bounds(s);
+            changed[..n].iter().all(|&t| !meet(s, own, t))
+                && self
+                    .near(own.0, own.1)
+                    .into_iter()
+                    .filter(|t| sorted.binary_search(t).is_err())
+                    .all(|t| !meet(s, own, t))
+        })
+    }
+
+    fn cell(&self, p: DVec3) -> [i64; 3] {
+        let l = &self.field.lattice;
+        ((p - l.origin) / l.step).floor().to_array().map(|x| x as i64)
+    }
+
+    fn stray(&mut self, changed: &[u32]) {
+        for &t in changed {
+            let [a, b, c] = self.mesh.corners(t as usize);
+            let (low, high) = (self.cell(a.min(b).min(c)), self.cell(a.max(b).max(c)));
+            for z in low[2]..=high[2] {
+                for y in low[1]..=high[1] {
+                    for x in low[0]..=high[0] {
+                        let list = self.strays.entry([x, y, z]).or_default();
+                        if !list.contains(&t) {
+                            list.push(t);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Triangles that may reach into a box.
+    fn near(&self, low: DVec3, high: DVec3) -> Vec<u32> {
+        // A vertex may lie on the very face of its cell.
+        let (a, b) = (self.cell(low).map(|x| x - 1), self.cell(high).map(|x| x + 1));
+        let clamp = |x: i64| x.max(0) as u32;
+        let mut found = Vec::new();
+        for z in clamp(a[2])..=clamp(b[2]) {
+            for y in clamp(a[1])..=clamp(b[1]) {
+                let (x0, x1) = (clamp(a[0]), clamp(b[0]));
+                let first = self.cells.partition_point(|(c, ..)| [c[2], c[1], c[0]] < [z, y, x0]);
+                for &(c, first, end) in &self.cells[first..] {
+                    if c[2] != z || c[1] != y || c[0] > x1 {
+                        break;
+                    }
+                    found.extend(first..end);
+                }
+                for x in x0..=x1 {
+                    if let Some(list) = self.strays.get(&[x as i64, y as i64, z as i64]) {
+                        found.extend(list);
+                    }
+                }
+            }
+        }
+        // Merged cells name their triangles in each of their parts.
+        found.sort_unstable();
+        found.dedup();
+        found.retain(|&t| self.mesh.triangles[t as usize] != GONE);
+        found
+    }
+}
