@@ -23,6 +23,9 @@ const TUKEY: f64 = 4.685;
 const ROUNDS: usize = 3;
 /// Family B is tried when the fourth-order term of the height field is above this share of the residual.
 const ORDER_FOUR_SHARE: f64 = 0.2;
+/// A general quadric has one sheet in its ball if its gradient varies by less than its own length; else it may be a
+/// hyperbola that takes both faces of an edge.
+const ONE_SHEET: f64 = 1.0;
 /// Fewest points of effective weight: two more than the six parameters of a height field.
 pub(super) const FEWEST: f64 = 8.0;
 
@@ -283,9 +286,9 @@ fn choose(
         && let Some(b) = general(m, &a)
     {
         let general_rss = squared(&b, points, weights);
-        if score(general_rss, 9.0) < score(rss, 6.0) {
-            // A general quadric may have come out inside out; the sign of the height field is kept.
-            let q = Quadric { center: DVec3::ZERO, scale: 1.0, a: b };
+        // A general quadric may have come out inside out; the sign of the height field is kept.
+        let q = Quadric { center: DVec3::ZERO, scale: 1.0, a: b };
+        if score(general_rss, 9.0) < score(rss, 6.0) && q.variation(m.mean(), reach) < ONE_SHEET {
             let along = q.value(m.mean()).1.dot(curved.frame.n);
             best = (if along < 0.0 { b.map(|x| -x) } else { b }, 9.0, general_rss);
         }

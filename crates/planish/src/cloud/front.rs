@@ -13,7 +13,8 @@
 
 use super::Quadric;
 use super::fit::{Sheet, Weighted, kernel, localized, sheet};
-use super::sites::{Sites, in_pieces};
+use super::nest::{LIMIT, Seen, cost, nest};
+use super::sites::{APART, Sites, in_pieces};
 use crate::geom::KdTree;
 use crate::observe::Observer;
 use glam::DVec3;
@@ -25,30 +26,32 @@ const CLASSES: [f64; 5] = [0.4, 0.6, 0.75, 0.85, 0.94];
 const VARIATION: f64 = 0.25;
 /// Weight of noise over radius (a_2).
 const ROUGHNESS: f64 = 1.0;
-/// Residuals above this many noise levels are explained by no sheet.
-const LIMIT: f64 = 3.0;
 /// What a carried-on sheet must explain, in squared noise levels: the freedom of its choice.
-const PRICE: f64 = 10.0;
-/// The same for a fit of its own: six parameters, each worth two.
-const OWN_PRICE: f64 = 16.0;
+pub(super) const PRICE: f64 = 14.0;
+/// And for every change of its direction by one within the ball: what is flat is likelier than what is round.
+pub(super) const VARIATION_PRICE: f64 = 10.0;
+/// Most sheets at one site whose signs are not known yet.
+const MOST: usize = 2;
+/// What a fit of its own must explain: six parameters, each worth two.
+const OWN_PRICE: f64 = 12.0;
+/// A fit of its own is not questioned if its points cost at most this much each, in squared noise levels.
+const PLAIN: f64 = 1.05;
+/// Sheets explain points that cost at most this much each, in squared noise levels, and what chance adds.
+const EXPLAINED: f64 = 1.15;
+/// The points of a crease are looked at this many times as far as one sheet holds, at most.
+const WIDE: f64 = 2.0;
 /// Cosine of 20 degrees: sheets that meet flatter are one, with a bend.
 const TURNED: f64 = 0.94;
-/// Noise levels between two sheets that can be told apart.
-const APART: f64 = 2.5;
 /// Points that must be nearest to a sheet.
 const NEEDED: usize = 3;
 /// Neighbours asked whether they carry a sheet on, how many must, and how far off they may be over their distance.
 const AROUND: usize = 16;
 const COMPANY: usize = 4;
 const OFFSET: f64 = 0.12;
-/// Most sheets at one site: a corner of four faces.
-const MOST: usize = 4;
 /// Sheets of fitted neighbours that are asked.
 const ASKED: usize = 16;
 /// Fitted neighbours are sought within this many radii.
 const FARTHEST: f64 = 3.0;
-/// A sheet is kept by a site if it owns this share of the points of the site.
-const SHARE: f64 = 0.12;
 /// Fits that guide others have an expected error below this share of the noise.
 const SURE: f64 = 0.35;
 /// A carried-on sheet begins with the ball that it has, at most this many times that of the site.
@@ -58,6 +61,10 @@ const STRAY: f64 = 0.011;
 /// Ratio of one ball to the next when a sheet grows, and how often it grows at most.
 const WIDEN: f64 = 1.35;
 const STEPS: usize = 3;
+
+/// A ball of so many points leaves a tenth of the noise; if it is this many noise levels wide it grows no further.
+pub(super) const PLENTY: usize = 700;
+pub(super) const WIDE_ENOUGH: f64 = 10.0;
 
 /// A fitted sample of the surface: not oriented yet.
 #[derive(Clone, Copy, Debug)]
@@ -93,12 +100,6 @@ pub(super) fn grow(points: &[DVec3], tree: &KdTree, sites: &Sites, observer: &dy
         .collect();
     let mut ranks: Vec<u32> = (0..irregularity.len() as u32).collect();
     ranks.sort_by(|&a, &b| irregularity[a as usize].total_cmp(&irregularity[b as usize]).then(a.cmp(&b)));
-    let mut owned: Vec<Vec<u32>> = vec![Vec::new(); sites.point.len()];
-    for (i, &o) in sites.owner.iter().enumerate() {
-        if o != u32::MAX {
-            owned[o as usize].push(i as u32);
-        }
-    }
     let mut closed: Vec<Fit> = Vec::new();
     let mut start = 0;
     for class in 0..=CLASSES.len() {
@@ -112,8 +113,7 @@ pub(super) fn grow(points: &[DVec3], tree: &KdTree, sites: &Sites, observer: &dy
         let snapshot = &closed;
         let fitted = in_pieces(open.len(), (span[0], span[1]), observer, |_, k| {
             let site = open[k] as usize;
-            let own = &owned[site];
-            fit_site(points, tree, sites, own, site, irregularity[site], class as u8, snapshot, &closed_tree)
+            fit_site(tree, sites, site, irregularity[site], class as u8, snapshot, &closed_tree)
         })?;
         closed.extend(fitted.into_iter().flatten());
     }
@@ -171,10 +171,8 @@ fn accompanied(fits: Vec<Fit>) -> Vec<Fit> {
 }
 
 fn fit_site(
-    points: &[DVec3],
     tree: &KdTree,
     sites: &Sites,
-    owned: &[u32],
     site: usize,
     irregularity: f64,
     class: u8,
@@ -184,16 +182,18 @@ fn fit_site(
     let survey = &sites.survey[site];
     let p = survey.quadric.center;
     let noise = sites.prior[site].noise.min(survey.noise).max(1e-300);
-    let (starts, rivals) = if class == 0 {
-        (vec![Start { sheet: survey.quadric, at: p, radius: survey.radius }], Vec::new())
+    let starts = if class == 0 {
+        vec![Start { sheet: survey.quadric, at: p, radius: survey.radius }]
     } else {
-        choose(points, tree, owned, survey.radius, survey.quadric, noise, closed, closed_tree)
+        choose(tree, survey.radius, sites.gap[site] / APART, survey.quadric, noise, closed, closed_tree)
     };
     let sheets = starts.len() as u8;
+    let all: Vec<Quadric> = starts.iter().map(|s| s.sheet).collect();
     starts
         .into_iter()
-        .filter_map(|Start { sheet: start, at, radius }| {
-            let others: Vec<Quadric> = rivals.iter().filter(|r| differ(r, &start, at, noise)).copied().collect();
+        .enumerate()
+        .filter_map(|(k, Start { sheet: start, at, radius })| {
+            let others: Vec<Quadric> = (0..all.len()).filter(|&i| i != k).map(|i| all[i]).collect();
             let (s, radius, error) = widen(tree, at, radius, &start, &others, noise)?;
             let (center, normal) = s.quadric.project(at);
             Some(Fit {
@@ -213,23 +213,33 @@ fn fit_site(
         .collect()
 }
 
-/// The sheets that explain the points of a site, each with the middle of the points that it owns there.
+/// The sheets that explain the points around a site, each with the middle of the points that are nearest to it there.
 fn choose(
-    points: &[DVec3],
     tree: &KdTree,
-    owned: &[u32],
     radius: f64,
+    usual: f64,
     own: Quadric,
     noise: f64,
     closed: &[Fit],
     closed_tree: &KdTree,
-) -> (Vec<Start>, Vec<Quadric>) {
+) -> Vec<Start> {
     let p = own.center;
+    let alone = vec![Start { sheet: own, at: p, radius }];
+    // A crease has a narrow ball because one sheet is no model there; with the right sheets a usual ball will do.
+    let wide = usual.clamp(radius, WIDE * radius);
+    let mut ball = Vec::new();
+    tree.within(p, wide, |_, q, _| ball.push(q));
+    let residuals = |q: &Quadric| -> Vec<f64> { ball.iter().map(|&x| q.distance(x).0 / noise).collect() };
+    let count = ball.len() as f64;
+    let good = count * (EXPLAINED + 2.0 * (2.0 / count).sqrt());
+    let own_cost = cost(&residuals(&own));
+    if own_cost < PLAIN * count {
+        return alone;
+    }
     let mut near = Vec::new();
-    closed_tree.within(p, FARTHEST * radius, |i, _, d2| near.push((d2, i)));
+    closed_tree.within(p, FARTHEST * wide, |i, _, d2| near.push((d2, i)));
     near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut asked: Vec<Quadric> = Vec::new();
-    let mut radii: Vec<f64> = Vec::new();
+    let mut asked: Vec<(Quadric, f64)> = Vec::new();
     for &(_, i) in &near {
         let f = &closed[i as usize];
         if f.error > SURE * noise {
@@ -238,74 +248,48 @@ fn choose(
         let (d, n) = f.quadric.distance(p);
         // Two that say the same here are one: same offset within the noise, same direction within 8 degrees.
         let known = asked.iter().any(|a| {
-            let (e, m) = a.distance(p);
+            let (e, m) = a.0.distance(p);
             let turn = n.dot(m);
             turn.abs() > 0.99 && (d - e * turn.signum()).abs() < 0.7 * noise
         });
-        if !known && d.abs() < radius {
-            asked.push(f.quadric);
-            radii.push(f.radius);
+        if !known && d.abs() < wide {
+            asked.push((f.quadric, f.radius));
             if asked.len() == ASKED {
                 break;
             }
         }
     }
-    let mut ball = Vec::new();
-    tree.within(p, radius, |_, q, _| ball.push(q));
-    let cost = |q: &Quadric| -> Vec<f64> {
-        ball.iter().map(|&x| (q.distance(x).0 / noise).powi(2).min(LIMIT * LIMIT)).collect()
-    };
-    asked.push(own);
-    radii.push(radius);
-    let costs: Vec<Vec<f64>> = asked.iter().map(cost).collect();
-    let price = |i: usize| if i + 1 == asked.len() { OWN_PRICE } else { PRICE };
-    let mut least = vec![LIMIT * LIMIT; ball.len()];
-    let mut chosen: Vec<usize> = Vec::new();
-    while chosen.len() < MOST {
-        let total: f64 = least.iter().sum();
-        let best = (0..asked.len())
-            .filter(|&i| chosen.iter().all(|&c| differ(&asked[i], &asked[c], p, noise)))
-            .map(|i| (costs[i].iter().zip(&least).map(|(a, b)| a.min(*b)).sum::<f64>() + price(i), i))
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((next, i)) = best else { break };
-        if next >= total {
-            break;
-        }
-        chosen.push(i);
-        least.iter_mut().zip(&costs[i]).for_each(|(l, c)| *l = l.min(*c));
+    let all: Vec<Seen> =
+        asked.iter().map(|a| Seen { residuals: residuals(&a.0), normal: a.0.distance(p).1, price: PRICE }).collect();
+    let Some(found) = nest(&all, true, MOST) else { return alone };
+    if found.cost + PRICE * (found.order.len() - 1) as f64
+        > (good + PRICE * (found.order.len() - 1) as f64).min(own_cost + OWN_PRICE)
+    {
+        return alone;
     }
-    let alone = Start { sheet: own, at: p, radius };
-    if chosen.is_empty() {
-        return (vec![alone], Vec::new());
-    }
-    // Who owns the points of the site.
-    let mut own_points = vec![(0usize, DVec3::ZERO); chosen.len()];
-    for &i in owned {
-        let q = points[i as usize];
-        let (k, d) = chosen
-            .iter()
-            .enumerate()
-            .map(|(k, &c)| (k, asked[c].distance(q).0.abs()))
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .expect("a sheet is chosen");
-        if d < LIMIT * noise {
-            own_points[k].0 += 1;
-            own_points[k].1 += q;
+    // The points nearest to each sheet tell where it begins to grow.
+    let mut middle = vec![(0usize, DVec3::ZERO); found.order.len()];
+    for (i, &q) in ball.iter().enumerate() {
+        let (d, k) = (0..found.order.len())
+            .map(|k| (all[found.order[k]].residuals[i].abs(), k))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .expect("a nesting has a sheet");
+        if d < LIMIT {
+            middle[k].0 += 1;
+            middle[k].1 += q;
         }
     }
-    let enough = SHARE * owned.len() as f64;
-    let kept: Vec<Start> = chosen
+    found
+        .order
         .iter()
-        .zip(&own_points)
-        .filter(|(_, o)| o.0 > 0 && o.0 as f64 >= enough)
-        .map(|(&c, o)| Start {
-            sheet: asked[c],
-            at: o.1 / o.0 as f64,
-            radius: if c + 1 == asked.len() { radius } else { radii[c].min(CARRIED * radius).max(radius) },
+        .zip(&middle)
+        .filter(|(_, m)| m.0 > 0)
+        .map(|(&k, m)| Start {
+            sheet: asked[k].0,
+            at: m.1 / m.0 as f64,
+            radius: asked[k].1.min(CARRIED * radius).max(radius),
         })
-        .collect();
-    asked.pop();
-    if kept.is_empty() { (vec![alone], Vec::new()) } else { (kept, asked) }
+        .collect()
 }
 
 /// Where a sheet begins to grow.
@@ -313,13 +297,6 @@ struct Start {
     sheet: Quadric,
     at: DVec3,
     radius: f64,
-}
-
-/// Two sheets are two if they meet at an angle or lie apart.
-fn differ(a: &Quadric, b: &Quadric, p: DVec3, noise: f64) -> bool {
-    let ((d, n), (e, m)) = (a.distance(p), b.distance(p));
-    let turn = n.dot(m);
-    turn.abs() < TURNED || (d - e * turn.signum()).abs() > APART * noise
 }
 
 /// Fits a sheet from a first guess and widens its ball while its own points show no bias: sheet, radius, expected error.
@@ -350,6 +327,10 @@ fn widen(
                 ball.push(Weighted { y, weight });
             }
         });
+        // Enough points: more of them cost more than they tell.
+        if step > 0 && ball.len() > PLENTY && r > WIDE_ENOUGH * noise {
+            break;
+        }
         let Some(found) = sheet(p, r, &ball, Some(&guess), noise / r, Some(if step == 0 { 2 } else { 1 })) else {
             if best.is_none() && step < STEPS {
                 continue;

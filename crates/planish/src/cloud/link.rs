@@ -1,8 +1,7 @@
 //! Which samples see each other, and what they say of each other's direction.
 //!
 //! [X03] §7: normals agree along a sheet by the gradient of the neighbour's model at the sample; across an edge the
-//! reflection of one normal along the line to the other tells. In the limit of flat sheets the reflection test says
-//! that both samples lie on the same side of each other's sheet, and that is what is asked here.
+//! reflection of one normal along the line to the other tells; besides, both must lie on the same side of each other.
 
 use super::front::Fit;
 use crate::geom::KdTree;
@@ -14,7 +13,13 @@ const ASKED: usize = 14;
 /// Cosine above which two sheets may be one.
 const SMOOTH: f64 = 0.8;
 /// Offset of one sheet at the other's centre, over their distance, up to which they may be one.
-const LEVEL: f64 = 0.45;
+const LEVEL: f64 = 0.05;
+
+/// Cosine between a normal and the reflection of the other from which they are opposite points ([X03] §7: sqrt(3) / 2).
+const OPPOSITE: f64 = 0.866;
+
+/// Power of the ratio of the noise of two samples in the weight of their vote.
+const THICK: i32 = 6;
 
 /// What one sample says of another.
 #[derive(Clone, Copy, Debug)]
@@ -56,8 +61,10 @@ fn vote(fits: &[Fit], i: usize, j: usize) -> Option<Vote> {
     let (d, n) = f.quadric.distance(g.center);
     let (e, m) = g.quadric.distance(f.center);
     let turn = n.dot(g.normal) + m.dot(f.normal);
-    let near = (1.0 - apart / (2.0 * reach)).max(0.01);
-    let slack = LEVEL * apart + f.error + g.error;
+    // A fit through two sheets at once is thicker than what is around it, and speaks for neither.
+    let alike = (f.noise.min(g.noise) / f.noise.max(g.noise).max(1e-300)).powi(THICK).max(1e-6);
+    let near = (1.0 - apart / (2.0 * reach)).max(0.01) * alike;
+    let slack = LEVEL * apart + 3.0 * (f.error + g.error);
     if turn.abs() > 2.0 * SMOOTH && d.abs() < slack && e.abs() < slack {
         let level = 1.0 - d.abs().max(e.abs()) / slack;
         let straight = (turn.abs() / 2.0 - SMOOTH) / (1.0 - SMOOTH);
@@ -65,17 +72,22 @@ fn vote(fits: &[Fit], i: usize, j: usize) -> Option<Vote> {
             a: i as u32,
             b: j as u32,
             sign: turn.signum(),
-            weight: (1.0 + level + straight) * near,
+            weight: (0.05 + 3.0 * level * straight) * near,
             smooth: true,
         });
     }
-    // Seen from each other: how clearly each lies on one side of the other.
+    // The reflection of one normal along the line to the other must be the other normal or its opposite, and both must
+    // lie on the same side of each other: else these two are no opposite points and tell nothing.
+    let way = (g.center - f.center) / apart.max(1e-300);
+    let mirrored = (f.normal - 2.0 * f.normal.dot(way) * way).dot(g.normal);
+    let sign = (d * e).signum();
+    let like = (mirrored * sign - OPPOSITE) / (1.0 - OPPOSITE);
     let clear = (d.abs().min(e.abs()) / apart.max(1e-300)).min(1.0);
-    let evidence = clear * near * 0.5;
+    let evidence = clear * near * 0.5 * like;
     (evidence > 0.0 && evidence.is_finite()).then_some(Vote {
         a: i as u32,
         b: j as u32,
-        sign: (d * e).signum(),
+        sign,
         weight: evidence,
         smooth: false,
     })

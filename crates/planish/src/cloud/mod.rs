@@ -8,18 +8,23 @@
 //!
 //! The blend (§4.2, eq. 4) is `field::SampleField`. Where a step departs from the paper its file says so.
 
+mod blend;
+mod cells;
 mod dense;
 mod dipoles;
 mod fit;
 mod front;
 mod link;
 mod moments;
+mod nest;
 mod orient;
 mod project;
 mod quadric;
 mod sites;
 mod survey;
 
+pub use blend::{Blend, Blended};
+pub use cells::Cell;
 pub use dipoles::Dipoles;
 pub use project::{Cleaned, ProjectParams, project};
 pub use quadric::Quadric;
@@ -176,6 +181,8 @@ pub struct Sample {
 pub struct Samples {
     /// The samples.
     pub samples: Vec<Sample>,
+    /// How the sheets of the samples join around every site.
+    pub cells: Vec<Cell>,
     /// Standard deviation of the points, world units: the middle of all places.
     pub noise: f64,
     /// Distance of neighbouring points, world units: the middle of all places.
@@ -202,7 +209,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
     if sites.point.is_empty() {
         return Err(CloudError::NoSurface { points: points.len() });
     }
-    let fits = front::grow(&points, &tree, &sites, &part(0.45, 0.9)).ok_or(CloudError::Cancelled)?;
+    let fits = front::grow(&points, &tree, &sites, &part(0.45, 0.85)).ok_or(CloudError::Cancelled)?;
     if fits.is_empty() {
         return Err(CloudError::NoSurface { points: points.len() });
     }
@@ -214,7 +221,6 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
     let toward = toward_scanner(cloud, &ids, &fits, &sites);
     let hints = Hints { toward: toward.as_deref(), normals: normals.as_deref(), areas: &areas };
     let oriented = orient::orient(&fits, &votes, &hints);
-    observer.progress(1.0);
     let samples: Vec<Sample> = fits
         .iter()
         .enumerate()
@@ -226,7 +232,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
                 normal: f.normal * sign,
                 quadric: if sign < 0.0 { f.quadric.flipped() } else { f.quadric },
                 radius: f.radius,
-                support: 1.15 * survey.radius.max(sites.gap[f.site as usize] * 2.0),
+                support: sites.support(f.site as usize),
                 error: f.error,
                 trust: (survey.radius / f.error.max(1e-6 * survey.radius)).min(1e6).powi(2),
                 noise: f.noise,
@@ -239,6 +245,10 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
             }
         })
         .collect();
+    let of_site: Vec<u32> = fits.iter().map(|f| f.site).collect();
+    let cells =
+        cells::cells(&points, &tree, &sites, &samples, &of_site, &part(0.9, 1.0)).ok_or(CloudError::Cancelled)?;
+    observer.progress(1.0);
     let middle = |mut v: Vec<f64>| {
         v.sort_unstable_by(f64::total_cmp);
         v[v.len() / 2]
@@ -250,6 +260,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
         spacing: middle(sites.survey.iter().map(|s| s.spacing).collect()),
         normal_noise_deg: slope.to_degrees(),
         samples,
+        cells,
         closed: oriented.closed,
         diagonal: Aabb::of(&points).diagonal(),
     })

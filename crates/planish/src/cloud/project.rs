@@ -4,7 +4,7 @@
 //! both sheets meet, thinned and joined.
 
 use super::sites::cover;
-use super::{Cloud, CloudError, Samples};
+use super::{Blend, Cloud, CloudError, Samples};
 use crate::geom::KdTree;
 use crate::mesh::Attribute;
 use crate::observe::Observer;
@@ -21,6 +21,8 @@ const SHARP_DEG: f64 = 30.0;
 const BESIDE: f64 = 2.0;
 /// Distance of points of a feature line, in spacings.
 const LINE: f64 = 3.0;
+/// Steps to the surface at most.
+const STEPS: usize = 4;
 /// Points between two looks at the observer.
 const CHUNK: usize = 1 << 15;
 
@@ -56,6 +58,9 @@ struct Placed {
     normal: DVec3,
     sample: u32,
     moved: f64,
+    /// Mean and Gaussian curvature.
+    mean: f64,
+    gauss: f64,
     edge: Option<DVec3>,
     outlier: bool,
 }
@@ -73,6 +78,7 @@ pub fn project(
 ) -> Result<Cleaned, CloudError> {
     let centers: Vec<DVec3> = samples.samples.iter().map(|s| s.center).collect();
     let tree = KdTree::new(&centers);
+    let blend = Blend::new(&samples.cells);
     let finite: Vec<u32> = (0..cloud.points.len() as u32).filter(|&i| cloud.points[i as usize].is_finite()).collect();
     let mut placed: Vec<Placed> = Vec::with_capacity(finite.len());
     while placed.len() < finite.len() {
@@ -81,11 +87,9 @@ pub fn project(
         }
         observer.progress(placed.len() as f64 / finite.len() as f64);
         let range = placed.len()..(placed.len() + CHUNK).min(finite.len());
-        placed.par_extend(
-            range
-                .into_par_iter()
-                .map_init(Vec::new, |near, k| place(cloud.points[finite[k] as usize], samples, &tree, outlier, near)),
-        );
+        placed.par_extend(range.into_par_iter().map_init(Vec::new, |near, k| {
+            place(cloud.points[finite[k] as usize], samples, &tree, &blend, outlier, near)
+        }));
     }
     let outliers = placed.iter().filter(|p| p.outlier).count();
     let inner = (placed.len() - outliers).max(1) as f64;
@@ -119,8 +123,8 @@ pub fn project(
     };
     let mut attributes = vec![
         normal,
-        column("curvature", &|p| sample(p).quadric.curvature(p.at).1),
-        column("gauss", &|p| sample(p).quadric.curvature(p.at).0),
+        column("curvature", &|p| p.mean),
+        column("gauss", &|p| p.gauss),
         column("irregularity", &|p| sample(p).irregularity),
         column("noise", &|p| sample(p).noise),
         column("segment", &|p| sample(p).segment as f64),
@@ -136,38 +140,70 @@ pub fn project(
     Ok(Cleaned { cloud: result, lines, outliers, moved_rms })
 }
 
-fn place(p: DVec3, samples: &Samples, tree: &KdTree, outlier: f64, near: &mut Vec<(f64, u32)>) -> Placed {
+fn place(
+    p: DVec3,
+    samples: &Samples,
+    tree: &KdTree,
+    blend: &Blend,
+    outlier: f64,
+    near: &mut Vec<(f64, u32)>,
+) -> Placed {
     tree.nearest(p, ASKED, near);
-    let best = near
-        .iter()
-        .map(|n| {
-            let s = &samples.samples[n.1 as usize];
-            let noise = s.noise.max(1e-9 * s.radius);
-            ((s.quadric.distance(p).0 / noise).powi(2) + 4.0 * n.0 / (s.support * s.support), n.1)
-        })
-        .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
-        .map_or(0, |b| b.1);
-    let s = &samples.samples[best as usize];
-    let (at, normal) = s.quadric.project(p);
-    let moved = at.distance(p);
-    let noise = s.noise.max(samples.noise);
-    let off = s.center.distance(p) > s.support + outlier * noise;
-    let astray = moved > outlier * noise.max(1e-9 * s.radius) || off || !at.is_finite();
-    let mut edge = None;
-    if !astray {
-        for n in near.iter() {
-            let t = &samples.samples[n.1 as usize];
-            let (d, m) = t.quadric.distance(at);
-            if m.dot(normal) < SHARP_DEG.to_radians().cos()
-                && d.abs() < BESIDE * noise + samples.spacing
-                && n.0.sqrt() < t.support
-            {
-                edge = meet(s.quadric, t.quadric, at);
-                break;
-            }
+    let first = near.first().map_or(0, |n| n.1);
+    let stray = |moved: f64| Placed {
+        at: p,
+        normal: samples.samples[first as usize].normal,
+        sample: first,
+        moved,
+        mean: 0.0,
+        gauss: 0.0,
+        edge: None,
+        outlier: true,
+    };
+    // Down the gradient to the surface; the blend is no exact distance, so more than once.
+    let mut at = p;
+    let mut here = None;
+    for _ in 0..STEPS {
+        let Some(b) = blend.at(at) else { return stray(f64::INFINITY) };
+        at -= b.value * b.normal;
+        here = Some(b);
+        if b.value.abs() < 1e-9 * samples.diagonal {
+            break;
         }
     }
-    Placed { at: if astray { p } else { at }, normal, sample: best, moved, edge, outlier: astray }
+    let Some(here) = here else { return stray(f64::INFINITY) };
+    // The sample that stands for the point: near, and of its side.
+    let sample = near
+        .iter()
+        .find(|n| samples.samples[n.1 as usize].normal.dot(here.normal) > SHARP_DEG.to_radians().cos())
+        .map_or(first, |n| n.1);
+    let s = &samples.samples[sample as usize];
+    let moved = at.distance(p);
+    let noise = s.noise.max(samples.noise);
+    let off = near.first().is_none_or(|n| n.0.sqrt() > s.support + outlier * noise);
+    if moved > outlier * noise.max(1e-9 * s.radius) || off || !at.is_finite() {
+        return stray(moved);
+    }
+    // The sheets of the heaviest cell: the one here tells the curvature, another close by an edge.
+    let cell = &blend.cells()[here.cell];
+    let sheets = &cell.sheets[..cell.count as usize];
+    let own = sheets
+        .iter()
+        .map(|q| (q.distance(at), q))
+        .filter(|((_, n), _)| n.dot(here.normal) > SHARP_DEG.to_radians().cos())
+        .min_by(|a, b| a.0.0.abs().total_cmp(&b.0.0.abs()));
+    let (mut edge, mut bend) = (None, (0.0, 0.0));
+    if let Some((_, own)) = own {
+        bend = own.curvature(at);
+        edge = sheets
+            .iter()
+            .filter(|q| {
+                let (d, n) = q.distance(at);
+                n.dot(here.normal) < SHARP_DEG.to_radians().cos() && d.abs() < BESIDE * noise + samples.spacing
+            })
+            .find_map(|q| meet(*own, *q, at));
+    }
+    Placed { at, normal: here.normal, sample, moved, mean: bend.1, gauss: bend.0, edge, outlier: false }
 }
 
 /// Where two sheets meet, near a point: alternating steps onto both.

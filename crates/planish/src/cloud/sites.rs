@@ -10,7 +10,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Distance between sites over the radius of the fits: the blend then meets about eight fits everywhere.
-const APART: f64 = 0.42;
+pub(super) const APART: f64 = 0.5;
 /// Sites stand no closer than for this share of the usual radius: creases have narrow balls, not finer shapes.
 const USUAL: f64 = 0.8;
 /// One point in this many is surveyed to learn the radii.
@@ -140,7 +140,16 @@ pub(super) fn cover(points: &[DVec3], tree: &KdTree, gap: impl Fn(usize) -> f64)
     chosen
 }
 
+/// Support over the radius of the fit, and over the distance of sites: about nine cells hear of every point.
+const SUPPORT: f64 = 1.15;
+const SUPPORT_GAPS: f64 = 2.3;
+
 impl Sites {
+    /// Radius within which a site takes part in the blend.
+    pub(super) fn support(&self, site: usize) -> f64 {
+        (SUPPORT * self.survey[site].radius).max(SUPPORT_GAPS * self.gap[site])
+    }
+
     /// A radius is one draw of a noisy choice: it becomes the lower middle of those around, grown by the way there.
     fn even(&mut self, places: &[DVec3], tree: &KdTree) {
         const SLOPE: f64 = 0.5;

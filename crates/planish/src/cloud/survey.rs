@@ -10,6 +10,7 @@
 
 use super::Quadric;
 use super::fit::{Frame, Height, framed_height};
+use super::front::{PLENTY, WIDE_ENOUGH};
 use super::moments::Moments;
 use crate::geom::KdTree;
 use glam::DVec3;
@@ -116,7 +117,8 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
             }
             scratch.y.extend_from_slice(points);
             let j = first + k;
-            if j > 0 && radius(j) > reach {
+            if j > 0 && (radius(j) > reach || (scratch.y.len() > PLENTY && GROWTH.powi(j as i32) > WIDE_ENOUGH * usual))
+            {
                 break 'rounds;
             }
             let Some(height) = framed_height(&sums.matrix(), Frame::of_moments(&sums)) else { continue };

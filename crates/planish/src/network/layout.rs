@@ -52,8 +52,8 @@ const CROWDED: f64 = 0.05;
 /// Part of the patches of the first draft that counts as forced by the features.
 const FORCED: f64 = 0.85;
 
-/// Rounds of settling for each round of relaxing: a round redraws disjoint unions only.
-const SETTLING: usize = 4;
+/// Rounds of settling for each round of smoothing asked for: a round redraws disjoint unions only.
+const SETTLING: usize = 8;
 
 /// Parameters of [`layout`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

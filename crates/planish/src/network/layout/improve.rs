@@ -13,7 +13,7 @@ use super::slide;
 use crate::network::CurveKind;
 use crate::observe::Observer;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A change must lower the energy by this, so that none is made for rounding; and by this factor more in every
 /// round, for what relaxing undoes would otherwise go back and forth.
@@ -66,7 +66,15 @@ pub(super) fn improve(bench: &mut Bench, patches: usize, observer: &dyn Observer
         observer.progress(0.3 + 0.5 * round as f64 / CHANGE_ROUNDS as f64);
         let least = LEAST_GAIN * GAIN_GROWTH.powi(round as i32);
         let scale = Scale::new(bench, patches);
-        let chosen = choose(bench, unions(&bench.complex), least, &fresh, &mut known, |union| scale.best(union));
+        let chosen = choose(
+            bench,
+            unions(&bench.complex),
+            least,
+            &fresh,
+            &mut known,
+            |union| scale.best(union),
+            |change| nodes_of_one(&bench.complex, change),
+        );
         if chosen.is_empty() {
             break;
         }
@@ -110,7 +118,8 @@ fn settle_some(
         let stars = complex.stars().into_iter().filter_map(|s| star_change(complex, &s));
         let unions: Vec<Change> = arcs.chain(stars).collect();
         let scale = Scale::new(bench, patches);
-        let chosen = choose(bench, unions, LEAST_SETTLING, &fresh, known, |union| scale.redrawn(union));
+        let cells = |change: &Change| change.cells.clone();
+        let chosen = choose(bench, unions, LEAST_SETTLING, &fresh, known, |union| scale.redrawn(union), cells);
         if chosen.is_empty() {
             break;
         }
@@ -121,12 +130,15 @@ fn settle_some(
     Ok(all)
 }
 
+/// The nodes of the cells of a change.
+fn nodes_of_one(complex: &Complex, change: &Change) -> Vec<u32> {
+    change.cells.iter().flat_map(|&c| complex.loop_of(c)).map(|&h| complex.from(h)).collect()
+}
+
 /// Marks the nodes of the cells of `changes`.
 fn nodes_of(complex: &Complex, changes: &[Change]) -> Vec<bool> {
     let mut nodes = vec![false; complex.nodes.len()];
-    for &h in changes.iter().flat_map(|change| &change.cells).flat_map(|&c| complex.loop_of(c)) {
-        nodes[complex.from(h) as usize] = true;
-    }
+    changes.iter().flat_map(|change| nodes_of_one(complex, change)).for_each(|n| nodes[n as usize] = true);
     nodes
 }
 
@@ -145,8 +157,8 @@ fn unions(complex: &Complex) -> Vec<Change> {
     pairs.chain(stars).collect()
 }
 
-/// The changes of `unions` that gain most by `best`, and more than `least`, on disjoint sets of nodes. What is known of
-/// unions without a node in `fresh` is taken from `known`.
+/// The changes of `unions` that gain most by `best`, and more than `least`, such that no two touch the same (`touches`).
+/// What is known of unions without a node in `fresh` is taken from `known`.
 fn choose(
     bench: &Bench,
     unions: Vec<Change>,
@@ -154,11 +166,10 @@ fn choose(
     fresh: &[bool],
     known: &mut Known,
     best: impl Fn(&Change) -> Option<Gain> + Sync,
+    touches: impl Fn(&Change) -> Vec<u32>,
 ) -> Vec<Change> {
     let complex = &bench.complex;
-    let nodes = |change: &Change| -> Vec<u32> {
-        change.cells.iter().flat_map(|&c| complex.loop_of(c)).map(|&h| complex.from(h)).collect()
-    };
+    let nodes = |change: &Change| nodes_of_one(complex, change);
     let gains: Vec<Option<Gain>> = unions
         .par_iter()
         .map(|union| match known.get(&union.removed) {
@@ -170,17 +181,14 @@ fn choose(
     let mut found: Vec<Gain> = gains.into_iter().flatten().filter(|g| g.0 > least).collect();
     // Ties by the cells, so that the order does not depend on how candidates were found.
     found.sort_by(|x, y| y.0.total_cmp(&x.0).then_with(|| x.1.cells.cmp(&y.1.cells)));
-    let mut taken = vec![false; complex.nodes.len()];
+    let mut taken = BTreeSet::new();
     let mut chosen = Vec::new();
     for (_, change) in found {
-        let nodes = nodes(&change);
-        if nodes.iter().any(|&n| taken[n as usize]) {
-            continue;
+        let touched = touches(&change);
+        if !touched.iter().any(|t| taken.contains(t)) {
+            taken.extend(touched);
+            chosen.push(change);
         }
-        for n in nodes {
-            taken[n as usize] = true;
-        }
-        chosen.push(change);
     }
     chosen
 }

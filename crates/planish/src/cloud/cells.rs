@@ -1,0 +1,276 @@
+//! What the surface looks like around every site: one sheet, or a body cut out of several.
+//!
+//! Every site asks which nested maxima and minima (`nest`) of the oriented samples around explain its points. The blend of
+//! these functions keeps edges sharp, and where one site errs its neighbours outvote it.
+
+use super::fit::{Weighted, sheet};
+use super::front::{PRICE, VARIATION_PRICE};
+use super::nest::{self, LIMIT, Seen, cost, nest};
+use super::sites::{Sites, in_pieces};
+use super::{Quadric, Sample};
+use crate::geom::KdTree;
+use crate::observe::Observer;
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// The points that a cell explains lie within this many supports: a fillet and an edge differ only from afar.
+const HEARD: f64 = 1.3;
+/// Most sheets of a cell.
+const MOST: usize = nest::MOST;
+/// Samples within this many supports are candidates.
+const ASIDE: f64 = 2.0;
+/// A sheet is fitted again to at least this many points of its own: twice the parameters of a height field.
+const FEWEST_OWN: usize = 12;
+/// Rounds of that, and what a round may cost more, in squared noise levels.
+const REFINED: usize = 3;
+const WORSE: f64 = 4.0;
+/// Passes over all cells: the second chooses among what the first has found.
+const PASSES: usize = 2;
+/// Squared bias of a cell in the blend for the cost of its points beyond one.
+const BIAS: f64 = 0.5;
+/// Points of a cell at most: these many tell the sheets apart.
+const ENOUGH: usize = 200;
+/// Candidates at most.
+const ASKED: usize = 16;
+/// A cell with one sheet is taken as it is if its points cost at most this much each, in squared noise levels, and what
+/// chance adds.
+const PLAIN: f64 = 1.05;
+/// Of one sheet if the normals differ by less than this cosine (8 degrees) and the offsets by less than so many levels.
+const SAME_TURN: f64 = 0.99;
+const SAME_LEVEL: f64 = 0.7;
+
+/// The surface around a site: nested maxima and minima of sheets.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cell {
+    /// Middle of the points of the site, world units.
+    pub center: DVec3,
+    /// Radius within which it takes part in the blend, world units.
+    pub support: f64,
+    /// Weight in the blend.
+    pub trust: f64,
+    /// The sheets, positive outside; the first `count` hold.
+    pub sheets: [Quadric; MOST],
+    /// Number of sheets.
+    pub count: u8,
+    /// Bit k: sheet k is joined to those before it by the minimum (a concave edge), else by the maximum (a convex one).
+    pub concave: u8,
+}
+
+/// The cells of all sites. `None` if cancelled.
+pub(super) fn cells(
+    points: &[DVec3],
+    tree: &KdTree,
+    sites: &Sites,
+    samples: &[Sample],
+    of_site: &[u32],
+    observer: &dyn Observer,
+) -> Option<Vec<Cell>> {
+    let mut owned = vec![(DVec3::ZERO, 0usize); sites.point.len()];
+    for (p, &o) in points.iter().zip(&sites.owner) {
+        if o != u32::MAX {
+            owned[o as usize].0 += *p;
+            owned[o as usize].1 += 1;
+        }
+    }
+    let places: Vec<Place> = (0..sites.point.len())
+        .map(|site| {
+            let (sum, count) = owned[site];
+            let support = sites.support(site);
+            Place {
+                center: if count > 0 { sum / count as f64 } else { sites.survey[site].quadric.center },
+                support,
+                noise: sites.prior[site].noise.min(sites.survey[site].noise).max(1e-9 * support),
+            }
+        })
+        .collect();
+    let candidate =
+        |(s, &site): (&Sample, &u32)| Candidate { quadric: s.quadric, at: s.center, error: s.error, owner: site };
+    let mut candidates: Vec<Candidate> = samples.iter().zip(of_site).map(candidate).collect();
+    let mut made: Vec<Option<Found>> = vec![None; places.len()];
+    for pass in 0..PASSES {
+        let around = KdTree::new(&candidates.iter().map(|c| c.at).collect::<Vec<_>>());
+        let span = [pass, pass + 1].map(|k| k as f64 / PASSES as f64);
+        let before = &made;
+        let fresh = in_pieces(places.len(), (span[0], span[1]), observer, |_, site| {
+            let old = &before[site];
+            if old.as_ref().is_some_and(|f| f.plain) {
+                return old.clone();
+            }
+            let new = find(&places[site], site as u32, tree, &candidates, &around);
+            match (old, new) {
+                (Some(o), Some(n)) => Some(if n.total < o.total { n } else { o.clone() }),
+                (o, n) => n.or_else(|| o.clone()),
+            }
+        })?;
+        made = fresh;
+        // What the cells found is better than the samples were: faces without what curls at their edges.
+        candidates = made
+            .iter()
+            .enumerate()
+            .flat_map(|(site, f)| {
+                f.iter().flat_map(move |f| {
+                    f.sheets.iter().map(move |s| Candidate { quadric: s.0, at: s.1, error: s.2, owner: site as u32 })
+                })
+            })
+            .collect();
+    }
+    Some(made.iter().zip(&places).filter_map(|(f, p)| f.as_ref().map(|f| f.cell(p))).collect())
+}
+
+/// Where a cell is.
+struct Place {
+    center: DVec3,
+    support: f64,
+    noise: f64,
+}
+
+/// A sheet that a cell may take.
+struct Candidate {
+    quadric: Quadric,
+    at: DVec3,
+    error: f64,
+    owner: u32,
+}
+
+/// What a cell takes: quadric, middle of its points and expected error of every sheet.
+#[derive(Clone)]
+struct Found {
+    sheets: Vec<(Quadric, DVec3, f64)>,
+    concave: u8,
+    /// Cost and prices.
+    total: f64,
+    /// What its points cost on the average, in squared noise levels.
+    cost: f64,
+    /// One sheet that explains all.
+    plain: bool,
+}
+
+impl Found {
+    fn cell(&self, place: &Place) -> Cell {
+        let support = place.support;
+        let mut sheets = [self.sheets[0].0; MOST];
+        sheets.iter_mut().zip(&self.sheets).for_each(|(s, f)| *s = f.0);
+        let error = self.sheets.iter().map(|s| s.2 * s.2).sum::<f64>() / self.sheets.len() as f64;
+        // What the points show beyond noise is bias of the cell.
+        let bias = BIAS * (self.cost - 1.0).max(0.0) * place.noise * place.noise;
+        let trust = support * support / (error + bias).max(1e-12 * support * support);
+        Cell {
+            center: place.center,
+            support,
+            trust: trust.min(1e12),
+            sheets,
+            count: self.sheets.len() as u8,
+            concave: self.concave,
+        }
+    }
+}
+
+fn find(place: &Place, site: u32, tree: &KdTree, candidates: &[Candidate], around: &KdTree) -> Option<Found> {
+    let &Place { center, support, noise } = place;
+    let mut ball = Vec::new();
+    tree.within(center, HEARD * support, |_, q, _| ball.push(q));
+    let all_points = ball;
+    let step = all_points.len().div_ceil(ENOUGH).max(1);
+    let ball: Vec<DVec3> = all_points.iter().copied().step_by(step).collect();
+    let count = ball.len().max(1) as f64;
+    let residuals = |q: &Quadric| -> Vec<f64> { ball.iter().map(|&x| q.distance(x).0 / noise).collect() };
+    // Candidates, those of the site first, then by distance.
+    let mut near: Vec<(f64, u32)> = Vec::new();
+    around.within(center, ASIDE * support, |i, _, d2| {
+        near.push((if candidates[i as usize].owner == site { 0.0 } else { d2 }, i));
+    });
+    near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    if let Some(first) = near.first()
+        && near.get(1).is_none_or(|n| n.0 > 0.0)
+    {
+        let c = &candidates[first.1 as usize];
+        let total = cost(&residuals(&c.quadric));
+        if c.owner == site && total < PLAIN * count + count.sqrt() {
+            let sheets = vec![(c.quadric, c.at, c.error)];
+            return Some(Found { sheets, concave: 0, total, cost: total / count, plain: true });
+        }
+    }
+    let mut asked: Vec<&Candidate> = Vec::new();
+    let mut seen: Vec<(f64, DVec3)> = Vec::new();
+    for &(_, i) in &near {
+        let c = &candidates[i as usize];
+        let (d, n) = c.quadric.distance(center);
+        let known = seen.iter().any(|(e, m)| n.dot(*m) > SAME_TURN && (d - e).abs() < SAME_LEVEL * noise);
+        if !known && d.abs() < support {
+            asked.push(c);
+            seen.push((d, n));
+            if asked.len() == ASKED {
+                break;
+            }
+        }
+    }
+    if asked.is_empty() {
+        return None;
+    }
+    let all: Vec<Seen> = asked
+        .iter()
+        .zip(&seen)
+        .map(|(c, s)| {
+            let price = PRICE + VARIATION_PRICE * c.quadric.variation(c.at, HEARD * support);
+            Seen { residuals: residuals(&c.quadric), normal: s.1, price }
+        })
+        .collect();
+    let found = nest(&all, false, MOST)?;
+    let mut sheets: Vec<(Quadric, DVec3, f64)> =
+        found.order.iter().map(|&k| (asked[k].quadric, asked[k].at, asked[k].error)).collect();
+    let prices = found.total - found.cost;
+    let mut spent = found.cost;
+    // Every point tells of the sheet that decides at it, and of no other; then once more.
+    let rounds = if sheets.len() > 1 { REFINED } else { 0 };
+    for _ in 0..rounds {
+        let better = refined(&sheets, found.concave, place, &all_points);
+        let next = ball.iter().map(|&q| (joined(&better, found.concave, q).1 / noise).powi(2).min(LIMIT * LIMIT)).sum();
+        if next > spent + WORSE {
+            break;
+        }
+        (sheets, spent) = (better, next);
+    }
+    let plain = sheets.len() == 1 && spent < PLAIN * count + count.sqrt();
+    Some(Found { sheets, concave: found.concave, total: spent + prices, cost: spent / count, plain })
+}
+
+/// The sheet that decides at a point and its signed distance.
+fn joined(sheets: &[(Quadric, DVec3, f64)], concave: u8, p: DVec3) -> (usize, f64) {
+    let mut best = (0, sheets[0].0.distance(p).0);
+    for (k, s) in sheets.iter().enumerate().skip(1) {
+        let d = s.0.distance(p).0;
+        if (d < best.1) == (concave >> k & 1 == 1) {
+            best = (k, d);
+        }
+    }
+    best
+}
+
+/// Every sheet fitted again to the points at which it decides.
+fn refined(sheets: &[(Quadric, DVec3, f64)], concave: u8, place: &Place, ball: &[DVec3]) -> Vec<(Quadric, DVec3, f64)> {
+    let radius = HEARD * place.support;
+    let mut points: Vec<Vec<Weighted>> = vec![Vec::new(); sheets.len()];
+    for &q in ball {
+        let (k, d) = joined(sheets, concave, q);
+        if d.abs() < LIMIT * place.noise {
+            points[k].push(Weighted { y: (q - place.center) / radius, weight: 1.0 });
+        }
+    }
+    sheets
+        .iter()
+        .zip(&points)
+        .map(|(old, own)| {
+            if own.len() < FEWEST_OWN {
+                return *old;
+            }
+            let Some(found) = sheet(place.center, radius, own, Some(&old.0), place.noise / radius, Some(1)) else {
+                return *old;
+            };
+            let middle = place.center + radius * own.iter().map(|w| w.y).sum::<DVec3>() / own.len() as f64;
+            let foot = found.quadric.project(middle).0;
+            let fresh = found.quadric.normalized_at(foot);
+            let fresh = if fresh.distance(foot).1.dot(old.0.distance(foot).1) > 0.0 { fresh } else { fresh.flipped() };
+            (fresh, foot, place.noise * (found.parameters / own.len() as f64).sqrt())
+        })
+        .collect()
+}
