@@ -375,12 +375,12 @@ fn patches_beside_a_feature_curve_share_its_nodes_and_the_model_has_no_gaps() {
     let mut model: Model = fitted.model;
     let bvh = Bvh::new(&model.mesh);
     let patches = imprint(&model.mesh, &model.network).unwrap();
-    // Across the first patch, at a third of one side and a half of the other.
+    // Across the first patch, at two fifths of one side and a half of the other.
     let at = |k: usize, share: f64| {
         let chain = &patches[0].sides[k];
         patches[0].mesh.points[chain[((chain.len() - 1) as f64 * share) as usize] as usize]
     };
-    let (p, q) = (at(0, 0.33), at(2, 0.5));
+    let (p, q) = (at(0, 0.4), at(2, 0.5));
     let points: Vec<FacePoint> = (1..20).map(|i| near(&bvh, p.lerp(q, i as f64 / 20.0))).collect();
     let mut edited = model.drawing();
     edited.sketch.features.push(FeatureCurve { patch: 0, family: Family::V, points });
