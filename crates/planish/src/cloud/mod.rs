@@ -20,7 +20,9 @@ mod nest;
 mod orient;
 mod project;
 mod quadric;
+mod scanner;
 mod sites;
+mod strays;
 mod survey;
 
 pub use blend::{Blend, Blended};
@@ -28,6 +30,7 @@ pub use cells::Cell;
 pub use dipoles::Dipoles;
 pub use project::{Cleaned, ProjectParams, project};
 pub use quadric::Quadric;
+pub use scanner::{ScannerParams, VirtualScan, virtual_scan};
 
 use crate::geom::{Aabb, KdTree};
 use crate::mesh::Attribute;
@@ -203,7 +206,7 @@ pub const FEWEST: usize = 18;
 /// [`CloudError`] for too few or collinear points, no surface, or if cancelled.
 pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Result<Samples, CloudError> {
     let (points, ids) = distinct(cloud)?;
-    let tree = KdTree::new(&points);
+    let (points, ids, tree) = strays::without(points, ids);
     let part = |from: f64, to: f64| Part { observer, from, to };
     let sites = sites::choose(&points, &tree, &part(0.0, 0.45)).ok_or(CloudError::Cancelled)?;
     if sites.point.is_empty() {
