@@ -56,6 +56,7 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
         Ok(())
     })?;
     report.stages = vec![read, fit, moved, write];
+    report.input.diagonal = samples.diagonal;
     pipeline::sample_figures(&samples, &mut report.quality, &mut report.warnings);
     figures(&cleaned, &mut report);
     staged.commit()?;

@@ -111,6 +111,8 @@ pub fn from_scan(
         warnings: Vec::new(),
         points: Default::default(),
     };
+    // Outliers are no part of the shape: its size is that of what is left.
+    facts.input.diagonal = made.samples.diagonal;
     pipeline::scan_figures(&made, &mut facts.quality, &mut facts.warnings);
     facts.quality.insert("scan.outliers".into(), pipeline::Figure::Count(points.outliers as u64));
     facts.quality.insert("scan.moved_rms".into(), pipeline::Figure::Number(points.moved_rms));

@@ -60,9 +60,9 @@ pub struct VirtualScan {
 const AWAY: f64 = 2.5;
 /// Places where a station may stand, and spots of the surface that tell what it sees there.
 const PLACES: usize = 160;
-const SPOTS: usize = 2_000;
-/// What a station that sees a spot well adds to it: two stations are wanted for each.
-const MEETINGS: f32 = 0.5;
+const SPOTS: usize = 5_000;
+/// What a station adds to the spots that it sees, of the chance that their hits are kept.
+const MEETINGS: f32 = 1.0;
 /// Pixels along a side of the first look, which tells how many are needed for the points wanted.
 const TRIAL: usize = 64;
 /// Pixels along a side at most.
@@ -178,7 +178,7 @@ fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> Vec<DVec3> {
                 .map(|k| (gain(k) + even(k), k))
                 .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))
                 .map_or(0, |b| b.1);
-            // Several stations see every spot: it is done when the chances add up.
+                // Grazing views add up.
             seen.iter_mut().zip(&chances[best]).for_each(|(s, c)| *s = (*s + MEETINGS * c).min(1.0).max(*s));
             places[best]
         })

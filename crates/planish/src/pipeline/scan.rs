@@ -168,8 +168,10 @@ pub fn scan_figures(made: &ScanMeshed, quality: &mut Quality, warnings: &mut Vec
     sample_figures(&made.samples, quality, warnings);
     quality.insert("scan.specks".into(), Figure::Count(made.specks as u64));
     quality.insert("scan.closed".into(), Figure::Flag(made.closed));
-    quality.insert("scan.to_mesh_rms".into(), Figure::Number(made.to_points.0));
-    quality.insert("scan.to_mesh_mean".into(), Figure::Number(made.to_points.1));
+    for (key, x) in [("rms", made.to_points.0), ("mean", made.to_points.1)] {
+        quality.insert(format!("scan.to_mesh_{key}"), Figure::Number(x));
+        quality.insert(format!("scan.to_mesh_{key}_rel"), Figure::Number(x / made.samples.diagonal));
+    }
 }
 
 /// The figures of samples alone.
@@ -180,6 +182,7 @@ pub fn sample_figures(samples: &Samples, quality: &mut Quality, warnings: &mut V
         ("scan.noise", samples.noise),
         ("scan.noise_rel", samples.noise / samples.diagonal),
         ("scan.spacing", samples.spacing),
+        ("scan.spacing_rel", samples.spacing / samples.diagonal),
         ("scan.confidence", confidence),
         ("scan.normal_noise_deg", samples.normal_noise_deg),
     ];
