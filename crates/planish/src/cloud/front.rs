@@ -84,6 +84,8 @@ pub(super) struct Fit {
     pub site: u32,
     /// Number of sheets of that site.
     pub sheets: u8,
+    /// Distance to the other sheet of a plate or a gap, world units; infinite where there is none.
+    pub gap: f64,
     /// Points that it explains better than its neighbours do.
     pub owned: u32,
 }
@@ -182,7 +184,9 @@ fn fit_site(
     let survey = &sites.survey[site];
     let p = survey.quadric.center;
     let noise = sites.prior[site].noise.min(survey.noise).max(1e-300);
-    let starts = if class == 0 {
+    let starts = if let Some(layer) = survey.layer {
+        [survey.quadric, layer].map(|sheet| Start { sheet, at: sheet.project(p).0, radius: survey.radius }).to_vec()
+    } else if class == 0 {
         vec![Start { sheet: survey.quadric, at: p, radius: survey.radius }]
     } else {
         choose(tree, survey.radius, sites.gap[site] / APART, survey.quadric, noise, closed, closed_tree)
@@ -196,6 +200,7 @@ fn fit_site(
             let others: Vec<Quadric> = (0..all.len()).filter(|&i| i != k).map(|i| all[i]).collect();
             let (s, radius, error) = widen(tree, at, radius, &start, &others, noise)?;
             let (center, normal) = s.quadric.project(at);
+            let gap = others.first().filter(|_| survey.layer.is_some()).map_or(f64::INFINITY, |o| o.distance(center).0.abs());
             Some(Fit {
                 quadric: s.quadric.normalized_at(center),
                 center,
@@ -207,6 +212,7 @@ fn fit_site(
                 class,
                 site: site as u32,
                 sheets,
+                gap,
                 owned: 0,
             })
         })
@@ -293,6 +299,7 @@ fn choose(
 }
 
 /// Where a sheet begins to grow.
+#[derive(Clone, Copy)]
 struct Start {
     sheet: Quadric,
     at: DVec3,

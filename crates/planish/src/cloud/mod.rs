@@ -14,6 +14,7 @@ mod dense;
 mod dipoles;
 mod fit;
 mod front;
+mod layers;
 mod link;
 mod moments;
 mod nest;
@@ -192,6 +193,9 @@ pub struct Samples {
     pub spacing: f64,
     /// Typical error of the normals, degrees.
     pub normal_noise_deg: f64,
+    /// Distance of sheets that were found side by side, the sides of a plate or a gap, world units: all but a twentieth are
+    /// farther apart. Infinite where there are none.
+    pub gap: f64,
     /// Whether each segment is closed.
     pub closed: Vec<bool>,
     /// Bounding-box diagonal of the points, world units.
@@ -262,11 +266,19 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
         noise: middle(sites.survey.iter().map(|s| s.noise).collect()),
         spacing: middle(sites.survey.iter().map(|s| s.spacing).collect()),
         normal_noise_deg: slope.to_degrees(),
+        gap: least_gap(&fits),
         samples,
         cells,
         closed: oriented.closed,
         diagonal: Aabb::of(&points).diagonal(),
     })
+}
+
+/// The twentieth part of the gaps between sheets side by side, if more than a hundredth of the fits have one.
+fn least_gap(fits: &[front::Fit]) -> f64 {
+    let mut gaps: Vec<f64> = fits.iter().map(|f| f.gap).filter(|g| g.is_finite()).collect();
+    gaps.sort_unstable_by(f64::total_cmp);
+    if gaps.len() * 100 > fits.len() { gaps[gaps.len() / 20] } else { f64::INFINITY }
 }
 
 /// A piece of the progress of a stage.

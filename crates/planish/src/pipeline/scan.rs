@@ -57,6 +57,10 @@ pub struct ScanMeshed {
 const CELL_SPACINGS: f64 = 1.6;
 /// A cell is this many noise levels wide.
 const CELL_NOISE: f64 = 1.0;
+/// Cells are at most this many gaps between close sheets wide: walls thinner than a cell break.
+const CELL_GAPS: f64 = 0.6;
+/// But not finer than this share of what suits the points: 16 times as many cells.
+const FINEST: f64 = 0.25;
 /// Components below this share of the area of the largest are specks of noise.
 const SPECK: f64 = 0.005;
 /// Raw points that are measured against the mesh.
@@ -64,7 +68,8 @@ const MEASURED: usize = 50_000;
 
 /// The edge of a cell that suits the samples.
 pub fn voxel_for(samples: &Samples) -> f64 {
-    (CELL_SPACINGS * samples.spacing).max(CELL_NOISE * samples.noise)
+    let usual = (CELL_SPACINGS * samples.spacing).max(CELL_NOISE * samples.noise);
+    usual.min(CELL_GAPS * samples.gap).max(FINEST * usual)
 }
 
 /// Meshes a scan.
