@@ -13,6 +13,7 @@
 
 use super::Quadric;
 use super::fit::{Sheet, Weighted, kernel, localized, sheet};
+use super::layers;
 use super::nest::{LIMIT, Seen, cost, nest};
 use super::sites::{APART, Sites, in_pieces};
 use crate::geom::KdTree;
@@ -193,14 +194,13 @@ fn fit_site(
     };
     let sheets = starts.len() as u8;
     let all: Vec<Quadric> = starts.iter().map(|s| s.sheet).collect();
-    starts
+    let mut fits: Vec<Fit> = starts
         .into_iter()
         .enumerate()
         .filter_map(|(k, Start { sheet: start, at, radius })| {
             let others: Vec<Quadric> = (0..all.len()).filter(|&i| i != k).map(|i| all[i]).collect();
             let (s, radius, error) = widen(tree, at, radius, &start, &others, noise)?;
             let (center, normal) = s.quadric.project(at);
-            let gap = others.first().filter(|_| survey.layer.is_some()).map_or(f64::INFINITY, |o| o.distance(center).0.abs());
             Some(Fit {
                 quadric: s.quadric.normalized_at(center),
                 center,
@@ -212,12 +212,28 @@ fn fit_site(
                 class,
                 site: site as u32,
                 sheets,
-                gap,
+                gap: f64::INFINITY,
                 owned: 0,
             })
         })
-        .collect()
+        .collect();
+    if survey.layer.is_some()
+        && let [f, g] = &mut fits[..]
+    {
+        // The two are a plate or a gap if they still are side by side.
+        let ((d, n), (e, m)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
+        let (d, e, apart) = (d.abs(), e.abs(), f.center.distance(g.center));
+        let parallel = n.dot(g.normal).abs().min(m.dot(f.normal).abs()) > PARALLEL;
+        if parallel && d.max(e).max(apart) < (1.0 + ALIKE) * d.min(e) && d.min(e) > layers::APART * noise {
+            (f.gap, g.gap) = (d, e);
+        }
+    }
+    fits
 }
+
+/// Sheets side by side are parallel by this cosine (10 degrees), and their distance is the same within this share.
+const PARALLEL: f64 = 0.985;
+const ALIKE: f64 = 0.3;
 
 /// The sheets that explain the points around a site, each with the middle of the points that are nearest to it there.
 fn choose(

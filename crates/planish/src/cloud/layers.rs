@@ -17,12 +17,14 @@ const WINDOW: f64 = 0.35;
 /// Points in the dip over those on a sheet, at most: noise has 1.3, an even spread 1, sheets three levels apart two
 /// thirds.
 const DIP: f64 = 0.7;
-/// And the difference in standard deviations of its counts.
-const SURE: f64 = 2.5;
+/// And the difference in standard deviations of its counts: a scan asks a hundred thousand times.
+const SURE: f64 = 3.0;
 /// Sectors around, how many must have both sheets, and the least share of the rarer one there.
 const SECTORS: usize = 8;
 const BOTH: usize = 6;
 const SHARE: f64 = 0.2;
+/// Least distance of the two sheets at any point, in noise levels.
+pub(super) const APART: f64 = 1.2;
 /// Times that points choose the nearer sheet.
 const ROUNDS: usize = 2;
 
@@ -93,10 +95,17 @@ pub(super) fn split(height: &Height, points: &[DVec3]) -> Option<Layers> {
         }
     }
     let left: f64 = points.iter().map(|&y| sheets[0].residual(y).abs().min(sheets[1].residual(y).abs()).powi(2)).sum();
+    let noise = (left / (n - 12.0)).sqrt();
+    // Side by side everywhere: sheets that cross are the faces of an edge.
+    let apart = |y: DVec3| sheets[0].residual(y) - sheets[1].residual(y);
+    let way = apart(DVec3::ZERO).signum();
+    if points.iter().any(|&y| way * apart(y) < APART * noise) {
+        return None;
+    }
     if sheets[1].residual(DVec3::ZERO).abs() < sheets[0].residual(DVec3::ZERO).abs() {
         sheets.swap(0, 1);
     }
-    Some(Layers { sheets, noise: (left / (n - 12.0)).sqrt() })
+    Some(Layers { sheets, noise })
 }
 
 #[cfg(test)]

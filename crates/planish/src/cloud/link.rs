@@ -74,9 +74,12 @@ fn vote(fits: &[Fit], i: usize, j: usize) -> Option<Vote> {
         let sign = -turn.signum();
         return Some(Vote { a: i as u32, b: j as u32, sign, weight: LAYERS, smooth: false });
     }
-    // And no sheet goes on as the other one.
-    let slack = (LEVEL * apart + 3.0 * (f.error + g.error)).min(SIDE * f.gap.min(g.gap));
+    let slack = LEVEL * apart + 3.0 * (f.error + g.error);
     if turn.abs() > 2.0 * SMOOTH && d.abs() < slack && e.abs() < slack {
+        // No sheet of a plate goes on as the other one.
+        if d.abs().max(e.abs()) > SIDE * f.gap.min(g.gap) {
+            return None;
+        }
         let level = 1.0 - d.abs().max(e.abs()) / slack;
         let straight = (turn.abs() / 2.0 - SMOOTH) / (1.0 - SMOOTH);
         return Some(Vote {

@@ -11,8 +11,12 @@ use rayon::prelude::*;
 
 /// The pseudo-distance changes by at most this much per length near the surface.
 const STEEP: f64 = 1.2;
-/// From this share of the support on a point is beside the data.
+/// From this share of the support on a point is beside the data: cells stand less than .45 supports apart.
 const BESIDE: f64 = 0.5;
+/// A winding number closer to one half than this says nothing beside cells, and twice as far off all.
+const UNSURE: f64 = 0.15;
+/// From this share on the winding number decides alone.
+const BEYOND: f64 = 1.0;
 
 /// Points in a row that are asked by one thread.
 const CHUNK: usize = 64;
@@ -57,11 +61,18 @@ impl SampleField {
         if here.aside > BESIDE * BESIDE
             && let Some(dipoles) = &self.closing
         {
-            let far = ((here.aside - BESIDE * BESIDE) / (1.0 - BESIDE * BESIDE)).min(1.0);
+            let far = ((here.aside.sqrt() - BESIDE) / (BEYOND - BESIDE)).min(1.0);
             let share = far * far * (3.0 - 2.0 * far);
             let size = self.blend.cells()[here.cell].support;
-            let winding = |p: DVec3| (0.5 - dipoles.number(p, 0.0)) * size;
-            let value = here.value + share * (winding(p) - here.value);
+            // Beside the data the number has no more than its bounds; close to single dipoles it leaves them.
+            let winding = |p: DVec3| (0.5 - dipoles.number(p, 0.0)).clamp(-0.5, 0.5) * size;
+            let beyond = winding(p);
+            // Where both agree on the side the cells know the distance.
+            if beyond * here.value > 0.0 {
+                return (here.value, here.normal, false);
+            }
+            let share = share * ((beyond.abs() / size - UNSURE) / UNSURE).clamp(0.0, 1.0);
+            let value = here.value + share * (beyond - here.value);
             if !slope {
                 return (value, here.normal, false);
             }
