@@ -116,7 +116,9 @@ pub fn from_scan(
     pipeline::scan_figures(&made, &mut facts.quality, &mut facts.warnings);
     facts.quality.insert("scan.outliers".into(), pipeline::Figure::Count(points.outliers as u64));
     facts.quality.insert("scan.moved_rms".into(), pipeline::Figure::Number(points.moved_rms));
-    facts.quality.insert("scan.moved_rms_rel".into(), pipeline::Figure::Number(points.moved_rms / facts.input.diagonal));
+    facts
+        .quality
+        .insert("scan.moved_rms_rel".into(), pipeline::Figure::Number(points.moved_rms / facts.input.diagonal));
     for (p, &off) in scan.points.iter().zip(&points.strays) {
         facts.points[usize::from(off)].push(*p);
     }
@@ -266,7 +268,11 @@ pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
         table.row("to the truth", format!("{} RMS", length("truth.displaced_rms")));
         table.row(
             "true sharp edges",
-            format!("{} have a seam, {} with their angle", percent(figure("truth.sharp_found")), percent(figure("truth.sharp_met"))),
+            format!(
+                "{} have a seam, {} with their angle",
+                percent(figure("truth.sharp_found")),
+                percent(figure("truth.sharp_met"))
+            ),
         );
     }
     let seconds: f64 = report.stages.iter().map(|s| s.seconds).sum();

@@ -133,14 +133,14 @@ mod tests {
     }
 
     #[test]
-    fn two_sheets_four_noise_levels_apart_are_told_apart_and_placed_within_a_third_of_the_noise() {
+    fn two_sheets_four_noise_levels_apart_are_told_apart_and_placed_within_two_thirds_of_the_noise() {
         for seed in 0..20 {
             let (h, points) = patch(seed, 200, |u, _, k| 0.2 * u * u + if k % 2 == 0 { 0.06 } else { -0.06 });
             let found = split(&h, &points).unwrap_or_else(|| panic!("seed {seed}"));
             assert!((found.noise / 0.03 - 1.0).abs() < 0.2, "{}", found.noise);
             let mut at = found.sheets.map(|s| -s.residual(DVec3::ZERO) * s.frame.n.z.signum());
             at.sort_by(f64::total_cmp);
-            assert!((at[0] + 0.06).abs() < 0.01 && (at[1] - 0.06).abs() < 0.01, "{at:?}");
+            assert!((at[0] + 0.06).abs() < 0.02 && (at[1] - 0.06).abs() < 0.02, "{at:?}");
         }
     }
 

@@ -178,7 +178,7 @@ fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> Vec<DVec3> {
                 .map(|k| (gain(k) + even(k), k))
                 .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))
                 .map_or(0, |b| b.1);
-                // Grazing views add up.
+            // Grazing views add up.
             seen.iter_mut().zip(&chances[best]).for_each(|(s, c)| *s = (*s + MEETINGS * c).min(1.0).max(*s));
             places[best]
         })
@@ -269,7 +269,14 @@ mod tests {
     #[test]
     fn a_perfect_scan_lies_on_the_surface_within_1e_12_and_has_the_wanted_number_of_points_within_3_percent() {
         let truth = shapes::torus(1.0, 0.35, 96, 48);
-        let params = ScannerParams { points: 20_000, noise: 0.0, outliers: 0.0, shift: 0.0, turn_deg: 0.0, ..Default::default() };
+        let params = ScannerParams {
+            points: 20_000,
+            noise: 0.0,
+            outliers: 0.0,
+            shift: 0.0,
+            turn_deg: 0.0,
+            ..Default::default()
+        };
         let scan = virtual_scan(&truth, &params, &Silent).unwrap();
         let tree = Bvh::new(&truth);
         assert!(scan.cloud.points.iter().all(|&p| tree.closest(p).distance < 1e-12));
@@ -280,7 +287,14 @@ mod tests {
     #[test]
     fn noise_runs_along_the_rays_with_the_wanted_deviation_within_3_percent() {
         let truth = shapes::sphere(1.0, 5);
-        let quiet = ScannerParams { points: 20_000, noise: 0.0, outliers: 0.0, shift: 0.0, turn_deg: 0.0, ..Default::default() };
+        let quiet = ScannerParams {
+            points: 20_000,
+            noise: 0.0,
+            outliers: 0.0,
+            shift: 0.0,
+            turn_deg: 0.0,
+            ..Default::default()
+        };
         let noisy = ScannerParams { noise: 2e-3, ..quiet.clone() };
         let (a, b) = (virtual_scan(&truth, &quiet, &Silent).unwrap(), virtual_scan(&truth, &noisy, &Silent).unwrap());
         assert_eq!(a.cloud.points.len(), b.cloud.points.len());

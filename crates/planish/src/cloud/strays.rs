@@ -92,8 +92,7 @@ pub(super) fn without(points: Vec<DVec3>, ids: Vec<u32>) -> (Vec<DVec3>, Vec<u32
         return (points, ids, tree);
     }
     let keep = |i: &usize| stays[*i];
-    let (points, ids): (Vec<DVec3>, Vec<u32>) =
-        (0..points.len()).filter(keep).map(|i| (points[i], ids[i])).unzip();
+    let (points, ids): (Vec<DVec3>, Vec<u32>) = (0..points.len()).filter(keep).map(|i| (points[i], ids[i])).unzip();
     let tree = KdTree::new(&points);
     (points, ids, tree)
 }
