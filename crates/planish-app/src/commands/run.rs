@@ -111,8 +111,6 @@ pub fn from_scan(
         warnings: Vec::new(),
         points: Default::default(),
     };
-    // Outliers are no part of the shape: its size is that of what is left.
-    facts.input.diagonal = made.samples.diagonal;
     pipeline::scan_figures(&made, &mut facts.quality, &mut facts.warnings);
     facts.quality.insert("scan.outliers".into(), pipeline::Figure::Count(points.outliers as u64));
     facts.quality.insert("scan.moved_rms".into(), pipeline::Figure::Number(points.moved_rms));
@@ -205,8 +203,15 @@ pub fn fitted(session: &Session, job: Job, before: Vec<StageRecord>) -> Result<(
         report.stages.push(record);
     }
     if let Some(scan) = job.scan {
-        report.input = scan.input;
+        // Outliers are no part of the shape: its size is that of the mesh, for all figures.
+        let diagonal = report.input.diagonal;
+        report.input = report::Input { diagonal, ..scan.input };
         report.quality.extend(scan.quality);
+        for key in ["scan.noise", "scan.spacing", "scan.moved_rms", "scan.to_mesh_rms", "scan.to_mesh_mean"] {
+            if let Some(x) = report.figure(key) {
+                report.quality.insert(format!("{key}_rel"), pipeline::Figure::Number(x / diagonal));
+            }
+        }
         report.warnings.extend(scan.warnings);
     }
     model.units = units;
