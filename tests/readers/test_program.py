@@ -31,9 +31,18 @@ def test_the_report_has_all_keys_and_relative_figures_are_fractions_of_the_diago
         assert quality[key + "_rel"] * report["input"]["diagonal"] == pytest.approx(quality[key], rel=1e-9)
     for stage in report["stages"]:
         assert stage["seconds"] >= 0 and stage["peak_bytes"] > 0 and isinstance(stage["counts"], dict)
-    assert [s["name"] for s in report["stages"]][:7] == [
-        "repair", "layout", "imprint", "grids", "surfaces", "seams", "relief"
+    assert [s["name"] for s in report["stages"]][:11] == [
+        "shape", "scan", "mesh", "points", "repair", "layout", "imprint", "grids", "surfaces", "seams", "relief"
     ]
+
+
+def test_the_demonstration_is_near_its_truth_and_finds_its_sharp_edges(report):
+    quality = report["quality"]
+    # A fifth of the points of the real one: .1 % away on the average.
+    assert quality["truth.mesh_rms_rel"] < 0.003 and quality["truth.displaced_rms_rel"] < 0.003
+    assert quality["scan.noise_rel"] == pytest.approx(quality["truth.noise_rel"], rel=0.5)
+    assert quality["truth.outliers"] * 0.6 < quality["scan.outliers"] < quality["truth.outliers"] * 3
+    assert quality["truth.sharp_found"] > 0.7 and quality["scan.confidence"] > 0.99
 
 
 def test_displacement_brings_the_surface_nearer_to_the_input(report):

@@ -114,9 +114,6 @@ pub fn from_scan(
     pipeline::scan_figures(&made, &mut facts.quality, &mut facts.warnings);
     facts.quality.insert("scan.outliers".into(), pipeline::Figure::Count(points.outliers as u64));
     facts.quality.insert("scan.moved_rms".into(), pipeline::Figure::Number(points.moved_rms));
-    facts
-        .quality
-        .insert("scan.moved_rms_rel".into(), pipeline::Figure::Number(points.moved_rms / facts.input.diagonal));
     for (p, &off) in scan.points.iter().zip(&points.strays) {
         facts.points[usize::from(off)].push(*p);
     }

@@ -9,7 +9,8 @@
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// A group counts as one from this many of its radii on: right to about 1e-2, and only the nearest half matters.
+/// A group counts as one from this many of its radii on: right to about 4e-2, and only the nearest half matters. (The first
+/// derivative alone does not help: on a round surface the second is as large.)
 const FAR: f64 = 2.5;
 /// Squared radius over which a dipole is spread, over its area: that of its disk is a third.
 const SPREAD: f64 = 0.15;
