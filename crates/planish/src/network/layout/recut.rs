@@ -2,6 +2,7 @@
 //! straight lines of the map. New arcs can therefore neither cross nor leave the union.
 
 use super::complex::{Arc, Complex, Node};
+use super::fan::{self, Fan};
 use super::shape::{Shape, Trace};
 use super::slide::Slide;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
@@ -39,10 +40,10 @@ pub(super) struct Change {
 
 /// The complex cut into the working mesh.
 pub(super) struct Embedding {
-    cut: Cut,
-    adjacency: Adjacency,
+    pub cut: Cut,
+    pub adjacency: Adjacency,
     /// For each half-edge of the cut mesh its half-arc.
-    half_arc: Vec<u32>,
+    pub half_arc: Vec<u32>,
     /// First half-edge of each half-arc.
     first: Vec<u32>,
     /// Faces of each cell, sorted.
@@ -210,7 +211,18 @@ impl Embedding {
         a: u32,
         b: u32,
     ) -> Option<Vec<Place>> {
-        let met = disk.straight(uv, a, b)?;
+        self.polyline((mesh, adjacency), (disk, uv), [a, b], &[])
+    }
+
+    /// The same through points of the map.
+    pub fn polyline(
+        &self,
+        (mesh, adjacency): (&TriMesh, &Adjacency),
+        (disk, uv): (&Disk, &[DVec2]),
+        [a, b]: [u32; 2],
+        via: &[DVec2],
+    ) -> Option<Vec<Place>> {
+        let met = disk.polyline(uv, a, via, b)?;
         let places = met.iter().filter_map(|m| self.on_ground(mesh, adjacency, disk, m));
         let name = |v: u32| self.cut.origin[disk.vertices[v as usize] as usize];
         Some(tighten(mesh, adjacency, [name(a)].into_iter().chain(places).chain([name(b)]).collect()))
@@ -289,6 +301,15 @@ impl Embedding {
             })
         };
         (0..complex.cells.len() as u32).into_par_iter().map(shape).collect()
+    }
+
+    /// The vertices of the cut mesh along a half-arc.
+    pub fn chain(&self, half: u32) -> Vec<u32> {
+        let mut chain = self.cut.chains[half as usize / 2].clone();
+        if half % 2 == 1 {
+            chain.reverse();
+        }
+        chain
     }
 
     /// The vertices inside a disk that are vertices of the working mesh: places for a node.
@@ -395,7 +416,7 @@ pub(super) fn outline_with_cells(complex: &Complex, change: &Change) -> Option<V
 }
 
 /// Takes out of a chain what turns back in the edge it came from.
-fn tighten(mesh: &TriMesh, adjacency: &Adjacency, chain: Vec<Place>) -> Vec<Place> {
+pub(super) fn tighten(mesh: &TriMesh, adjacency: &Adjacency, chain: Vec<Place>) -> Vec<Place> {
     let ends =
         |h: u32| [mesh.triangles[h as usize / 3][h as usize % 3], mesh.triangles[h as usize / 3][next(h) as usize % 3]];
     let named = |p: Place| match p {
@@ -500,6 +521,11 @@ impl<'a> Bench<'a> {
             }
         }
         0
+    }
+
+    /// Draws fans of nodes that share no arc. Returns how many were drawn.
+    pub fn apply_fans(&mut self, fans: Vec<Fan>) -> usize {
+        self.commit(fans, fan::put)
     }
 
     /// Makes slides of nodes whose cells are disjoint. Returns how many were made.
