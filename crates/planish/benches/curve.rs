@@ -215,7 +215,7 @@ fn snakes(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
                     traced.length(mesh) / geodesic.length(mesh),
                     turn(snake.positions()),
                     turn(&even.positions(mesh)),
-                    snake.unevenness()
+                    snake.unevenness().expect("one piece")
                 ),
             );
         }
