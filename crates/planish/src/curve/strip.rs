@@ -52,15 +52,46 @@ pub fn connect(
         return Ok(vec![from, to]);
     }
     // Most neighbours of a curve lie on adjacent faces.
-    for h in 3 * from.face..3 * from.face + 3 {
+    let beside = (3 * from.face..3 * from.face + 3).find(|&h| {
         let o = adjacency.opposite[h as usize];
-        if o != NONE && o / 3 == to.face {
-            return Ok(straightened(mesh, adjacency, from, vec![h], to));
+        o != NONE && o / 3 == to.face
+    });
+    let (a, b) = (nearest_corner(mesh, &from), nearest_corner(mesh, &to));
+    let along = |a: u32, b: u32| {
+        let chain = local_path(mesh, adjacency, a, b)?;
+        straighten(mesh, adjacency, from, &chain, to)
+    };
+    let first = match beside {
+        Some(h) => straightened(mesh, adjacency, from, vec![h], to),
+        None => along(a, b).ok_or_else(|| no_way(mesh, &from, &to))?,
+    };
+    let straight = from.position(mesh).distance(to.position(mesh));
+    let mut best = (length(mesh, &first), first);
+    if best.0 <= BENT * straight || best.1.len() > NEAR {
+        return Ok(best.1);
+    }
+    // Past a tip there are several geodesics; the nearest corners need not tell which is shortest.
+    for v in mesh.triangles[from.face as usize] {
+        for w in mesh.triangles[to.face as usize] {
+            let other = if (v, w) == (a, b) && beside.is_none() { None } else { along(v, w) };
+            if let Some(way) = other {
+                let reached = length(mesh, &way);
+                if reached < best.0 {
+                    best = (reached, way);
+                }
+            }
         }
     }
-    let (a, b) = (nearest_corner(mesh, &from), nearest_corner(mesh, &to));
-    let chain = local_path(mesh, adjacency, a, b).ok_or_else(|| no_way(mesh, &from, &to))?;
-    straighten(mesh, adjacency, from, &chain, to).ok_or_else(|| no_way(mesh, &from, &to))
+    Ok(best.1)
+}
+
+/// A way between near places longer than this times the segment is compared with those by other corners, ...
+const BENT: f64 = 1.02;
+/// ... unless it has more places than this: they do not lie near each other.
+const NEAR: usize = 24;
+
+fn length(mesh: &TriMesh, places: &[FacePoint]) -> f64 {
+    places.windows(2).map(|w| w[0].position(mesh).distance(w[1].position(mesh))).sum()
 }
 
 pub(crate) fn no_way(mesh: &TriMesh, from: &FacePoint, to: &FacePoint) -> CurveError {
@@ -560,10 +591,6 @@ mod tests {
     use super::*;
     use crate::mesh::shapes;
     use glam::DVec3;
-
-    fn length(mesh: &TriMesh, places: &[FacePoint]) -> f64 {
-        places.windows(2).map(|w| w[0].position(mesh).distance(w[1].position(mesh))).sum()
-    }
 
     #[test]
     fn a_way_over_a_flat_sheet_is_the_straight_segment_within_1e_12() {

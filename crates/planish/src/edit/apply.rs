@@ -1,6 +1,7 @@
 //! What each edit does to a drawing.
 
 use super::{ApplyError, Edit, Forces, LINE_KIND, Magnetism, Others, Pull, Scalar, SplineMove, Spot};
+use super::mirror::ON_PLANE;
 use super::{carry_network, mirror_network};
 use crate::curve::{
     Canvas, CurveError, Magnet, PaintMode, PaintParams, ScalarField, SnakeParams, SplineEdit, Stroke, SurfaceCurve,
@@ -274,7 +275,10 @@ impl Work<'_, '_> {
                 let attraction = pull.as_ref().map_or(0.0, |p| p.weight);
                 let params = SnakeParams { attraction, ..forces.params() };
                 let section = section.map(|s| (s[0], s[1]));
-                self.edit(|e, _, o| e.relax_curve(*curve, section, field.as_ref(), &params, o))
+                match curve {
+                    Some(curve) => self.edit(|e, _, o| e.relax_curve(*curve, section, field.as_ref(), &params, o)),
+                    None => self.relax_all(section, field.as_ref(), &params),
+                }
             }
             Edit::Spline { curve, control, moves } => self.spline(*curve, *control, moves),
             Edit::SplitRegion { at, from } => {
@@ -341,6 +345,41 @@ impl Work<'_, '_> {
             }
             Edit::Undo { .. } | Edit::Redo { .. } => Err(ApplyError::NotADrawing),
         }
+    }
+
+    /// Relaxes one curve after the other; one that would run into another stays as it is.
+    fn relax_all(
+        &mut self,
+        section: Option<(f64, f64)>,
+        field: Option<&ScalarField>,
+        params: &SnakeParams,
+    ) -> Result<(), ApplyError> {
+        let mesh = self.ground.canvas.mesh;
+        let plane = self.drawing.sketch.symmetry;
+        let near = ON_PLANE * mesh.bounds().diagonal();
+        self.edit(|e, _, observer| -> Result<(), ApplyError> {
+            let count = e.network.curves.len();
+            let mut faults = e.glance().faults.len();
+            for c in 0..count {
+                observer.progress(c as f64 / count as f64);
+                let curve = &e.network.curves[c];
+                let in_plane = |plane: symmetry::Plane| {
+                    curve.points.iter().all(|p| plane.height(p.position(mesh)).abs() < near)
+                };
+                if curve.kind != CurveKind::Smooth || plane.is_some_and(in_plane) {
+                    continue;
+                }
+                let before = curve.points.clone();
+                e.relax_curve(c as u32, section, field, params, observer)?;
+                let after = e.glance().faults.len();
+                if after > faults {
+                    e.network.curves[c].points = before;
+                } else {
+                    faults = after;
+                }
+            }
+            Ok(())
+        })
     }
 
     fn spline(&mut self, curve: u32, control: usize, moves: &[SplineMove]) -> Result<(), ApplyError> {

@@ -246,10 +246,12 @@ pub enum Edit {
         #[serde(default)]
         forces: Forces,
     },
-    /// Relaxes a curve or a section of it.
+    /// Relaxes a curve, a section of it, or all curves.
     Relax {
-        /// The curve.
-        curve: u32,
+        /// The curve; absent for all that are free to move and do not lie in the plane of symmetry. Of these one stays
+        /// as it is where it would run into another.
+        #[serde(default)]
+        curve: Option<u32>,
         /// Middle and width of the section, shares of the length.
         #[serde(default)]
         section: Option<[f64; 2]>,
