@@ -155,11 +155,8 @@ fn a_project_of_schema_1_is_read_without_a_sketch_and_steps_and_written_as_schem
         let curve = |k: usize| format!("{{\"corners\":[{k},{}],\"kind\":\"boundary\",\"points\":2}}", (k + 1) % 4);
         let side = |k: usize| format!("{{\"curve\":{k},\"reversed\":false}}");
         let list = |of: &dyn Fn(usize) -> String| (0..4).map(of).collect::<Vec<_>>().join(",");
-        let json = format!(
-            "{{\"corners\":4,\"curves\":[{}],\"patches\":[{{\"sides\":[{}]}}]}}",
-            list(&curve),
-            list(&side)
-        );
+        let json =
+            format!("{{\"corners\":4,\"curves\":[{}],\"patches\":[{{\"sides\":[{}]}}]}}", list(&curve), list(&side));
         let row = rusqlite::params![json, faces, weights];
         database.execute("INSERT INTO network VALUES (1, ?1, ?2, ?3)", row).unwrap();
     }

@@ -314,15 +314,20 @@ fn draw(
 fn surfaces(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Result<(), PipelineError> {
     let (network, grids) = (&model.network, &model.grids);
     let control = |s: &Vec<surface::Surface>| [("control_points", s.iter().map(|s| s.control.len()).sum())];
-    let fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &params.fit, o), control)?;
+    let symmetric = |surfaces: &mut Vec<surface::Surface>| {
+        if let Some(plane) = &model.sketch.symmetry {
+            surface::mirror_surfaces(&model.mesh, network, plane, surfaces);
+        }
+    };
+    let mut fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &params.fit, o), control)?;
+    // Seams are smoothed between images already, and what that takes from their symmetry is given back.
+    symmetric(&mut fitted);
     let mut smooth = clock.stage(
         "seams",
         |o| surface::stitch(network, grids, &fitted, &params.stitch, o),
         |_| [("curves", network.curves.len())],
     )?;
-    if let Some(plane) = &model.sketch.symmetry {
-        surface::mirror_surfaces(&model.mesh, network, plane, &mut smooth);
-    }
+    symmetric(&mut smooth);
     let reliefs = clock.stage(
         "relief",
         |_| {

@@ -14,15 +14,7 @@ use std::collections::BinaryHeap;
 use std::sync::Mutex;
 
 /// Landmarks: the two ends of the shape along each of these directions.
-const DIRECTIONS: [DVec3; 7] = [
-    DVec3::X,
-    DVec3::Y,
-    DVec3::Z,
-    DVec3::new(1.0, 1.0, 1.0),
-    DVec3::new(1.0, 1.0, -1.0),
-    DVec3::new(1.0, -1.0, 1.0),
-    DVec3::new(-1.0, 1.0, 1.0),
-];
+const DIRECTIONS: [DVec3; 5] = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 1.0, 1.0), DVec3::new(1.0, -1.0, -1.0)];
 /// Their number: one cache line of distances per vertex holds both ends of all directions.
 const LANDMARKS: usize = 2 * DIRECTIONS.len();
 /// Width of a bucket of the distance search, in mean edges.
@@ -308,12 +300,9 @@ impl<'m> Canvas<'m> {
         Err(no_way())
     }
 
-    /// The chain that always steps to the neighbour nearest to `to`; where that comes no nearer, the rest is the
-    /// shortest chain.
-    /// # Errors
-    /// `NoWay` if there is none.
+    /// The chain that always steps to the neighbour nearest to `to`; nothing where that comes no nearer.
     /// Source: [K98] §3.2.
-    pub fn greedy(&self, from: u32, to: u32) -> Result<Vec<u32>, CurveError> {
+    pub fn greedy(&self, from: u32, to: u32) -> Option<Vec<u32>> {
         let points = &self.mesh.points;
         let goal = points[to as usize];
         let mut chain = vec![from];
@@ -324,17 +313,10 @@ impl<'m> Canvas<'m> {
                 .iter()
                 .map(|&(w, _)| (if w == to { -1.0 } else { points[w as usize].distance(goal) }, w))
                 .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            match nearest {
-                Some((d, w)) if d < away => {
-                    chain.push(w);
-                    (v, away) = (w, d);
-                }
-                _ => {
-                    chain.extend(self.path(v, to, None)?.into_iter().skip(1));
-                    break;
-                }
-            }
+            let (d, w) = nearest.filter(|n| n.0 < away)?;
+            chain.push(w);
+            (v, away) = (w, d);
         }
-        Ok(chain)
+        Some(chain)
     }
 }

@@ -1,7 +1,7 @@
 //! What each edit does to a drawing.
 
-use super::{ApplyError, Edit, Forces, LINE_KIND, Magnetism, Others, Pull, Scalar, SplineMove, Spot};
 use super::mirror::ON_PLANE;
+use super::{ApplyError, Edit, Forces, LINE_KIND, Magnetism, Others, Pull, Scalar, SplineMove, Spot};
 use super::{carry_network, mirror_network};
 use crate::curve::{
     Canvas, CurveError, Magnet, PaintMode, PaintParams, ScalarField, SnakeParams, SplineEdit, Stroke, SurfaceCurve,
@@ -14,6 +14,9 @@ use crate::model::Drawing;
 use crate::network::{CurveKind, Editor, LayoutParams, imprint};
 use crate::observe::Observer;
 use glam::DVec3;
+
+/// A position further off the mesh than this share of its diagonal is a mistake: of units, or of axes.
+const FAR: f64 = 0.25;
 
 /// A mesh made ready for edits.
 pub struct Ground<'m> {
@@ -56,6 +59,7 @@ pub fn apply(
     others: &Others,
     observer: &dyn Observer,
 ) -> Result<(), ApplyError> {
+    super::check::check(edit)?;
     let before = drawing.clone();
     let made = Work { ground, drawing, observer }.make(edit, others);
     if observer.cancelled() || made.is_err() {
@@ -113,7 +117,11 @@ impl Work<'_, '_> {
     fn place(&self, spot: &Spot) -> Result<FacePoint, ApplyError> {
         let faces = self.mesh().triangles.len();
         match *spot {
-            Spot::Position(p) => Ok(self.ground.bvh.closest(DVec3::from_array(p)).place),
+            Spot::Position(p) => {
+                let found = self.ground.bvh.closest(DVec3::from_array(p));
+                let away = found.distance / self.mesh().bounds().diagonal().max(f64::MIN_POSITIVE);
+                if away > FAR { Err(ApplyError::OffMesh { place: p, away }) } else { Ok(found.place) }
+            }
             Spot::Place(p) if (p.face as usize) < faces => Ok(p),
             Spot::Place(p) => Err(CurveError::NoSuchFace { face: p.face, faces }.into()),
             Spot::Corner { corner } => {
@@ -363,9 +371,8 @@ impl Work<'_, '_> {
             for c in 0..count {
                 observer.progress(c as f64 / count as f64);
                 let curve = &e.network.curves[c];
-                let in_plane = |plane: symmetry::Plane| {
-                    curve.points.iter().all(|p| plane.height(p.position(mesh)).abs() < near)
-                };
+                let in_plane =
+                    |plane: symmetry::Plane| curve.points.iter().all(|p| plane.height(p.position(mesh)).abs() < near);
                 if curve.kind != CurveKind::Smooth || plane.is_some_and(in_plane) {
                     continue;
                 }

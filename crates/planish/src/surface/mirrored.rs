@@ -1,8 +1,9 @@
 //! Fits of a symmetric network: surfaces behind a plane of symmetry as exact mirror images of those before it.
 //!
 //! 1. corners and patches are matched with their images; nothing is done unless every patch has one
-//! 2. before the plane, boundaries in it are put into it exactly, and the control points next to them straight beside
-//!    them: the tangents across the plane are then normal to it, and the surface has one tangent plane there
+//! 2. before the plane, boundaries in it are put into it exactly, and the control points next to them level with them:
+//!    what their steps from the boundary have along its normal in the plane is taken away, and the surface has one
+//!    tangent plane there
 //! 3. every patch behind the plane gets the mirror image of its mate. What the shape itself lacks of symmetry goes to
 //!    the reliefs.
 
@@ -28,7 +29,7 @@ pub fn mirror_surfaces(mesh: &TriMesh, network: &Network, plane: &Plane, surface
         return false;
     }
     for p in (0..surfaces.len()).filter(|&p| matched.is_before(p)) {
-        straighten(&mut surfaces[p], &matched, network, plane, p);
+        level(&mut surfaces[p], &matched, network, plane, p);
     }
     for q in (0..surfaces.len()).filter(|&q| !matched.is_before(q)) {
         surfaces[q] = image(&surfaces[matched.mates[q].0], &matched, network, plane, q);
@@ -54,7 +55,8 @@ impl Matched {
     fn new(mesh: &TriMesh, network: &Network, plane: &Plane) -> Option<Matched> {
         let same = SAME * mesh.bounds().diagonal();
         let corners: Vec<DVec3> = network.corners.iter().map(|c| c.place.position(mesh)).collect();
-        let images: Vec<usize> = corners.iter().map(|p| nearest(&corners, plane.mirror(*p), same)).collect::<Option<_>>()?;
+        let images: Vec<usize> =
+            corners.iter().map(|p| nearest(&corners, plane.mirror(*p), same)).collect::<Option<_>>()?;
         if (0..images.len()).any(|k| images[images[k]] != k) {
             return None;
         }
@@ -155,8 +157,8 @@ fn fixed(surface: &Surface, matched: &Matched, network: &Network, p: usize) -> V
     out
 }
 
-/// Puts boundaries into the plane and the control points next to them straight beside.
-fn straighten(surface: &mut Surface, matched: &Matched, network: &Network, plane: &Plane, p: usize) {
+/// Puts boundaries into the plane and the control points next to them level with them.
+fn level(surface: &mut Surface, matched: &Matched, network: &Network, plane: &Plane, p: usize) {
     for k in fixed(surface, matched, network, p) {
         let height = plane.height(surface.control[k]);
         surface.control[k] -= plane.normal * height;
@@ -174,9 +176,11 @@ fn straighten(surface: &mut Surface, matched: &Matched, network: &Network, plane
                 continue;
             }
             let (rim, inner) = (control_at(surface, k, n, 0), control_at(surface, k, n, 1));
+            let beside = |n: usize| surface.control[control_at(surface, k, n.min(count - 1), 0)];
+            let along = (beside(n + 1) - beside(n.saturating_sub(1))).normalize_or_zero();
             let step = surface.control[inner] - surface.control[rim];
             let away = plane.normal.dot(step).max(LEAST_AWAY * step.length());
-            surface.control[inner] = surface.control[rim] + plane.normal * away;
+            surface.control[inner] = surface.control[rim] + plane.normal * away + along * step.dot(along);
         }
     }
 }
