@@ -375,7 +375,7 @@ fn a_script_draws_a_network_on_a_bare_mesh_and_the_history_goes_back_and_forth_i
     // Nothing is left to make again.
     let output = planish(&["edit", "again.planish", "again.toml", "-o", "x.planish"], folder.path());
     assert_eq!(status(&output), 3);
-    assert!(error_line(&output).contains("step 1 (redo): there is nothing left to make again"));
+    assert!(error_line(&output).contains("step 1 (redo, line 1): there is nothing left to make again"));
     assert!(!folder.path().join("x.planish").exists());
 }
 

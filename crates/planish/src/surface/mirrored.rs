@@ -1,9 +1,9 @@
 //! Fits of a symmetric network: surfaces behind a plane of symmetry as exact mirror images of those before it.
 //!
 //! 1. corners and patches are matched with their images; nothing is done unless every patch has one
-//! 2. before the plane, boundaries in it are put into it exactly, and the control points next to them level with them:
-//!    what their steps from the boundary have along its normal in the plane is taken away, and the surface has one
-//!    tangent plane there
+//! 2. before the plane, boundaries in it are put into it exactly, and where that is asked for the control points next to
+//!    them level with them: what their steps from the boundary have along its normal in the plane is taken away, and the
+//!    surface has one tangent plane there
 //! 3. every patch behind the plane gets the mirror image of its mate. What the shape itself lacks of symmetry goes to
 //!    the reliefs.
 
@@ -23,13 +23,23 @@ const LEAST_AWAY: f64 = 0.2;
 
 /// Puts mirror images of the surfaces before `plane` (on the side of its normal) in the place of those behind it. False,
 /// and nothing changed, if the network is not symmetric.
-pub fn mirror_surfaces(mesh: &TriMesh, network: &Network, plane: &Plane, surfaces: &mut [Surface]) -> bool {
+/// * `leveled` - make them level across the plane, too: before seams are smoothed, for it disturbs smooth ones
+pub fn mirror_surfaces(
+    mesh: &TriMesh,
+    network: &Network,
+    plane: &Plane,
+    leveled: bool,
+    surfaces: &mut [Surface],
+) -> bool {
     let Some(matched) = Matched::new(mesh, network, plane) else { return false };
     if surfaces.len() != network.patches.len() {
         return false;
     }
     for p in (0..surfaces.len()).filter(|&p| matched.is_before(p)) {
-        level(&mut surfaces[p], &matched, network, plane, p);
+        flatten(&mut surfaces[p], &matched, network, plane, p);
+        if leveled {
+            level(&mut surfaces[p], &matched, network, plane, p);
+        }
     }
     for q in (0..surfaces.len()).filter(|&q| !matched.is_before(q)) {
         surfaces[q] = image(&surfaces[matched.mates[q].0], &matched, network, plane, q);
@@ -47,8 +57,6 @@ struct Matched {
     mates: Vec<(usize, usize)>,
     /// Heights of the middles of the patches.
     heights: Vec<f64>,
-    /// For each corner the curves before the plane that end there, those in the plane left out.
-    curves_before: Vec<usize>,
 }
 
 impl Matched {
@@ -66,12 +74,6 @@ impl Matched {
             network.curves[c].corners.iter().all(|&k| in_plane[k as usize]) && plane.height(middles[c]).abs() < same
         };
         let curve_in_plane: Vec<bool> = (0..network.curves.len()).map(on_plane).collect();
-        let mut curves_before = vec![0; corners.len()];
-        for (c, curve) in network.curves.iter().enumerate() {
-            if !curve_in_plane[c] && plane.height(middles[c]) > 0.0 {
-                curve.corners.iter().for_each(|&k| curves_before[k as usize] += 1);
-            }
-        }
         let side = |p: usize, k: usize| network.patches[p].sides[k].curve as usize;
         let count = network.patches.len();
         let mate_of = |q: usize| {
@@ -95,7 +97,7 @@ impl Matched {
         }
         let heights: Vec<f64> =
             (0..count).map(|p| (0..4).map(|k| plane.height(middles[side(p, k)])).sum::<f64>()).collect();
-        Some(Matched { in_plane, curve_in_plane, mates, heights, curves_before })
+        Some(Matched { in_plane, curve_in_plane, mates, heights })
     }
 
     fn is_before(&self, p: usize) -> bool {
@@ -157,27 +159,22 @@ fn fixed(surface: &Surface, matched: &Matched, network: &Network, p: usize) -> V
     out
 }
 
-/// Puts boundaries into the plane and the control points next to them level with them.
-fn level(surface: &mut Surface, matched: &Matched, network: &Network, plane: &Plane, p: usize) {
+/// Puts boundaries into the plane.
+fn flatten(surface: &mut Surface, matched: &Matched, network: &Network, plane: &Plane, p: usize) {
     for k in fixed(surface, matched, network, p) {
         let height = plane.height(surface.control[k]);
         surface.control[k] -= plane.normal * height;
     }
+}
+
+/// Puts the control points next to boundaries in the plane level with them, but those of the curves that end there: they
+/// belong to two patches.
+fn level(surface: &mut Surface, matched: &Matched, network: &Network, plane: &Plane, p: usize) {
     for k in (0..4).filter(|&k| matched.side_in_plane(network, p, k)) {
-        let count = count_along(surface, k);
-        for n in 0..count {
-            // The first and the last belong to the curves that end here; of several at a corner none is bent alone.
-            let end = match n {
-                0 => Some(k),
-                _ if n + 1 == count => Some((k + 1) % 4),
-                _ => None,
-            };
-            if end.is_some_and(|e| matched.curves_before[network.corner(p, e) as usize] != 1) {
-                continue;
-            }
+        for n in 1..count_along(surface, k) - 1 {
             let (rim, inner) = (control_at(surface, k, n, 0), control_at(surface, k, n, 1));
-            let beside = |n: usize| surface.control[control_at(surface, k, n.min(count - 1), 0)];
-            let along = (beside(n + 1) - beside(n.saturating_sub(1))).normalize_or_zero();
+            let beside = |n: usize| surface.control[control_at(surface, k, n, 0)];
+            let along = (beside(n + 1) - beside(n - 1)).normalize_or_zero();
             let step = surface.control[inner] - surface.control[rim];
             let away = plane.normal.dot(step).max(LEAST_AWAY * step.length());
             surface.control[inner] = surface.control[rim] + plane.normal * away + along * step.dot(along);
