@@ -663,19 +663,26 @@ fn spread(complex: &mut Complex) {
     }
     on_edge.sort_by(|x, y| x.0.cmp(&y.0).then(x.1.total_cmp(&y.1)).then((x.2, x.3).cmp(&(y.2, y.3))));
     for run in on_edge.chunk_by_mut(|x, y| x.0 == y.0) {
-        let gap = APART.min(0.5 / (run.len() + 1) as f64);
-        let mut least = gap;
-        for x in run.iter_mut() {
-            x.1 = x.1.max(least);
-            least = x.1 + gap;
-        }
-        let mut most = 1.0 - gap;
-        for x in run.iter_mut().rev() {
-            x.1 = x.1.min(most);
-            most = x.1 - gap;
-        }
-        for &(h, t, a, i) in run.iter() {
+        let mut parts: Vec<f64> = run.iter().map(|x| x.1).collect();
+        keep_apart(&mut parts, APART);
+        for (&(h, _, a, i), t) in run.iter().zip(parts) {
             complex.arcs[a as usize].as_mut().expect("a live arc").chain[i as usize] = Place::Edge(h, t);
         }
+    }
+}
+
+/// Moves places along an edge, given in rising order, at least `gap` away from each other and from its ends (less where
+/// many share it).
+pub(super) fn keep_apart(parts: &mut [f64], gap: f64) {
+    let gap = gap.min(0.5 / (parts.len() + 1) as f64);
+    let mut least = gap;
+    for part in parts.iter_mut() {
+        *part = part.max(least);
+        least = *part + gap;
+    }
+    let mut most = 1.0 - gap;
+    for part in parts.iter_mut().rev() {
+        *part = part.min(most);
+        most = *part - gap;
     }
 }
