@@ -131,6 +131,19 @@ fn turn(p: &[DVec3]) -> f64 {
     p.windows(3).map(|w| (w[1] - w[0]).angle_between(w[2] - w[1]).to_degrees()).sum::<f64>() / (p.len() - 2) as f64
 }
 
+/// Mean turn within the surface: of the parts of the pieces across the blended normals at the points.
+fn turn_within(mesh: &TriMesh, normals: &[DVec3], curve: &SurfaceCurve) -> f64 {
+    let at = curve.positions(mesh);
+    let turns = (1..at.len() - 1).map(|i| {
+        let place = &curve.points[i];
+        let t = mesh.triangles[place.face as usize];
+        let n = (0..3).map(|k| normals[t[k] as usize] * place.bary[k]).sum::<DVec3>().normalize_or_zero();
+        let flat = |v: DVec3| v - n * v.dot(n);
+        flat(at[i] - at[i - 1]).angle_between(flat(at[i + 1] - at[i])).to_degrees()
+    });
+    turns.sum::<f64>() / (at.len() - 2) as f64
+}
+
 fn snakes(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
     if !wanted(&format!("curve/snake/{name}")) {
         return;
@@ -213,8 +226,13 @@ fn snakes(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
     }
     // Against the geodesic in the same course: the mean over pairs, with points a share of an edge apart.
     let pairs = picks(mesh, &canvas.adjacency);
+    let mut normals = vec![DVec3::ZERO; mesh.points.len()];
+    for (t, corners) in mesh.triangles.iter().enumerate() {
+        corners.iter().for_each(|&v| normals[v as usize] += mesh.area_vector(t));
+    }
+    normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());
     for share in [0.5, 1.0] {
-        let (mut length, mut worst, mut turns, mut less, mut uneven) = (0.0, 0.0f64, [0.0; 2], 0, 0.0f64);
+        let (mut length, mut worst, mut turns, mut less, mut uneven) = (0.0, 0.0f64, [0.0; 4], 0, 0.0f64);
         let count = 20;
         for pair in pairs.iter().take(count) {
             let params = PaintParams { mode: PaintMode::Geodesic, ..PaintParams::default() };
@@ -224,19 +242,24 @@ fn snakes(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
             snake.relax(&rest_params, &Silent).expect("a snake");
             let traced = SurfaceCurve::open(snake.curve().trace(mesh, &canvas.adjacency).expect("a trace"));
             let ratio = traced.length(mesh) / geodesic.length(mesh);
-            let two = [turn(snake.positions()), turn(&even.positions(mesh))];
+            let four = [
+                turn(snake.positions()),
+                turn(&even.positions(mesh)),
+                turn_within(mesh, &normals, &snake.curve()),
+                turn_within(mesh, &normals, &even),
+            ];
             length += ratio / count as f64;
             worst = worst.max(ratio);
-            (0..2).for_each(|k| turns[k] += two[k] / count as f64);
-            less += (two[0] < two[1]) as usize;
+            (0..4).for_each(|k| turns[k] += four[k] / count as f64);
+            less += (four[0] < four[1]) as usize;
             uneven = uneven.max(snake.unevenness().expect("one piece"));
         }
         tell(
             &format!("curve/geodesic_{share}/{name}"),
             &format!(
                 "length over geodesic {length:.5} in the mean, {worst:.5} at most; turn per point {:.3} against {:.3} deg, \
-                 less in {less} of {count}; unevenness {uneven:.3} at most",
-                turns[0], turns[1]
+                 less in {less} of {count}, within the surface {:.3} against {:.3}; unevenness {uneven:.3} at most",
+                turns[0], turns[1], turns[2], turns[3]
             ),
         );
     }
