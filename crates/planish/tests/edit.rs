@@ -477,7 +477,6 @@ fn points_slide_along_feature_curves_so_that_iso_curves_cross_them_with_half_the
         slid += bend(line[j], j);
         unslid += bend(even[j], j);
     }
-    println!("bend {} against {}", slid / 37.0, unslid / 37.0);
     assert!(slid < 0.5 * unslid, "{slid} {unslid}");
 }
 
@@ -529,7 +528,6 @@ fn fits_on_both_sides_of_a_plane_of_symmetry_are_exact_mirror_images_and_bend_no
         seams.iter().filter(|s| in_plane(s.curve)).map(|s| s.angle_mean_deg).collect()
     };
     let (mirrored, unmirrored) = (bends(&told.seams), bends(&unmirrored.seams));
-    println!("bends in the plane {mirrored:?} against {unmirrored:?}");
     assert!(mirrored.len() >= 4);
     let mean = |list: &[f64]| list.iter().sum::<f64>() / list.len() as f64;
     assert!(mean(&mirrored) < mean(&unmirrored) + 0.5, "{mirrored:?} {unmirrored:?}");
