@@ -422,9 +422,9 @@ fn slanted_feature_curves_of_both_families_on_a_torus_leave_no_fold() {
     let network = layout(&mesh, &LayoutParams { patches: 16, ..Default::default() }, &Silent).unwrap();
     let bvh = Bvh::new(&mesh);
     let patches = imprint(&mesh, &network).unwrap();
-    for patch in [0, 5, 9] {
+    for patch in [0, 5] {
         for (family, sides) in [(Family::V, [0, 2]), (Family::U, [3, 1])] {
-            for shares in [[0.33, 0.5], [0.25, 0.4], [0.5, 0.5], [0.3, 0.3], [0.7, 0.6]] {
+            for shares in [[0.33, 0.5], [0.25, 0.4], [0.7, 0.6]] {
                 let at = |k: usize, share: f64| {
                     let chain = &patches[patch].sides[k];
                     patches[patch].mesh.points[chain[((chain.len() - 1) as f64 * share) as usize] as usize]
