@@ -66,7 +66,7 @@ pub(super) fn read(
     let sizes = vec![(CELLS + 1, CELLS + 1); sub.len()];
     let sides = |p: usize| {
         // Side 1 runs with the v curve and side 3 beyond against it; side 0 above the u curve with it, side 2 below against.
-        let across = ((p + 1) % nu != 0).then_some([(p, 1), (p + 1, 3)]);
+        let across = (!(p + 1).is_multiple_of(nu)).then_some([(p, 1), (p + 1, 3)]);
         let along = (p + nu < sub.len()).then_some([(p + nu, 0), (p, 2)]);
         across.into_iter().chain(along)
     };

@@ -70,6 +70,11 @@ pub fn resample_with_features(
     refined(input, network, patches, params, &|sizes| give_sums(network, drawn, sizes), &make, observer)
 }
 
+/// Points along u and v.
+type Size = (usize, usize);
+type Give<'a, E> = dyn Fn(&mut [Size]) -> Result<(), E> + 'a;
+type Make<'a, E> = dyn Fn(&[usize], &[Size], &dyn Observer) -> Result<Vec<Grid>, E> + 'a;
+
 /// Relaxes all patches, and those that need it again with more points.
 /// * `give` - puts sizes that are given in the place of those chosen
 /// * `make` - grids of some patches, rising, by the sizes of all
@@ -78,8 +83,8 @@ fn refined<E: From<GridError>>(
     network: &Network,
     patches: &[PatchMesh],
     params: &GridParams,
-    give: &dyn Fn(&mut [(usize, usize)]) -> Result<(), E>,
-    make: &dyn Fn(&[usize], &[(usize, usize)], &dyn Observer) -> Result<Vec<Grid>, E>,
+    give: &Give<E>,
+    make: &Make<E>,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, E> {
     let mut sizes = choose_sizes(network, patches, params);
