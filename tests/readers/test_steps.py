@@ -23,7 +23,7 @@ def same_surfaces(a, b):
 
 
 def test_a_network_that_goes_through_its_file_gives_the_same_surfaces(demo, tmp_path):
-    shutil.copy(demo / "demo.ply", tmp_path / "part.ply")
+    shutil.copy(demo / "mesh.ply", tmp_path / "part.ply")
     planish("layout", "part.ply", "-o", "network.json", "--patches", 60, cwd=tmp_path)
     straight = fit(tmp_path, "part.ply", "-o", "a.planish", "--patches", 60)
     by_file = fit(tmp_path, "part.ply", "--network", "network.json", "-o", "b.planish")

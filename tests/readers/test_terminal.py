@@ -69,7 +69,7 @@ def terminal(request):
 
 
 def test_bars_show_the_stage_and_are_gone_at_the_end(terminal, tmp_path):
-    run = terminal("demo", "-o", "out", "--triangles", 20000, cwd=tmp_path)
+    run = terminal("demo", "-o", "out", "--points", 15000, cwd=tmp_path)
     assert run.read(120, BAR), run.seen
     run.read(240)
     assert run.process.wait() == 0
@@ -80,13 +80,13 @@ def test_bars_show_the_stage_and_are_gone_at_the_end(terminal, tmp_path):
 
 
 def test_quiet_shows_nothing(terminal, tmp_path):
-    run = terminal("demo", "-q", "-o", "out", "--triangles", 6000, cwd=tmp_path)
+    run = terminal("demo", "-q", "-o", "out", "--points", 8000, cwd=tmp_path)
     run.read(240)
     assert run.process.wait() == 0 and run.seen == b""
 
 
 def test_ctrl_c_at_the_keyboard_ends_within_1_s_and_leaves_nothing(terminal, tmp_path):
-    run = terminal("demo", "-o", "out", "--triangles", 400000, cwd=tmp_path)
+    run = terminal("demo", "-o", "out", "--points", 400000, cwd=tmp_path)
     assert run.read(60, BAR), run.seen
     pressed = time.monotonic()
     os.write(run.ours, b"\x03")

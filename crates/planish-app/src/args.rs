@@ -16,12 +16,12 @@ use planish_io::Up;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-/// Turns dense triangle meshes into smooth B-spline patches with displacement maps.
+/// Turns raw scans and dense triangle meshes into smooth B-spline patches with displacement maps.
 #[derive(Parser, Debug)]
 #[command(name = "planish", version, max_term_width = 110)]
 #[command(after_help = "\
 The way of the data:
-  mesh -> repair -> layout -> grids -> surfaces -> seams -> relief -> files
+  scan -> samples -> mesh -> repair -> layout -> grids -> surfaces -> seams -> relief -> files
   `run` goes all the way; `layout` stops at the network; `fit` goes on from there; `edit` changes the curves.
 
 Exit status:
@@ -38,9 +38,9 @@ pub struct Cli {
 /// The commands, in the order of the pipeline.
 #[derive(Subcommand, Debug)]
 pub enum Command {
-    /// Make a synthetic part with sharp edges and fine detail, and run everything on it
+    /// Scan a synthetic part with sharp edges and fine detail, and run everything on the noisy scan
     Demo(Demo),
-    /// Everything: mesh in; surfaces, displacement maps and a report out
+    /// Everything: scan or mesh in; surfaces, displacement maps and a report out
     Run(Run),
     /// Scan -> denoised, oriented points with outliers and features flagged
     Clean(Clean),
@@ -136,9 +136,9 @@ pub struct Demo {
     /// Folder for the products; made if missing
     #[arg(short, long, value_name = "DIR", default_value = "planish-demo")]
     pub output: PathBuf,
-    /// Triangles of the synthetic part, about
-    #[arg(long, value_name = "N", default_value_t = 60_000, value_parser = clap::value_parser!(u32).range(2_000..=2_000_000))]
-    pub triangles: u32,
+    /// Points of the synthetic scan, about
+    #[arg(long, value_name = "N", default_value_t = 60_000, value_parser = clap::value_parser!(u32).range(5_000..=5_000_000))]
+    pub points: u32,
     #[command(flatten)]
     pub common: Common,
 }
@@ -202,7 +202,7 @@ impl HoleArgs {
 pub struct Clean {
     /// The scan: E57, LAS, LAZ, PLY, PCD, XYZ, TXT, CSV, ASC, PTS, NPY or NPZ
     pub scan: PathBuf,
-    /// The points: .ply (all columns), .las, .e57 or .xyz
+    /// The points: .ply or .xyz (all columns), .las, .laz or .e57
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Also write each segment into a file of its own beside the output
@@ -386,7 +386,7 @@ pub struct Compare {
 /// `planish info`
 #[derive(Args, Debug)]
 pub struct Info {
-    /// A mesh or a model
+    /// A scan, a mesh or a model
     pub file: PathBuf,
     #[command(flatten)]
     pub common: Common,

@@ -39,9 +39,15 @@ const CUTS_PER_SPAN: usize = 8;
 const COLORS: usize = 1024;
 
 /// Draws all pictures of a report.
+/// * `raw` - points of a scan on the surface, and its outliers
 /// # Errors
 /// If the parts of the model do not belong together.
-pub fn pictures(model: &Model, report: &Report, up: Up) -> Result<Vec<Picture>, Failure> {
+pub fn pictures(
+    model: &Model,
+    raw: Option<&[Vec<DVec3>; 2]>,
+    report: &Report,
+    up: Up,
+) -> Result<Vec<Picture>, Failure> {
     let (up, toward) = match up {
         Up::Y => (DVec3::Y, DVec3::new(0.62, 0.42, 1.0)),
         Up::Z => (DVec3::Z, DVec3::new(-0.85, -0.75, 0.6)),
@@ -62,9 +68,18 @@ pub fn pictures(model: &Model, report: &Report, up: Up) -> Result<Vec<Picture>, 
         pictures.push(Picture { title: title.into(), caption, png, scale: None });
     };
 
+    if let Some([points, strays]) = raw {
+        let (dots, colors) = dots(points, strays, &model.mesh);
+        let look = Look { paint: Paint::PerTriangle(&colors), hollows: 0.0, ..Look::default() };
+        let caption = format!("{} raw points as they came, {} outliers in red.", points.len(), strays.len());
+        add("Scan", caption, draw(&dots, look)?);
+    }
     let input = draw(&model.mesh, Look { paint: Paint::Plain(CLAY), ..Look::default() })?;
     let triangles = model.mesh.triangles.len();
-    add("Input", format!("The mesh after repair, {triangles} triangles."), input);
+    match raw {
+        Some(_) => add("Mesh", format!("The mesh made from the points, {triangles} triangles."), input),
+        None => add("Input", format!("The mesh after repair, {triangles} triangles."), input),
+    }
 
     let (painted, colors) = patches(model)?;
     let look = Look { paint: Paint::PerTriangle(&colors), lines: curves(model), hollows: 0.5, ..Look::default() };
@@ -230,6 +245,42 @@ fn curves(model: &Model) -> Vec<Line> {
     }
     lines
 }
+
+/// Points as small triangles that lie like the surface beside them, outliers in a colour of their own and facing up.
+fn dots(points: &[DVec3], strays: &[DVec3], mesh: &TriMesh) -> (TriMesh, Vec<[u8; 3]>) {
+    let tree = Bvh::new(mesh);
+    let area: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
+    // The dots of all points together cover a share of the surface: what lies behind shows through.
+    let side = (COVERED * area / points.len().max(1) as f64).sqrt();
+    let finite = |p: &&DVec3| p.is_finite();
+    let step = points.len().div_ceil(DOTS).max(1);
+    let plain: Vec<(DVec3, DVec3)> = points
+        .par_iter()
+        .step_by(step)
+        .filter(finite)
+        .map(|p| (*p, mesh.normal(tree.closest(*p).place.face as usize)))
+        .collect();
+    // Only strays around the shape are in the picture.
+    let bounds = mesh.bounds();
+    let reach = bounds.diagonal();
+    let red = strays.iter().filter(finite).filter(|p| p.distance(bounds.center()) < reach).map(|p| (*p, DVec3::Z));
+    let count = plain.len();
+    let (mut dots, mut colors) = (TriMesh::default(), Vec::new());
+    for (k, (p, n)) in plain.into_iter().chain(red).enumerate() {
+        let u = n.try_normalize().unwrap_or(DVec3::Z).any_orthonormal_vector();
+        let v = n.cross(u);
+        let size = if k < count { side } else { 2.0 * side };
+        let first = dots.points.len() as u32;
+        dots.points.extend([-u - 0.6 * v, u - 0.6 * v, 1.2 * v].map(|d| p + size * d));
+        dots.triangles.push([first, first + 1, first + 2]);
+        colors.push(if k < count { CLAY } else { FEATURE_COLOR });
+    }
+    (dots, colors)
+}
+
+/// Share of the surface that its dots cover, and how many dots are drawn at most.
+const COVERED: f64 = 0.25;
+const DOTS: usize = 1_000_000;
 
 /// Distance of each vertex from the surfaces, and the end of a scale that 98 of 100 of them keep.
 fn deviation(mesh: &TriMesh, surface: &TriMesh) -> (Vec<f64>, f64) {

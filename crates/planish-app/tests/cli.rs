@@ -305,7 +305,7 @@ fn a_demanded_tolerance_that_is_missed_is_status_1_and_the_result_is_there() {
 fn ctrl_c_ends_within_1_s_with_status_130_and_no_partial_file() {
     let folder = tempfile::tempdir().unwrap();
     let mut child = Command::new(env!("CARGO_BIN_EXE_planish"))
-        .args(["demo", "-o", "out", "--triangles", "400000"])
+        .args(["demo", "-o", "out", "--points", "400000"])
         .current_dir(folder.path())
         .stdin(Stdio::null())
         .stdout(Stdio::null())

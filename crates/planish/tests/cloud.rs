@@ -216,6 +216,72 @@ fn outliers_are_flagged_and_left_out() {
 }
 
 #[test]
+fn strays_all_around_a_box_change_its_mesh_by_less_than_a_noise_level() {
+    let shape = shapes::cuboid(DVec3::new(1.0, 0.8, 0.6), 4);
+    let noise = 0.0014;
+    let mut points = scan_of(&shape, 30_000, noise, 1);
+    points.extend((0..600).map(|i| DVec3::from_array([0, 1, 2].map(|k| 2.0 * random::unit(5, 3 * i + k) - 0.6))));
+    let mesh = meshed(points, None);
+    let facts = diagnose(&mesh);
+    assert!(facts.watertight && facts.manifold && facts.components == 1, "{facts:?}");
+    let found = planish::mesh::compare(&shape, &mesh, &Default::default(), &Silent).unwrap();
+    assert!(found.both.rms < noise, "{}", found.both.rms);
+}
+
+#[test]
+fn a_plate_four_noise_levels_thick_has_two_sides_that_look_away_from_each_other() {
+    let points: Vec<DVec3> = (0..60_000u64)
+        .map(|i| {
+            let (x, y) = (random::unit(1, 2 * i), random::unit(1, 2 * i + 1));
+            let side = if i % 2 == 0 { 0.004 } else { -0.004 };
+            DVec3::new(x, y, 0.1 * (4.0 * x).sin() + side)
+                + 0.002 * DVec3::from_array([0, 1, 2].map(|k| normal(4, 3 * i + k)))
+        })
+        .collect();
+    let samples = clean(points);
+    assert!((samples.noise / 0.002 - 1.0).abs() < 0.15, "{}", samples.noise);
+    // Within a rim of the width of a ball a side may miss.
+    let inner =
+        samples.samples.iter().filter(|s| (s.center - DVec3::new(0.5, 0.5, 0.0)).truncate().abs().max_element() < 0.45);
+    let (mut count, mut wrong, mut aside) = (0, 0, 0);
+    for s in inner {
+        let above = s.center.z - 0.1 * (4.0 * s.center.x).sin();
+        aside += usize::from((above.abs() - 0.004).abs() > 0.002);
+        count += 1;
+        wrong += usize::from(s.normal.z * above < 0.0);
+    }
+    assert!(count > 500 && wrong * 100 < count && aside * 50 < count, "{wrong} wrong, {aside} aside of {count}");
+}
+
+#[test]
+fn a_hole_in_a_sphere_is_closed_within_a_tenth_of_the_radius_or_left_open() {
+    let points: Vec<DVec3> =
+        scan_of(&shapes::sphere(1.0, 5), 20_000, 0.002, 1).into_iter().filter(|p| p.z < 0.9).collect();
+    let closed = meshed(points.clone(), Some(true));
+    let facts = diagnose(&closed);
+    assert!(facts.watertight && facts.manifold && facts.components == 1, "{facts:?}");
+    let top = closed.points.iter().map(|p| p.z).fold(0.0, f64::max);
+    assert!((0.85..1.03).contains(&top), "{top}");
+    assert!(closed.points.iter().all(|p| p.length() < 1.03 && p.length() > 0.85));
+    let open = meshed(points, Some(false));
+    let facts = diagnose(&open);
+    assert!(!facts.watertight && facts.boundary_loops == 1, "{facts:?}");
+}
+
+/// The mesh of a scan with default parameters.
+fn meshed(points: Vec<DVec3>, close: Option<bool>) -> TriMesh {
+    let params = ScanParams {
+        clean: CleanParams::default(),
+        contour: ContourParams::default(),
+        voxel: None,
+        resolution: None,
+        memory: 1 << 30,
+        close,
+    };
+    mesh_scan(&Cloud::new(points), &params, &Silent).unwrap().meshed.extracted.mesh
+}
+
+#[test]
 fn a_thinned_cloud_keeps_its_distance() {
     let scan = Cloud::new(scan_of(&shapes::sphere(1.0, 5), 20_000, 0.003, 1));
     let samples = cloud::clean(&scan, &CleanParams::default(), &Silent).unwrap();

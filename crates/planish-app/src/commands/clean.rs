@@ -25,7 +25,7 @@ pub fn scan_facts(path: &Path, scan: &Cloud, units: planish::model::Units) -> In
 }
 
 pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
-    files::check_extension(&args.output, &["ply", "las", "e57", "xyz"])?;
+    files::check_extension(&args.output, &planish_io::WRITTEN_SCANS)?;
     let staged = Staged::file(&args.output)?;
     let own_report = session.stage_report()?;
     let params = args.clean.params(None)?;
@@ -56,6 +56,7 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
         Ok(())
     })?;
     report.stages = vec![read, fit, moved, write];
+    report.input.diagonal = samples.diagonal;
     pipeline::sample_figures(&samples, &mut report.quality, &mut report.warnings);
     figures(&cleaned, &mut report);
     staged.commit()?;

@@ -1,35 +1,52 @@
-//! `planish demo`: a synthetic part, and everything on it.
+//! `planish demo`: a synthetic part is scanned with all the faults of a scanner, and everything runs on the scan.
 
 use super::Session;
-use super::run::{Job, produce};
+use super::run::{Job, Scanned, from_scan, produce};
 use crate::args::Demo;
 use crate::failure::{Failure, Status};
 use crate::products::Staged;
+use planish::cloud::{ScannerParams, virtual_scan};
 use planish::mesh::shapes;
-use planish::pipeline::PipelineParams;
+use planish::pipeline::{Figure, PipelineParams};
 use planish_io::{Up, WriteOptions};
 use std::path::Path;
 
-/// Name of the synthetic part among the products.
-const PART: &str = "demo.ply";
+/// Names of the scan and of the part that was scanned among the products.
+const SCAN: &str = "scan.e57";
+const TRUTH: &str = "truth.ply";
+/// Triangles of the part: its facets are far below the noise.
+const TRIANGLES: usize = 100_000;
 
 pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
     let staged = Staged::folder(&args.output)?;
-    let part = shapes::demo(session.common.seed.unwrap_or(0), args.triangles as usize);
+    let seed = session.common.seed.unwrap_or(0);
+    let (truth, shape) = session.step("shape", || Ok(shapes::demo(seed, TRIANGLES)))?;
+    let scanner = ScannerParams { points: args.points as usize, seed, ..ScannerParams::default() };
+    let (made, shot) = session.bars.step("scan", |o| virtual_scan(&truth, &scanner, o));
+    if crate::progress::interrupted() {
+        return Err(Failure::interrupted());
+    }
+    let scan = made.map_err(Failure::fault)?;
     let options = WriteOptions { units: session.units(), up: Up::Z, name: "demo".into() };
-    planish_io::write_mesh(staged.path(PART), &part, &options)
-        .map_err(|e| Failure::usage(args.output.join(PART), e))?;
+    let wrong = |name: &str, e: &dyn std::fmt::Display| Failure::usage(args.output.join(name), e);
+    planish_io::write_mesh(staged.path(TRUTH), &truth, &options).map_err(|e| wrong(TRUTH, &e))?;
+    planish_io::write_scan(staged.path(SCAN), &scan.cloud).map_err(|e| wrong(SCAN, &e))?;
+    let Scanned { mesh, tags, mut facts, records } = from_scan(session, Path::new(SCAN), &scan.cloud, None, &staged)?;
+    let strays = scan.stray.iter().filter(|&&s| s).count();
+    facts.quality.insert("truth.outliers".into(), Figure::Count(strays as u64));
+    facts.quality.insert("truth.noise_rel".into(), Figure::Number(scanner.noise));
     let job = Job {
         command: "demo",
-        path: Path::new(PART),
-        input: &part,
-        tags: None,
+        path: Path::new(SCAN),
+        input: &mesh,
+        tags: Some(&tags),
         network: None,
         params: PipelineParams::default(),
         demanded: None,
         output: &args.output,
         up: Up::Z,
-        scan: None,
+        scan: Some(facts),
+        truth: Some(&truth),
     };
-    produce(session, job, staged, Vec::new())
+    produce(session, job, staged, [vec![shape, shot], records].concat())
 }

@@ -47,6 +47,7 @@ fn anew(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
         output: &args.output,
         up: Up::default(),
         scan: None,
+        truth: None,
     };
     fitted(session, job, vec![read])
 }

@@ -1,7 +1,7 @@
 //! `planish info`: what is in a file, and what is wrong with it.
 
 use super::{Session, commit_report};
-use crate::args::Info;
+use crate::args::{Info, ScanArgs};
 use crate::failure::{Failure, Status};
 use crate::files::{self, Content};
 use crate::summary::Summary;
@@ -12,6 +12,10 @@ use planish_io::report::{Report, count, number};
 
 pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
+    if planish_io::is_scan(&args.file) {
+        let report = scan_info(session, args)?;
+        return commit_report(own_report, &report).map(|()| Status::Done);
+    }
     let (content, read) = session.step("read", || files::content(&args.file))?;
     let (mesh, model) = match &content {
         Content::Mesh(mesh) => (mesh, None),
@@ -48,6 +52,56 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
         table.print();
     }
     Ok(Status::Done)
+}
+
+/// What is in a scan.
+fn scan_info(session: &Session, args: &Info) -> Result<Report, Failure> {
+    let (scan, read) = session.step("read", || files::scan(&args.file, &ScanArgs::default()))?;
+    let mut report = Report::new("info", super::clean::scan_facts(&args.file, &scan, session.units()));
+    report.stages.push(read);
+    let lost = scan.points.iter().filter(|p| !p.is_finite()).count();
+    let mut places: Vec<[u64; 3]> =
+        scan.points.iter().filter(|p| p.is_finite()).map(|p| p.to_array().map(f64::to_bits)).collect();
+    let finite = places.len();
+    places.sort_unstable();
+    places.dedup();
+    let repeated = finite - places.len();
+    let facts = [
+        ("scan.points", scan.points.len()),
+        ("scan.not_finite", lost),
+        ("scan.repeated", repeated),
+        ("scan.scanners", scan.scanners.len()),
+    ];
+    report.quality.extend(facts.map(|(key, n)| (key.to_owned(), Figure::Count(n as u64))));
+    for (n, code, what) in [
+        (lost, "not_finite", "points have coordinates that are no numbers; they are left out"),
+        (repeated, "repeated", "points repeat others exactly; they count once"),
+    ] {
+        if n > 0 {
+            report.warnings.push(Warning::new(code, format!("{} {what}.", count(n as u64)), ""));
+        }
+    }
+    if session.common.quiet {
+        return Ok(report);
+    }
+    session.tell_warnings(&report);
+    let unit = report.input.units.as_str();
+    let bounds = scan.bounds();
+    let corner = |p: planish::DVec3| (p + scan.shift).to_array().map(|x| x.to_string()).join(" ");
+    let mut table = Summary::default();
+    table.row("points", count(scan.points.len() as u64));
+    table.row("from", format!("{} {unit}", corner(bounds.min)));
+    table.row("to", format!("{} {unit}", corner(bounds.max)));
+    table.row("diagonal", format!("{} {unit}", number(bounds.diagonal())));
+    let columns: Vec<&str> = scan.attributes.iter().map(|a| a.name.as_str()).collect();
+    table.row("columns", if columns.is_empty() { "positions only".into() } else { columns.join(", ") });
+    let scanners = match scan.scanners.len() {
+        0 => "positions unknown".to_owned(),
+        n => format!("{n} with known positions"),
+    };
+    table.row("scanners", scanners);
+    table.print();
+    Ok(report)
 }
 
 fn figures(facts: &Diagnosis, report: &mut Report) {

@@ -7,11 +7,12 @@ use crate::files;
 use crate::pictures;
 use crate::products::Staged;
 use crate::summary::Summary;
+use planish::DVec3;
 use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{HistoryEntry, Model};
 use planish::network::Network;
 use planish::pipeline::{self, Fitted, PipelineParams, StageRecord};
-use planish_io::report::{self, Report, SeamRow, count, distance, number};
+use planish_io::report::{self, Report, SeamRow, count, distance, number, percent};
 use planish_io::{StepInput, Up, WriteOptions};
 use std::path::Path;
 
@@ -22,11 +23,12 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
     let mut extra = None;
     let (input, tags) = if planish_io::is_scan(&args.input) {
         let (scan, read) = session.step("read", || files::scan(&args.input, &args.scan))?;
-        let (mesh, more, records) = from_scan(session, &args.input, &scan, args.holes.choice(), &staged)?;
+        let Scanned { mesh, tags, facts, records } =
+            from_scan(session, &args.input, &scan, args.holes.choice(), &staged)?;
         before.push(read);
         before.extend(records);
-        extra = Some(more);
-        (mesh, None)
+        extra = Some(facts);
+        (mesh, Some(tags))
     } else {
         let (tagged, read) = session.step("read", || files::tagged_mesh(&args.input))?;
         before.push(read);
@@ -44,8 +46,21 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
         output: &args.output,
         up: args.up.into(),
         scan: extra,
+        truth: None,
     };
     produce(session, job, staged, before)
+}
+
+/// A scan on its way to a model.
+pub struct Scanned {
+    /// The mesh that was made of it.
+    pub mesh: TriMesh,
+    /// Its sharp edges.
+    pub tags: FeatureTags,
+    /// What was found.
+    pub facts: ScanFacts,
+    /// The stages that ran.
+    pub records: Vec<StageRecord>,
 }
 
 /// What the stages before the mesh found.
@@ -56,6 +71,8 @@ pub struct ScanFacts {
     pub quality: pipeline::Quality,
     /// Warnings of the scan.
     pub warnings: Vec<pipeline::Warning>,
+    /// The raw points, in parts: on the surface, and outliers.
+    pub points: [Vec<DVec3>; 2],
 }
 
 /// The stages from a scan to a mesh; leaves `points.ply`.
@@ -65,7 +82,7 @@ pub fn from_scan(
     scan: &planish::cloud::Cloud,
     close: Option<bool>,
     staged: &Staged,
-) -> Result<(TriMesh, ScanFacts, Vec<StageRecord>), Failure> {
+) -> Result<Scanned, Failure> {
     let params = pipeline::ScanParams {
         clean: Default::default(),
         contour: Default::default(),
@@ -75,7 +92,7 @@ pub fn from_scan(
         close,
     };
     let fault = |e: &dyn std::fmt::Display| Failure::input(path, super::with_hint(&e.to_string()));
-    let (made, mesh) = session.bars.step("mesh", |o| pipeline::mesh_scan(scan, &params, o));
+    let (made, record) = session.bars.step("mesh", |o| pipeline::mesh_scan(scan, &params, o));
     if crate::progress::interrupted() {
         return Err(Failure::interrupted());
     }
@@ -92,11 +109,19 @@ pub fn from_scan(
         input: super::clean::scan_facts(path, scan, session.units()),
         quality: Default::default(),
         warnings: Vec::new(),
+        points: Default::default(),
     };
     pipeline::scan_figures(&made, &mut facts.quality, &mut facts.warnings);
     facts.quality.insert("scan.outliers".into(), pipeline::Figure::Count(points.outliers as u64));
     facts.quality.insert("scan.moved_rms".into(), pipeline::Figure::Number(points.moved_rms));
-    Ok((made.meshed.extracted.mesh, facts, vec![mesh, project]))
+    facts
+        .quality
+        .insert("scan.moved_rms_rel".into(), pipeline::Figure::Number(points.moved_rms / facts.input.diagonal));
+    for (p, &off) in scan.points.iter().zip(&points.strays) {
+        facts.points[usize::from(off)].push(*p);
+    }
+    let (mesh, tags) = (made.meshed.extracted.mesh, made.meshed.extracted.tags);
+    Ok(Scanned { mesh, tags, facts, records: vec![record, project] })
 }
 
 /// A mesh on its way to a model.
@@ -121,17 +146,21 @@ pub struct Job<'a> {
     pub up: Up,
     /// What the stages before the mesh found, if the input is a scan.
     pub scan: Option<ScanFacts>,
+    /// The surface that was scanned, where it is known.
+    pub truth: Option<&'a TriMesh>,
 }
 
 /// Fits a model and writes all products.
 pub fn produce(session: &Session, job: Job, staged: Staged, before: Vec<StageRecord>) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
     let (path, output, demanded, up) = (job.path, job.output, job.demanded, job.up);
+    let mut job = job;
+    let raw = job.scan.as_mut().map(|s| std::mem::take(&mut s.points));
     let (mut report, model) = fitted(session, job, before)?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let options = WriteOptions { units: model.units, up, name };
     let ((), write) = session.step("write", || write_products(&staged, output, &model, &options))?;
-    let (pictures, draw) = session.step("pictures", || pictures::pictures(&model, &report, up))?;
+    let (pictures, draw) = session.step("pictures", || pictures::pictures(&model, raw.as_ref(), &report, up))?;
     report.stages.extend([write, draw]);
     write_text(&staged.path("report.json"), &report.to_json())?;
     write_text(&staged.path("report.html"), &report::html(&report, &pictures))?;
@@ -161,9 +190,28 @@ pub fn fitted(session: &Session, job: Job, before: Vec<StageRecord>) -> Result<(
     report.quality = quality;
     report.warnings = warnings;
     report.seams = seam_rows(&model, &seams);
+    if let Some(truth) = job.truth {
+        let noise = job.scan.as_ref().and_then(|s| s.quality.get("scan.noise")).map_or(0.0, |f| f.value());
+        // An edge has its seam within two noise levels; without noise within a thousandth of the diagonal.
+        let within = (2.0 * noise).max(1e-3 * truth.bounds().diagonal());
+        let (found, record) =
+            session.bars.step("truth", |o| pipeline::truth_figures(truth, job.input, &model, within, o));
+        if crate::progress::interrupted() {
+            return Err(Failure::interrupted());
+        }
+        report.quality.extend(found.map_err(Failure::fault)?);
+        report.stages.push(record);
+    }
     if let Some(scan) = job.scan {
-        report.input = scan.input;
+        // Outliers are no part of the shape: its size is that of the mesh, for all figures.
+        let diagonal = report.input.diagonal;
+        report.input = report::Input { diagonal, ..scan.input };
         report.quality.extend(scan.quality);
+        for key in ["scan.noise", "scan.spacing", "scan.moved_rms", "scan.to_mesh_rms", "scan.to_mesh_mean"] {
+            if let Some(x) = report.figure(key) {
+                report.quality.insert(format!("{key}_rel"), pipeline::Figure::Number(x / diagonal));
+            }
+        }
         report.warnings.extend(scan.warnings);
     }
     model.units = units;
@@ -187,8 +235,19 @@ pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
     let figure = |key: &str| report.figure(key).unwrap_or(0.0);
     let length = |key: &str| distance(figure(key), diagonal, unit);
     let closed = if report.flag("mesh.watertight") == Some(true) { "watertight" } else { "open" };
-    table
-        .row("input", format!("{}: {} triangles, {closed}", report.input.path, count(figure("mesh.triangles") as u64)));
+    let triangles = format!("{} triangles, {closed}", count(figure("mesh.triangles") as u64));
+    match report.input.counts.get("points") {
+        Some(&points) => {
+            table.row("input", format!("{}: {} points", report.input.path, count(points)));
+            table.row("noise", length("scan.noise"));
+            table.row("orientation", format!("{} of the evidence agrees", percent(figure("scan.confidence"))));
+            table.row("points to mesh", format!("{} RMS", length("scan.to_mesh_rms")));
+            table.row("mesh", triangles);
+        }
+        None => {
+            table.row("input", format!("{}: {triangles}", report.input.path));
+        }
+    }
     table.row("patches", count(figure("patches.count") as u64));
     table.row("control points", count(figure("surface.control_points") as u64));
     table.row("grids", format!("{} points, {} folds", count(figure("grid.points") as u64), figure("grid.folds")));
@@ -209,6 +268,17 @@ pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
         let reached = figure("surface.patch_rms_max_rel");
         let word = if reached > wanted { "missed" } else { "kept" };
         table.row("tolerance", format!("{word}: {} for {} of the diagonal", number(reached), number(wanted)));
+    }
+    if report.figure("truth.displaced_rms").is_some() {
+        table.row("to the truth", format!("{} RMS", length("truth.displaced_rms")));
+        table.row(
+            "true sharp edges",
+            format!(
+                "{} have a seam, {} with their angle",
+                percent(figure("truth.sharp_found")),
+                percent(figure("truth.sharp_met"))
+            ),
+        );
     }
     let seconds: f64 = report.stages.iter().map(|s| s.seconds).sum();
     table.row("time", format!("{} s", number(seconds)));

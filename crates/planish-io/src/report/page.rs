@@ -33,6 +33,40 @@ pub struct Scale {
     pub labels: Vec<String>,
 }
 
+/// Figures of a scan in words: key, meaning, and how the value is read.
+const SCAN_FIGURES: [(&str, &str, Reading); 14] = [
+    ("scan.noise", "Noise of the points, standard deviation", Reading::Length),
+    ("scan.spacing", "Distance of neighbouring points", Reading::Length),
+    ("scan.samples", "Samples fitted to them", Reading::Plain),
+    ("scan.segments", "Connected parts", Reading::Plain),
+    ("scan.confidence", "Evidence that agrees with the orientation", Reading::Fraction),
+    ("scan.normal_noise_deg", "Typical error of the normals", Reading::Degrees),
+    ("scan.outliers", "Outliers left out", Reading::Plain),
+    ("scan.moved_rms", "Points moved onto the surface by, root mean square", Reading::Length),
+    ("scan.closed", "Holes were closed", Reading::Plain),
+    ("scan.specks", "Specks of noise left out", Reading::Plain),
+    ("scan.to_mesh_rms", "Raw points to the mesh, root mean square", Reading::Length),
+    ("scan.to_mesh_mean", "Raw points to the mesh, mean", Reading::Length),
+    ("truth.noise_rel", "True noise along the rays", Reading::Fraction),
+    ("truth.outliers", "True number of wrong ranges", Reading::Plain),
+];
+
+/// Figures of a result against a known truth.
+const TRUTH_FIGURES: [(&str, &str, Reading); 12] = [
+    ("truth.mesh_rms", "Mesh to truth, root mean square", Reading::Length),
+    ("truth.mesh_max", "Mesh to truth, largest", Reading::Length),
+    ("truth.mesh_normal_deg", "Normals of the mesh, mean error", Reading::Degrees),
+    ("truth.surface_rms", "Surfaces to truth, root mean square", Reading::Length),
+    ("truth.surface_normal_deg", "Normals of the surfaces, mean error", Reading::Degrees),
+    ("truth.displaced_rms", "Displaced surfaces to truth, root mean square", Reading::Length),
+    ("truth.displaced_max", "Displaced surfaces to truth, largest", Reading::Length),
+    ("truth.displaced_normal_deg", "Normals of the displaced surfaces, mean error", Reading::Degrees),
+    ("truth.sharp_length", "Length of the true edges above 40°", Reading::Length),
+    ("truth.sharp_found", "Of that with a seam on it", Reading::Fraction),
+    ("truth.sharp_met", "Of that with the true angle within 3°", Reading::Fraction),
+    ("truth.sharp_false", "Sharp seams where the truth is smooth", Reading::Fraction),
+];
+
 /// Figures of quality in words: key, meaning, and how the value is read.
 const FIGURES: [(&str, &str, Reading); 23] = [
     ("mesh.triangles", "Triangles of the mesh after repair", Reading::Plain),
@@ -85,7 +119,9 @@ pub fn html(report: &Report, pictures: &[Picture]) -> String {
     warnings(&mut page, report);
     gallery(&mut page, pictures);
     seams(&mut page, report);
-    figures(&mut page, report);
+    figures(&mut page, report, "Scan", &SCAN_FIGURES);
+    figures(&mut page, report, "Against the truth", &TRUTH_FIGURES);
+    figures(&mut page, report, "Figures", &FIGURES);
     stages(&mut page, report);
     let _ = write!(
         page,
@@ -122,6 +158,20 @@ fn lead(page: &mut String, report: &Report) {
         );
     }
     text += ".";
+    if let (Some(noise), Some(sure)) = (report.figure("scan.noise_rel"), report.figure("scan.confidence")) {
+        text += &format!(
+            " The points scatter by {} of the diagonal; {} of the evidence agrees on which side is outside.",
+            percent(noise),
+            percent(sure)
+        );
+    }
+    if let (Some(rms), Some(found)) = (report.figure("truth.displaced_rms_rel"), report.figure("truth.sharp_found")) {
+        text += &format!(
+            " From the true shape the result is {} of the diagonal away; {} of its sharp edges have a seam.",
+            percent(rms),
+            percent(found)
+        );
+    }
     if let Some(rms) = report.figure("displaced.rms_rel") {
         text += &format!(" With the displacement maps applied the average is {}.", percent(rms));
     }
@@ -278,16 +328,17 @@ fn gap_of(report: &Report, gap: f64) -> f64 {
     if gap <= ROUNDING * report.input.diagonal { 0.0 } else { gap }
 }
 
-fn figures(page: &mut String, report: &Report) {
-    if report.quality.is_empty() {
+fn figures(page: &mut String, report: &Report, title: &str, list: &[(&str, &str, Reading)]) {
+    if !list.iter().any(|f| report.quality.contains_key(f.0)) {
         return;
     }
-    page.push_str(
-        "<h2>Figures</h2>\n<p class=\"note\">Each with its key in <code>report.json</code>.</p>\n<div class=\"scroll\">\
+    let _ = write!(
+        page,
+        "<h2>{title}</h2>\n<p class=\"note\">Each with its key in <code>report.json</code>.</p>\n<div class=\"scroll\">\
          <table><tbody>\n",
     );
     let unit = report.input.units.as_str();
-    for (key, words, reading) in FIGURES {
+    for &(key, words, reading) in list {
         let Some(figure) = report.quality.get(key) else { continue };
         let value = match (figure, reading) {
             (Figure::Flag(yes), _) => if *yes { "yes" } else { "no" }.to_owned(),

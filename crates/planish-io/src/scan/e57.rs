@@ -1,8 +1,9 @@
-//! E57: scans with poses (ASTM E2807). All scans of a file become one cloud.
+//! E57: scans with poses (ASTM E2807). All scans of a file become one cloud, and a cloud of several stations becomes as
+//! many scans, each in the coordinates of its scanner.
 
 use super::{column, foreign, guarded};
 use crate::{Place, ReadError, WriteError};
-use e57::{CartesianCoordinate, E57Reader, E57Writer, Record, RecordValue};
+use e57::{CartesianCoordinate, E57Reader, E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
 use glam::DVec3;
 use planish::cloud::Cloud;
 use std::io::Cursor;
@@ -30,7 +31,11 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Cloud, ReadError> {
                 return Err(ReadError::Truncated { what, needed, left: size, place: Place::Item("scan", k) });
             }
             let origin = scan.transform.as_ref().map(|t| &t.translation).map(|t| DVec3::new(t.x, t.y, t.z));
-            cloud.scanners.push(origin.unwrap_or(DVec3::ZERO));
+            // Without a pose nobody knows where the scanner stood.
+            let station = origin.map_or(u32::MAX, |o| {
+                cloud.scanners.push(o);
+                cloud.scanners.len() as u32 - 1
+            });
             let mut points = file.pointcloud_simple(&scan).map_err(foreign)?;
             points.apply_pose(true);
             points.spherical_to_cartesian(true);
@@ -38,12 +43,15 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Cloud, ReadError> {
                 let p = point.map_err(foreign)?;
                 let CartesianCoordinate::Valid { x, y, z } = p.cartesian else { continue };
                 cloud.points.push(DVec3::new(x, y, z));
-                cloud.seen_by.push(k as u32);
+                cloud.seen_by.push(station);
                 has_color |= p.color.is_some();
                 has_intensity |= p.intensity.is_some();
                 color.extend(p.color.map_or([0.0; 3], |c| [c.red, c.green, c.blue]));
                 intensity.push(p.intensity.unwrap_or(0.0));
             }
+        }
+        if cloud.scanners.is_empty() {
+            cloud.seen_by.clear();
         }
         if has_color {
             cloud.attributes.push(column("color", 3, color));
@@ -72,19 +80,38 @@ pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud) -> Result<(), W
     if intensity.is_some() {
         prototype.push(Record::INTENSITY_UNIT_F32);
     }
-    let mut scan = file.add_pointcloud(&guid("scan", world.len()), prototype).map_err(fault)?;
-    scan.set_name(Some("planish".into()));
-    for (i, p) in world.iter().enumerate() {
-        let mut values: Vec<RecordValue> = p.to_array().map(RecordValue::Double).into();
-        if let Some(a) = color {
-            let byte = |x: f32| RecordValue::Integer((x.clamp(0.0, 1.0) * 255.0).round() as i64);
-            values.extend(a.values[3 * i..3 * i + 3].iter().map(|&x| byte(x)));
-        }
-        if let Some(a) = intensity {
-            values.push(RecordValue::Single(a.values[i].clamp(0.0, 1.0)));
-        }
-        scan.add_point(values).map_err(fault)?;
+    // Points of no known scanner are a scan without a pose.
+    let station = |i: usize| match cloud.seen_by.get(i) {
+        Some(&k) => Some(k as usize).filter(|&k| k < cloud.scanners.len()),
+        None => (cloud.scanners.len() == 1).then_some(0),
+    };
+    let mut scans: Vec<(Option<usize>, Vec<usize>)> = (0..cloud.scanners.len()).map(|k| (Some(k), vec![])).collect();
+    scans.push((None, Vec::new()));
+    for i in 0..world.len() {
+        scans[station(i).unwrap_or(cloud.scanners.len())].1.push(i);
     }
-    scan.finalize().map_err(fault)?;
+    for (number, (station, members)) in scans.into_iter().filter(|s| !s.1.is_empty()).enumerate() {
+        let name = format!("scan-{number}");
+        let mut scan = file.add_pointcloud(&guid(&name, members.len()), prototype.clone()).map_err(fault)?;
+        scan.set_name(Some(format!("planish {name}")));
+        let eye = station.map(|k| cloud.scanners[k] + cloud.shift);
+        if let Some(DVec3 { x, y, z }) = eye {
+            let translation = Translation { x, y, z };
+            scan.set_transform(Some(Transform { rotation: Quaternion::default(), translation }));
+        }
+        for i in members {
+            let p = world[i] - eye.unwrap_or(DVec3::ZERO);
+            let mut values: Vec<RecordValue> = p.to_array().map(RecordValue::Double).into();
+            if let Some(a) = color {
+                let byte = |x: f32| RecordValue::Integer((x.clamp(0.0, 1.0) * 255.0).round() as i64);
+                values.extend(a.values[3 * i..3 * i + 3].iter().map(|&x| byte(x)));
+            }
+            if let Some(a) = intensity {
+                values.push(RecordValue::Single(a.values[i].clamp(0.0, 1.0)));
+            }
+            scan.add_point(values).map_err(fault)?;
+        }
+        scan.finalize().map_err(fault)?;
+    }
     file.finalize().map_err(fault)
 }

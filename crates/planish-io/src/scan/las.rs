@@ -6,7 +6,8 @@ use glam::DVec3;
 use las::point::Format;
 use las::{Builder, Color, Point, Reader, Transform, Vector, Writer};
 use planish::cloud::Cloud;
-use std::io::Cursor;
+use std::fs::File;
+use std::io::{BufWriter, Cursor};
 use std::path::Path;
 
 /// Points read at once.
@@ -86,7 +87,8 @@ pub(super) fn read(bytes: Vec<u8>, classes: &[u8]) -> Result<Cloud, ReadError> {
 /// Steps of a coordinate over the size of the cloud: fine enough for any scanner, coarse enough for 31 bits.
 const STEPS: f64 = 1e9;
 
-pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud) -> Result<(), WriteError> {
+/// Writes LAS 1.2, compressed (LAZ) or not.
+pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud, compressed: bool) -> Result<(), WriteError> {
     let fault = |e: las::Error| WriteError::Io(std::io::Error::other(e));
     let bounds = planish::geom::Aabb::of(world);
     let mut builder = Builder::from((1, 2));
@@ -94,6 +96,7 @@ pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud) -> Result<(), W
     let intensity = cloud.attribute("intensity", 1);
     let class = cloud.attribute("classification", 1);
     builder.point_format = Format::new(if color.is_some() { 2 } else { 0 }).map_err(fault)?;
+    builder.point_format.is_compressed = compressed;
     builder.generating_software = format!("planish {}", env!("CARGO_PKG_VERSION"));
     let axis = |k: usize| {
         let size = bounds.size()[k].max(bounds.diagonal() * 1e-3).max(1e-6);
@@ -103,7 +106,7 @@ pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud) -> Result<(), W
     };
     builder.transforms = Vector { x: axis(0), y: axis(1), z: axis(2) };
     let header = builder.into_header().map_err(fault)?;
-    let mut writer = Writer::from_path(path.with_extension("las"), header).map_err(fault)?;
+    let mut writer = Writer::new(BufWriter::new(File::create(path)?), header).map_err(fault)?;
     for (i, p) in world.iter().enumerate() {
         let whole = |x: f32| (x.clamp(0.0, 1.0) * 65535.0).round() as u16;
         let point = Point {
@@ -124,10 +127,5 @@ pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud) -> Result<(), W
         };
         writer.write_point(point).map_err(fault)?;
     }
-    writer.close().map_err(fault)?;
-    drop(writer);
-    if path.with_extension("las") != path {
-        std::fs::rename(path.with_extension("las"), path)?;
-    }
-    Ok(())
+    writer.close().map_err(fault)
 }

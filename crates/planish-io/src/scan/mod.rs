@@ -28,7 +28,7 @@ pub struct ScanOptions {
 /// Extensions that always mean a scan.
 pub const SCAN_EXTENSIONS: [&str; 10] = ["e57", "las", "laz", "pcd", "xyz", "txt", "csv", "asc", "pts", "npz"];
 /// Extensions that can be written.
-const WRITTEN: [&str; 4] = ["ply", "las", "e57", "xyz"];
+pub const WRITTEN_SCANS: [&str; 5] = ["ply", "las", "laz", "e57", "xyz"];
 
 /// True if the file is a scan: by its extension, for `.ply` by the absence of faces, for `.npy` by a shape of rows.
 pub fn is_scan(path: &Path) -> bool {
@@ -95,15 +95,15 @@ fn shift(cloud: &mut Cloud) {
     }
 }
 
-/// Writes a scan: `.ply`, `.las`, `.e57` or `.xyz`, with the shift added again. The file appears whole or not at all.
+/// Writes a scan: `.ply`, `.las`, `.laz`, `.e57` or `.xyz`, with the shift added again. The file appears whole or not at all.
 /// # Errors
 /// [`WriteError::UnknownExtension`], [`WriteError::Nothing`] for no points, [`WriteError::Value`] for coordinates that
 /// are no numbers.
 pub fn write_scan(path: impl AsRef<Path>, cloud: &Cloud) -> Result<(), WriteError> {
     let path = path.as_ref();
     let extension = lower(path);
-    if !WRITTEN.contains(&extension.as_str()) {
-        let known = WRITTEN.map(|e| format!(".{e}")).join(", ");
+    if !WRITTEN_SCANS.contains(&extension.as_str()) {
+        let known = WRITTEN_SCANS.map(|e| format!(".{e}")).join(", ");
         return Err(WriteError::UnknownExtension { extension, known });
     }
     if cloud.points.is_empty() {
@@ -127,7 +127,7 @@ pub fn write_scan(path: impl AsRef<Path>, cloud: &Cloud) -> Result<(), WriteErro
         "ply" => atomic::write(path, |out| {
             ply::write_points(out, &world, &cloud.attributes, &format!("planish {}", env!("CARGO_PKG_VERSION")))
         }),
-        "las" => atomic::write_at(path, |at| las::write(at, &world, cloud)),
+        "las" | "laz" => atomic::write_at(path, |at| las::write(at, &world, cloud, extension == "laz")),
         "e57" => atomic::write_at(path, |at| e57::write(at, &world, cloud)),
         _ => atomic::write(path, |out| table::write(out, &world, cloud)),
     }

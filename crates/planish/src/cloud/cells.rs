@@ -26,6 +26,8 @@ const REFINED: usize = 3;
 const WORSE: f64 = 4.0;
 /// Passes over all cells: the second chooses among what the first has found.
 const PASSES: usize = 2;
+/// The middle of the points of a cell is at most this many supports from its surface: at a corner of 90 degrees a tenth.
+const AWAY: f64 = 0.25;
 /// Squared bias of a cell in the blend for the cost of its points beyond one.
 const BIAS: f64 = 0.5;
 /// Points of a cell at most: these many tell the sheets apart.
@@ -114,7 +116,7 @@ pub(super) fn cells(
             })
             .collect();
     }
-    Some(made.iter().zip(&places).filter_map(|(f, p)| f.as_ref().map(|f| f.cell(p))).collect())
+    Some(made.iter().zip(&places).filter_map(|(f, p)| f.as_ref().filter(|f| f.at_home(p)).map(|f| f.cell(p))).collect())
 }
 
 /// Where a cell is.
@@ -146,6 +148,12 @@ struct Found {
 }
 
 impl Found {
+    /// Is the surface where the points of the site are? Those of a stray are not.
+    fn at_home(&self, place: &Place) -> bool {
+        let off = joined(&self.sheets, self.concave, place.center).1.abs();
+        off < (LIMIT * place.noise).max(AWAY * place.support)
+    }
+
     fn cell(&self, place: &Place) -> Cell {
         let support = place.support;
         let mut sheets = [self.sheets[0].0; MOST];

@@ -13,6 +13,7 @@
 
 use super::Quadric;
 use super::fit::{Sheet, Weighted, kernel, localized, sheet};
+use super::layers;
 use super::nest::{LIMIT, Seen, cost, nest};
 use super::sites::{APART, Sites, in_pieces};
 use crate::geom::KdTree;
@@ -84,6 +85,8 @@ pub(super) struct Fit {
     pub site: u32,
     /// Number of sheets of that site.
     pub sheets: u8,
+    /// Distance to the other sheet of a plate or a gap, world units; infinite where there is none.
+    pub gap: f64,
     /// Points that it explains better than its neighbours do.
     pub owned: u32,
 }
@@ -182,14 +185,16 @@ fn fit_site(
     let survey = &sites.survey[site];
     let p = survey.quadric.center;
     let noise = sites.prior[site].noise.min(survey.noise).max(1e-300);
-    let starts = if class == 0 {
+    let starts = if let Some(layer) = survey.layer {
+        [survey.quadric, layer].map(|sheet| Start { sheet, at: sheet.project(p).0, radius: survey.radius }).to_vec()
+    } else if class == 0 {
         vec![Start { sheet: survey.quadric, at: p, radius: survey.radius }]
     } else {
         choose(tree, survey.radius, sites.gap[site] / APART, survey.quadric, noise, closed, closed_tree)
     };
     let sheets = starts.len() as u8;
     let all: Vec<Quadric> = starts.iter().map(|s| s.sheet).collect();
-    starts
+    let mut fits: Vec<Fit> = starts
         .into_iter()
         .enumerate()
         .filter_map(|(k, Start { sheet: start, at, radius })| {
@@ -207,11 +212,28 @@ fn fit_site(
                 class,
                 site: site as u32,
                 sheets,
+                gap: f64::INFINITY,
                 owned: 0,
             })
         })
-        .collect()
+        .collect();
+    if survey.layer.is_some()
+        && let [f, g] = &mut fits[..]
+    {
+        // The two are a plate or a gap if they still are side by side.
+        let ((d, n), (e, m)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
+        let (d, e, apart) = (d.abs(), e.abs(), f.center.distance(g.center));
+        let parallel = n.dot(g.normal).abs().min(m.dot(f.normal).abs()) > PARALLEL;
+        if parallel && d.max(e).max(apart) < (1.0 + ALIKE) * d.min(e) && d.min(e) > layers::APART * noise {
+            (f.gap, g.gap) = (d, e);
+        }
+    }
+    fits
 }
+
+/// Sheets side by side are parallel by this cosine (10 degrees), and their distance is the same within this share.
+const PARALLEL: f64 = 0.985;
+const ALIKE: f64 = 0.3;
 
 /// The sheets that explain the points around a site, each with the middle of the points that are nearest to it there.
 fn choose(
@@ -293,6 +315,7 @@ fn choose(
 }
 
 /// Where a sheet begins to grow.
+#[derive(Clone, Copy)]
 struct Start {
     sheet: Quadric,
     at: DVec3,

@@ -18,6 +18,11 @@ const LEVEL: f64 = 0.05;
 /// Cosine between a normal and the reflection of the other from which they are opposite points ([X03] §7: sqrt(3) / 2).
 const OPPOSITE: f64 = 0.866;
 
+/// Weight of the vote of two sheets of one plate or gap: more than any other has.
+const LAYERS: f64 = 4.0;
+/// A sheet goes on at most this share of the gap aside.
+const SIDE: f64 = 0.4;
+
 /// Power of the ratio of the noise of two samples in the weight of their vote.
 const THICK: i32 = 6;
 
@@ -64,8 +69,17 @@ fn vote(fits: &[Fit], i: usize, j: usize) -> Option<Vote> {
     // A fit through two sheets at once is thicker than what is around it, and speaks for neither.
     let alike = (f.noise.min(g.noise) / f.noise.max(g.noise).max(1e-300)).powi(THICK).max(1e-6);
     let near = (1.0 - apart / (2.0 * reach)).max(0.01) * alike;
+    // The two sides of a plate or a gap that were found as such look away from each other, and nothing speaks louder.
+    if f.site == g.site && f.gap.is_finite() && g.gap.is_finite() {
+        let sign = -turn.signum();
+        return Some(Vote { a: i as u32, b: j as u32, sign, weight: LAYERS, smooth: false });
+    }
     let slack = LEVEL * apart + 3.0 * (f.error + g.error);
     if turn.abs() > 2.0 * SMOOTH && d.abs() < slack && e.abs() < slack {
+        // No sheet of a plate goes on as the other one.
+        if d.abs().max(e.abs()) > SIDE * f.gap.min(g.gap) {
+            return None;
+        }
         let level = 1.0 - d.abs().max(e.abs()) / slack;
         let straight = (turn.abs() / 2.0 - SMOOTH) / (1.0 - SMOOTH);
         return Some(Vote {

@@ -14,13 +14,16 @@ mod dense;
 mod dipoles;
 mod fit;
 mod front;
+mod layers;
 mod link;
 mod moments;
 mod nest;
 mod orient;
 mod project;
 mod quadric;
+mod scanner;
 mod sites;
+mod strays;
 mod survey;
 
 pub use blend::{Blend, Blended};
@@ -28,6 +31,7 @@ pub use cells::Cell;
 pub use dipoles::Dipoles;
 pub use project::{Cleaned, ProjectParams, project};
 pub use quadric::Quadric;
+pub use scanner::{ScannerParams, VirtualScan, virtual_scan};
 
 use crate::geom::{Aabb, KdTree};
 use crate::mesh::Attribute;
@@ -189,6 +193,9 @@ pub struct Samples {
     pub spacing: f64,
     /// Typical error of the normals, degrees.
     pub normal_noise_deg: f64,
+    /// Distance of sheets that were found side by side, the sides of a plate or a gap, world units: all but a twentieth are
+    /// farther apart. Infinite where there are none.
+    pub gap: f64,
     /// Whether each segment is closed.
     pub closed: Vec<bool>,
     /// Bounding-box diagonal of the points, world units.
@@ -203,7 +210,7 @@ pub const FEWEST: usize = 18;
 /// [`CloudError`] for too few or collinear points, no surface, or if cancelled.
 pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Result<Samples, CloudError> {
     let (points, ids) = distinct(cloud)?;
-    let tree = KdTree::new(&points);
+    let (points, ids, tree) = strays::without(points, ids);
     let part = |from: f64, to: f64| Part { observer, from, to };
     let sites = sites::choose(&points, &tree, &part(0.0, 0.45)).ok_or(CloudError::Cancelled)?;
     if sites.point.is_empty() {
@@ -259,11 +266,19 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
         noise: middle(sites.survey.iter().map(|s| s.noise).collect()),
         spacing: middle(sites.survey.iter().map(|s| s.spacing).collect()),
         normal_noise_deg: slope.to_degrees(),
+        gap: least_gap(&fits),
         samples,
         cells,
         closed: oriented.closed,
         diagonal: Aabb::of(&points).diagonal(),
     })
+}
+
+/// The twentieth part of the gaps between sheets side by side, if more than a hundredth of the fits have one.
+fn least_gap(fits: &[front::Fit]) -> f64 {
+    let mut gaps: Vec<f64> = fits.iter().map(|f| f.gap).filter(|g| g.is_finite()).collect();
+    gaps.sort_unstable_by(f64::total_cmp);
+    if gaps.len() * 100 > fits.len() { gaps[gaps.len() / 20] } else { f64::INFINITY }
 }
 
 /// A piece of the progress of a stage.

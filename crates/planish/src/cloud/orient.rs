@@ -38,6 +38,8 @@ pub(super) struct Oriented {
 const SWEEPS: usize = 12;
 /// A part whose normals cancel to this share of its area may be closed.
 const CANCELS: f64 = 0.15;
+/// And its volume is above this share of what its area and size allow.
+const HOLLOW: f64 = 0.05;
 /// Scanner positions and normals of the file decide a part if their sum is above this share of its area.
 const DECIDED: f64 = 0.05;
 
@@ -173,7 +175,9 @@ fn decide(own: &[u32], fits: &[Fit], sign: &mut [f64], hints: &Hints, settled: &
     let center = middle(own.iter().map(|&i| (fits[i as usize].center, hints.areas[i as usize])));
     let volume = sum(&|i| sign[i] * fits[i].normal.dot(fits[i].center - center));
     let extent = sum(&|i| (fits[i].center - center).length());
-    let closed = total.length() < CANCELS * area && volume.abs() > 0.05 * extent;
+    // A plate has next to no volume; that it has two sides is known.
+    let plate: f64 = sum(&|i| f64::from(u8::from(fits[i].gap.is_finite())));
+    let closed = total.length() < CANCELS * area && (volume.abs() > HOLLOW * extent || plate > area / 2.0);
     let outward = |known: &[DVec3]| sum(&|i| sign[i] * fits[i].normal.dot(known[i]));
     let mut verdict = 0.0;
     for known in [hints.normals, hints.toward].into_iter().flatten() {

@@ -45,7 +45,9 @@ pub struct Cleaned {
     pub cloud: Cloud,
     /// Feature lines.
     pub lines: Vec<Vec<DVec3>>,
-    /// Number of outliers among all points of the scan.
+    /// For each point of the scan whether it is an outlier or no number.
+    pub strays: Vec<bool>,
+    /// Number of outliers among the points that are numbers.
     pub outliers: usize,
     /// Root of the mean squared distance of the points that are no outliers to the surface, world units.
     pub moved_rms: f64,
@@ -94,6 +96,8 @@ pub fn project(
     let outliers = placed.iter().filter(|p| p.outlier).count();
     let inner = (placed.len() - outliers).max(1) as f64;
     let moved_rms = (placed.iter().filter(|p| !p.outlier).map(|p| p.moved * p.moved).sum::<f64>() / inner).sqrt();
+    let mut strays = vec![true; cloud.points.len()];
+    placed.iter().zip(&finite).for_each(|(p, &i)| strays[i as usize] = p.outlier);
     let lines = feature_lines(&placed, LINE * samples.spacing);
     let thinned = params.spacing > 0.0;
     let mut kept: Vec<u32> =
@@ -137,7 +141,7 @@ pub fn project(
     attributes.extend(own);
     result.attributes = attributes;
     observer.progress(1.0);
-    Ok(Cleaned { cloud: result, lines, outliers, moved_rms })
+    Ok(Cleaned { cloud: result, lines, strays, outliers, moved_rms })
 }
 
 fn place(

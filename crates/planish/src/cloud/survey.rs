@@ -4,13 +4,15 @@
 //! 1. nested balls, each 1.3 times as wide, one sum of monomials each
 //! 2. the height field of each ball; its residuals averaged in sectors of equal area: what is left in the averages
 //!    beyond noise is bias, what is left inside the sectors is noise
-//! 3. the ball of least variance plus squared bias
+//! 3. two sheets close together where the residuals have a dip (`layers`)
+//! 4. the ball of least variance plus squared bias
 //!
 //! Departs from [X03]: no feature size is set by hand, and the noise is measured in every place by itself.
 
 use super::Quadric;
 use super::fit::{Frame, Height, framed_height};
 use super::front::{PLENTY, WIDE_ENOUGH};
+use super::layers::{Layers, split};
 use super::moments::Moments;
 use crate::geom::KdTree;
 use glam::DVec3;
@@ -47,6 +49,8 @@ pub(super) struct Survey {
     pub spacing: f64,
     /// The height field.
     pub quadric: Quadric,
+    /// A second sheet close to it: then this is the sheet of the place itself, and both are one plate or one gap.
+    pub layer: Option<Quadric>,
 }
 
 /// Buffers of one thread.
@@ -91,6 +95,7 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
         }
     }
     let radius = |j: usize| r0 * GROWTH.powi(j as i32);
+    let quadric = |h: &Height| Quadric { center: p, scale: r0, a: h.implicit() };
     let mut sums = Moments::ZERO;
     let (mut best, mut least): (Option<Survey>, f64) = (None, f64::INFINITY);
     scratch.y.clear();
@@ -124,8 +129,13 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
             let Some(height) = framed_height(&sums.matrix(), Frame::of_moments(&sums)) else { continue };
             let ball = GROWTH.powi(j as i32);
             let (noise, excess) = bias(&height, &scratch.y, ball);
-            let noise = noise.max(floor / r0);
             let count = scratch.y.len();
+            let layers = split(&height, &scratch.y);
+            let (noise, excess) = match &layers {
+                None => (noise.max(floor / r0), excess),
+                // Each sheet has half of the points, and its bias is not measured: that of both together is.
+                Some(l) => (l.noise.max(floor / r0), PARAMETERS + 2.0 * layer_bias(l, &scratch.y, ball)),
+            };
             if ball < NOISE_RADII * noise {
                 continue;
             }
@@ -140,8 +150,10 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
                     radius: radius(j),
                     noise: noise * r0,
                     error: error * r0 * r0,
-                    spacing: radius(j) * (std::f64::consts::PI / count as f64).sqrt(),
-                    quadric: Quadric { center: p, scale: r0, a: height.implicit() },
+                    spacing: radius(j)
+                        * (std::f64::consts::PI * if layers.is_some() { 2.0 } else { 1.0 } / count as f64).sqrt(),
+                    quadric: quadric(layers.as_ref().map_or(&height, |l| &l.sheets[0])),
+                    layer: layers.map(|l| quadric(&l.sheets[1])),
                 });
             } else if error > HOPELESS * least {
                 break 'rounds;
@@ -149,6 +161,15 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
         }
     }
     best
+}
+
+/// What the averages of the sectors hold beyond noise if every point belongs to the nearer of two sheets.
+fn layer_bias(layers: &Layers, points: &[DVec3], ball: f64) -> f64 {
+    let own = |k: usize| -> Vec<DVec3> {
+        let [a, b] = [k, 1 - k].map(|i| &layers.sheets[i]);
+        points.iter().copied().filter(|&y| a.residual(y).abs() <= b.residual(y).abs()).collect()
+    };
+    (0..2).map(|k| bias(&layers.sheets[k], &own(k), ball).1).sum::<f64>() / 2.0
 }
 
 /// Noise inside the sectors and what the averages of the sectors hold beyond it, in units of the squared noise.

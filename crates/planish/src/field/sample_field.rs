@@ -11,10 +11,12 @@ use rayon::prelude::*;
 
 /// The pseudo-distance changes by at most this much per length near the surface.
 const STEEP: f64 = 1.2;
-/// From this share of the support on a point is beside the data.
+/// From this share of the support on a point is beside the data: cells stand less than .45 supports apart.
 const BESIDE: f64 = 0.5;
-/// The winding number decides where it is this far from one half.
-const CERTAIN: f64 = 0.3;
+/// A winding number closer to one half than this says nothing beside cells, and twice as far off all.
+const UNSURE: f64 = 0.15;
+/// From this share on the winding number decides alone.
+const BEYOND: f64 = 1.0;
 
 /// Points in a row that are asked by one thread.
 const CHUNK: usize = 64;
@@ -54,16 +56,28 @@ impl SampleField {
             let (value, normal) = self.beyond(p, slope);
             return (value, normal, false);
         };
-        // Away from the data the samples together know better than a fit carried on beyond its points.
+        // Away from the data the samples together know better than a fit carried on beyond its points: from the cells to
+        // the winding number without a step, so that the surface goes on smoothly over a hole.
         if here.aside > BESIDE * BESIDE
             && let Some(dipoles) = &self.closing
         {
-            let winding = dipoles.number(p, 0.0);
-            let outside = winding < 0.5;
-            if outside != (here.value >= 0.0) && (winding - 0.5).abs() > CERTAIN {
-                let size = here.value.abs().max(0.01 * self.widest);
-                return (if outside { size } else { -size }, here.normal, false);
+            let far = ((here.aside.sqrt() - BESIDE) / (BEYOND - BESIDE)).min(1.0);
+            let share = far * far * (3.0 - 2.0 * far);
+            let size = self.blend.cells()[here.cell].support;
+            // Beside the data the number has no more than its bounds; close to single dipoles it leaves them.
+            let winding = |p: DVec3| (0.5 - dipoles.number(p, 0.0)).clamp(-0.5, 0.5) * size;
+            let beyond = winding(p);
+            // Where both agree on the side the cells know the distance.
+            if beyond * here.value > 0.0 {
+                return (here.value, here.normal, false);
             }
+            let share = share * ((beyond.abs() / size - UNSURE) / UNSURE).clamp(0.0, 1.0);
+            let value = here.value + share * (beyond - here.value);
+            if !slope {
+                return (value, here.normal, false);
+            }
+            let g = gradient(winding, p, STENCIL * size).unwrap_or(here.normal);
+            return (value, here.normal.lerp(g, share).normalize_or(here.normal), false);
         }
         (here.value, here.normal, here.aside <= BESIDE * BESIDE)
     }
@@ -77,13 +91,19 @@ impl SampleField {
                 if !slope {
                     return (value(p), DVec3::ZERO);
                 }
-                let e = 1e-3 * self.widest;
-                let along = |d: DVec3| value(p + d * e) - value(p - d * e);
-                let g = DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z));
-                (value(p), g.normalize_or_zero())
+                (value(p), gradient(value, p, STENCIL * self.widest).unwrap_or(DVec3::ZERO))
             }
         }
     }
+}
+
+/// Step of differences of the winding number, in supports: dipoles are about a quarter of one apart.
+const STENCIL: f64 = 0.1;
+
+/// Unit gradient by central differences.
+fn gradient(value: impl Fn(DVec3) -> f64, p: DVec3, e: f64) -> Option<DVec3> {
+    let along = |d: DVec3| value(p + d * e) - value(p - d * e);
+    DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)).try_normalize()
 }
 
 impl Field for SampleField {

@@ -57,6 +57,10 @@ pub struct ScanMeshed {
 const CELL_SPACINGS: f64 = 1.6;
 /// A cell is this many noise levels wide.
 const CELL_NOISE: f64 = 1.0;
+/// Cells are at most this many gaps between close sheets wide: walls thinner than a cell break.
+const CELL_GAPS: f64 = 0.6;
+/// But not finer than this share of what suits the points: 16 times as many cells.
+const FINEST: f64 = 0.25;
 /// Components below this share of the area of the largest are specks of noise.
 const SPECK: f64 = 0.005;
 /// Raw points that are measured against the mesh.
@@ -64,7 +68,8 @@ const MEASURED: usize = 50_000;
 
 /// The edge of a cell that suits the samples.
 pub fn voxel_for(samples: &Samples) -> f64 {
-    (CELL_SPACINGS * samples.spacing).max(CELL_NOISE * samples.noise)
+    let usual = (CELL_SPACINGS * samples.spacing).max(CELL_NOISE * samples.noise);
+    usual.min(CELL_GAPS * samples.gap).max(FINEST * usual)
 }
 
 /// Meshes a scan.
@@ -168,8 +173,10 @@ pub fn scan_figures(made: &ScanMeshed, quality: &mut Quality, warnings: &mut Vec
     sample_figures(&made.samples, quality, warnings);
     quality.insert("scan.specks".into(), Figure::Count(made.specks as u64));
     quality.insert("scan.closed".into(), Figure::Flag(made.closed));
-    quality.insert("scan.to_mesh_rms".into(), Figure::Number(made.to_points.0));
-    quality.insert("scan.to_mesh_mean".into(), Figure::Number(made.to_points.1));
+    for (key, x) in [("rms", made.to_points.0), ("mean", made.to_points.1)] {
+        quality.insert(format!("scan.to_mesh_{key}"), Figure::Number(x));
+        quality.insert(format!("scan.to_mesh_{key}_rel"), Figure::Number(x / made.samples.diagonal));
+    }
 }
 
 /// The figures of samples alone.
@@ -180,6 +187,7 @@ pub fn sample_figures(samples: &Samples, quality: &mut Quality, warnings: &mut V
         ("scan.noise", samples.noise),
         ("scan.noise_rel", samples.noise / samples.diagonal),
         ("scan.spacing", samples.spacing),
+        ("scan.spacing_rel", samples.spacing / samples.diagonal),
         ("scan.confidence", confidence),
         ("scan.normal_noise_deg", samples.normal_noise_deg),
     ];

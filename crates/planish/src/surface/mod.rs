@@ -27,7 +27,7 @@ pub use fit::{FEWEST_CONTROL, fit};
 pub use fold::folds;
 pub use mirrored::mirror_surfaces;
 pub use network_fit::{FitParams, fit_network};
-pub use quality::{Deviation, SeamQuality, deviation, deviation_of, measure_seams};
+pub use quality::{Deviation, SeamAngle, SeamQuality, deviation, deviation_of, measure_seams, seam_angles};
 pub use resolution::Resolution;
 pub(crate) use sides::{check, node};
 pub use stitch::{StitchParams, stitch};

@@ -8,6 +8,7 @@ use super::sides::place;
 use super::{RowSampler, Surface};
 use crate::grid::Grid;
 use crate::network::{CurveKind, Network};
+use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -97,6 +98,56 @@ pub fn measure_seams(network: &Network, surfaces: &[Surface]) -> Vec<SeamQuality
         .map(|c| measure(network, surfaces, c, [uses[c][0], uses[c][1]]))
         .collect()
 }
+
+/// A place on a seam.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeamAngle {
+    /// Index of the curve.
+    pub curve: u32,
+    /// The place on the first of the two surfaces.
+    pub point: DVec3,
+    /// Angle between the two normals, degrees; not a number where a surface has none.
+    pub angle_deg: f64,
+    /// Length that it stands for, world units.
+    pub length: f64,
+}
+
+/// Angles along every curve that has a patch on both sides, in the order of the curves, at even parameters about `step`
+/// apart (world units).
+///
+/// Surfaces must be those of the network's patches.
+pub fn seam_angles(network: &Network, surfaces: &[Surface], step: f64) -> Vec<SeamAngle> {
+    let uses = network.uses();
+    let one = |c: usize| {
+        let both = [uses[c][0], uses[c][1]];
+        let jets = |t: f64| {
+            both.map(|(p, k)| {
+                let side = network.patches[p as usize].sides[k as usize];
+                let (u, v) = place(k as usize, side.reversed, t);
+                surfaces[p as usize].jet(u, v)
+            })
+        };
+        let coarse: Vec<DVec3> = uniform_parameters(SEAM_SAMPLES).into_iter().map(|t| jets(t)[0].point).collect();
+        let length: f64 = coarse.windows(2).map(|w| w[0].distance(w[1])).sum();
+        let pieces = (length / step).ceil().clamp(1.0, MOST_ANGLES);
+        let even = (0..pieces as usize).map(move |i| (i as f64 + 0.5) / pieces);
+        even.map(|t| {
+            let [a, b] = jets(t);
+            let [m, n] = [&a, &b].map(|j| j.area_vector().normalize_or(DVec3::NAN));
+            let angle_deg = m.cross(n).length().atan2(m.dot(n)).to_degrees();
+            SeamAngle { curve: c as u32, point: a.point, angle_deg, length: length / pieces }
+        })
+        .collect::<Vec<_>>()
+    };
+    (0..uses.len())
+        .into_par_iter()
+        .filter(|&c| uses[c].len() == 2 && uses[c].iter().all(|&(p, _)| (p as usize) < surfaces.len()))
+        .flat_map_iter(one)
+        .collect()
+}
+
+/// Places on one seam at most.
+const MOST_ANGLES: f64 = 1e5;
 
 fn measure(network: &Network, surfaces: &[Surface], curve: usize, uses: [(u32, u8); 2]) -> SeamQuality {
     let (first, k) = (&surfaces[uses[0].0 as usize], uses[0].1);
