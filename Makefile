@@ -48,6 +48,11 @@ docs: build
 	$(CARGO) doc --release --locked --no-deps -p planish -p planish-io
 	$(PLANISH) demo -q -o out/docs
 	python3 docs/pictures.py out/docs/report.html docs/pictures
+	python3 examples/edit/head.py out/docs/head.nrrd
+	$(PLANISH) mesh -q out/docs/head.nrrd --plain -o out/docs/head.ply
+	$(PLANISH) edit -q out/docs/head.ply examples/edit/head.toml -o out/docs/head.planish --pictures out/docs/head
+	for p in 03-paint 04-relax 10-spline 11-complete 13-mirror 14-feature; do \
+	  cp out/docs/head/$$p.png docs/pictures/head-$$p.png; done
 
 clean:
 	rm -rf out .stamp .venv

@@ -375,26 +375,59 @@ fn a_script_draws_a_network_on_a_bare_mesh_and_the_history_goes_back_and_forth_i
     // Nothing is left to make again.
     let output = planish(&["edit", "again.planish", "again.toml", "-o", "x.planish"], folder.path());
     assert_eq!(status(&output), 3);
-    assert!(error_line(&output).contains("step 1 (redo): there is nothing left to make again"));
+    assert!(error_line(&output).contains("step 1 (redo, line 1): there is nothing left to make again"));
     assert!(!folder.path().join("x.planish").exists());
 }
 
 #[test]
-fn a_script_that_cannot_be_told_its_line_and_a_wrong_edit_its_step() {
+fn wrong_scripts_are_told_with_file_line_and_hint_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     write_box(&folder.path().join("box.ply"), 4);
     let run = |text: &str| {
         fs::write(folder.path().join("s.toml"), text).unwrap();
-        let output = planish(&["edit", "box.ply", "s.toml", "-o", "box.planish"], folder.path());
+        let arguments = ["edit", "box.ply", "s.toml", "-o", "box.planish", "--pictures", "seen"];
+        let output = planish(&arguments, folder.path());
         assert_eq!(status(&output), 3, "{text}");
-        error_line(&output)
+        let line = error_line(&output);
+        assert!(line.starts_with("error: s.toml: ") && line.contains(" - hint: "), "{line}");
+        // Neither a model nor the pictures of the steps before.
+        let mut left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().file_name()).collect();
+        left.sort();
+        assert_eq!(left, ["box.ply", "s.toml"], "{text}");
+        line
     };
-    assert!(run("[[step]]\nedit = \"paint\"\npicks = 3\n").contains("s.toml"));
-    assert!(run("[[step]]\nedit = \"fly\"\n").contains("fly"));
-    assert!(
-        run("[[step]]\nedit = \"split_curve\"\ncurve = 4\nat = 0.5\n")
-            .contains("step 1 (split_curve): curve 4 is not there")
-    );
+    let good = "[[step]]\nedit = \"feature_lines\"\nangle_deg = 40.0\n\n";
+    for (text, wanted) in [
+        ("[[step]]\nedit = \"paint\"\npicks = 3\n".to_string(), "(line 1)"),
+        (format!("{good}[[step]]\nedit = \"fly\"\n"), "step 2: unknown variant `fly`"),
+        (format!("{good}[[step]]\nedit = \"fly\"\n"), "(line 5)"),
+        (format!("{good}[[step]]\nedit = \"join\"\ncorner = 1\nwings = 2\n"), "(line 5)"),
+        ("[[step]\n".into(), "(line 1)"),
+        ("[view]\nlens = 3\n".into(), "unknown field `lens`"),
+        (
+            format!("{good}[[step]]\nedit = \"split_curve\"\ncurve = 40\nat = 0.5\n"),
+            "step 2 (split_curve, line 5): curve 40 is not there, there are 12",
+        ),
+        (
+            "[[step]]\nedit = \"paint\"\npicks = [[nan, 0, 0], [1, 1, 1]]\n".into(),
+            "step 1 (paint, line 1): a pick is not a finite number",
+        ),
+        (
+            "[[step]]\nedit = \"paint\"\npicks = [[0.5, 0.5, 1.0], [900, 0, 0]]\n".into(),
+            "(900.000000, 0.000000, 0.000000) is 51904 % of the diagonal off the mesh",
+        ),
+        ("[[step]]\nedit = \"undo\"\n".into(), "step 1 (undo, line 1): there is nothing left to take back"),
+        (
+            "[[step]]\nedit = \"carry\"\nfrom = \"none.planish\"\nlandmarks = []\n".into(),
+            "step 1 (carry, line 1): none.planish: ",
+        ),
+    ] {
+        let line = run(&text);
+        assert!(line.contains(wanted), "{line}");
+    }
+    fs::remove_file(folder.path().join("s.toml")).unwrap();
+    let output = planish(&["edit", "box.ply", "s.toml", "-o", "box.planish"], folder.path());
+    assert!(status(&output) == 3 && error_line(&output).contains("s.toml: cannot be read"));
     let output = planish(&["edit", "box.ply", "s.toml"], folder.path());
     assert_eq!(status(&output), 2);
     assert!(error_line(&output).contains("--output"));

@@ -96,6 +96,90 @@ fn empty_model_comes_back() {
     assert_eq!(read_model(&path).unwrap(), Model::default());
 }
 
+/// Tables of schema 1, before sketches and steps.
+const TABLES_1: &str = "
+CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE array (id INTEGER PRIMARY KEY, kind TEXT NOT NULL, count INTEGER NOT NULL, checksum INTEGER NOT NULL,
+    data BLOB NOT NULL);
+CREATE TABLE mesh (id INTEGER PRIMARY KEY, points INTEGER NOT NULL, triangles INTEGER NOT NULL);
+CREATE TABLE attribute (id INTEGER PRIMARY KEY, name TEXT NOT NULL, width INTEGER NOT NULL, numbers INTEGER NOT NULL);
+CREATE TABLE network (id INTEGER PRIMARY KEY, json TEXT NOT NULL, faces INTEGER NOT NULL, weights INTEGER NOT NULL);
+CREATE TABLE grid (patch INTEGER PRIMARY KEY, rows INTEGER NOT NULL, cols INTEGER NOT NULL, points INTEGER NOT NULL,
+    faces INTEGER NOT NULL, weights INTEGER NOT NULL);
+CREATE TABLE surface (patch INTEGER PRIMARY KEY, rows INTEGER NOT NULL, cols INTEGER NOT NULL,
+    control INTEGER NOT NULL, knots_u INTEGER NOT NULL, knots_v INTEGER NOT NULL);
+CREATE TABLE relief (patch INTEGER PRIMARY KEY, rows INTEGER NOT NULL, cols INTEGER NOT NULL, vectors INTEGER NOT NULL);
+CREATE TABLE history (sequence INTEGER PRIMARY KEY, parent INTEGER REFERENCES history, command TEXT NOT NULL,
+    parameters TEXT NOT NULL);
+";
+
+/// Writes an array as every schema has them and returns its number: numbers as little-endian bytes, compressed with
+/// zstd, and the CRC-32 of kind, count and what is compressed.
+fn add_array(database: &rusqlite::Connection, kind: &str, count: usize, bytes: &[u8]) -> i64 {
+    let data = zstd::bulk::compress(bytes, 1).unwrap();
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(kind.as_bytes());
+    hasher.update(&(count as u64).to_le_bytes());
+    hasher.update(&data);
+    let row = rusqlite::params![kind, count as i64, hasher.finalize(), data];
+    database.execute("INSERT INTO array (kind, count, checksum, data) VALUES (?1, ?2, ?3, ?4)", row).unwrap();
+    database.last_insert_rowid()
+}
+
+#[test]
+fn a_project_of_schema_1_is_read_without_a_sketch_and_steps_and_written_as_schema_2() {
+    let folder = folder();
+    let path = folder.path().join("old.planish");
+    let floats = |x: &[f64]| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    let words = |x: &[u32]| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    {
+        let database = rusqlite::Connection::open(&path).unwrap();
+        database.pragma_update(None, "application_id", 0x706C_616E).unwrap();
+        database.pragma_update(None, "user_version", 1).unwrap();
+        database.execute_batch(TABLES_1).unwrap();
+        database
+            .execute_batch(
+                "INSERT INTO meta VALUES ('generator', 'planish 0.1.0'), ('params', '{}'), ('units', 'cm');
+                 INSERT INTO history VALUES (1, NULL, 'layout', '{}'), (2, 1, 'fit', '{\"tolerance\":0.1}');",
+            )
+            .unwrap();
+        // A square of two triangles; its rim is four curves between four corners, around one patch.
+        let points = add_array(&database, "f64", 12, &floats(&[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.5]));
+        let triangles = add_array(&database, "u32", 6, &words(&[0, 1, 2, 0, 2, 3]));
+        database.execute("INSERT INTO mesh VALUES (1, ?1, ?2)", [points, triangles]).unwrap();
+        let corners = [(0u32, [1., 0., 0.]), (0, [0., 1., 0.]), (0, [0., 0., 1.]), (1, [0., 0., 1.])];
+        let mut places = corners.to_vec();
+        (0..4).for_each(|k| places.extend([corners[k], corners[(k + 1) % 4]]));
+        let faces = add_array(&database, "u32", 12, &words(&places.iter().map(|p| p.0).collect::<Vec<_>>()));
+        let weights = add_array(&database, "f64", 36, &floats(&places.iter().flat_map(|p| p.1).collect::<Vec<_>>()));
+        let curve = |k: usize| format!("{{\"corners\":[{k},{}],\"kind\":\"boundary\",\"points\":2}}", (k + 1) % 4);
+        let side = |k: usize| format!("{{\"curve\":{k},\"reversed\":false}}");
+        let list = |of: &dyn Fn(usize) -> String| (0..4).map(of).collect::<Vec<_>>().join(",");
+        let json =
+            format!("{{\"corners\":4,\"curves\":[{}],\"patches\":[{{\"sides\":[{}]}}]}}", list(&curve), list(&side));
+        let row = rusqlite::params![json, faces, weights];
+        database.execute("INSERT INTO network VALUES (1, ?1, ?2, ?3)", row).unwrap();
+    }
+    let model = read_model(&path).unwrap();
+    assert_eq!((model.mesh.points.len(), model.mesh.triangles.len()), (4, 2));
+    assert_eq!(model.mesh.points[3], DVec3::new(0.0, 1.0, 0.5));
+    let network = &model.network;
+    assert_eq!((network.corners.len(), network.curves.len(), network.patches.len()), (4, 4, 1));
+    assert_eq!(network.curves[3].corners, [3, 0]);
+    assert_eq!(network.curves[2].points[1], FacePoint { face: 1, bary: [0.0, 0.0, 1.0] });
+    assert_eq!(model.units, Units::Cm);
+    assert_eq!(model.history.iter().map(|h| &h.command[..]).collect::<Vec<_>>(), ["layout", "fit"]);
+    assert_eq!(model.history[1].parameters, "{\"tolerance\":0.1}");
+    assert!(model.sketch == Default::default() && model.undo.is_empty() && model.redo.is_empty());
+    write_model(&path, &model).unwrap();
+    assert_eq!(read_model(&path).unwrap(), model);
+    let version = |p: &std::path::Path| -> i32 {
+        let database = rusqlite::Connection::open(p).unwrap();
+        database.pragma_query_value(None, "user_version", |row| row.get(0)).unwrap()
+    };
+    assert_eq!(version(&path), 2);
+}
+
 #[test]
 fn log_that_another_program_left_beside_a_replaced_file_is_not_played_into_the_new_one() {
     let folder = folder();

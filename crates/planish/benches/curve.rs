@@ -6,14 +6,18 @@ mod common;
 use planish::curve::{
     Canvas, Magnet, PaintMode, PaintParams, ScalarField, Section, Snake, SnakeParams, SurfaceCurve, Sweep, way,
 };
-use planish::geom::random;
+use planish::geom::{Bvh, random};
+use planish::grid::{self, GridParams};
 use planish::mesh::{self, Adjacency, FacePoint, TriMesh, shapes};
-use planish::{DVec3, Silent};
+use planish::network::{CurveKind, Editor, imprint};
+use planish::{DVec3, Silent, surface};
 use std::io::Write;
 use std::time::Instant;
 
 /// Pairs of picks per input and mode.
 const PAIRS: usize = 60;
+/// Runs of which the least time counts.
+const RUNS: usize = 5;
 /// Distance of the picks over the diagonal, with some tolerance.
 const APART: [f64; 2] = [0.24, 0.26];
 
@@ -23,6 +27,19 @@ fn tell(id: &str, what: &str) {
 
 fn milliseconds(start: Instant) -> f64 {
     1e3 * start.elapsed().as_secs_f64()
+}
+
+/// Least time of some runs, milliseconds: what the machine does besides adds to the others.
+fn least<T>(mut run: impl FnMut() -> T) -> (f64, T) {
+    let start = Instant::now();
+    let mut out = run();
+    let mut best = milliseconds(start);
+    for _ in 1..RUNS {
+        let start = Instant::now();
+        out = run();
+        best = best.min(milliseconds(start));
+    }
+    (best, out)
 }
 
 fn median(values: &mut [f64], share: f64) -> f64 {
@@ -57,12 +74,8 @@ fn painting(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
     if !wanted(&format!("curve/paint/{name}")) {
         return;
     }
-    let start = Instant::now();
-    let canvas = Canvas::new(mesh);
-    tell(
-        &format!("curve/paint/{name}"),
-        &format!("{} triangles, set-up {:.0} ms", mesh.triangles.len(), milliseconds(start)),
-    );
+    let (time, canvas) = least(|| Canvas::new(mesh));
+    tell(&format!("curve/paint/{name}"), &format!("{} triangles, set-up {time:.0} ms", mesh.triangles.len()));
     let pairs = picks(mesh, &canvas.adjacency);
     let field = ScalarField::maximum_curvature(mesh, &canvas.adjacency).smoothed(mesh, &canvas.adjacency, 4);
     let magnet = Magnet::of_scalar(&field);
@@ -72,9 +85,8 @@ fn painting(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
         let mut times = Vec::new();
         let mut total = 0.0;
         for pair in &pairs {
-            let start = Instant::now();
-            let chain = way(&canvas, pair[0], pair[1], &params, Some(&magnet));
-            times.push(milliseconds(start));
+            let (time, chain) = least(|| way(&canvas, pair[0], pair[1], &params, Some(&magnet)));
+            times.push(time);
             total += SurfaceCurve::open(chain.expect("a way")).length(mesh);
         }
         lengths.push(total);
@@ -119,6 +131,19 @@ fn turn(p: &[DVec3]) -> f64 {
     p.windows(3).map(|w| (w[1] - w[0]).angle_between(w[2] - w[1]).to_degrees()).sum::<f64>() / (p.len() - 2) as f64
 }
 
+/// Mean turn within the surface: of the parts of the pieces across the blended normals at the points.
+fn turn_within(mesh: &TriMesh, normals: &[DVec3], curve: &SurfaceCurve) -> f64 {
+    let at = curve.positions(mesh);
+    let turns = (1..at.len() - 1).map(|i| {
+        let place = &curve.points[i];
+        let t = mesh.triangles[place.face as usize];
+        let n = (0..3).map(|k| normals[t[k] as usize] * place.bary[k]).sum::<DVec3>().normalize_or_zero();
+        let flat = |v: DVec3| v - n * v.dot(n);
+        flat(at[i] - at[i - 1]).angle_between(flat(at[i + 1] - at[i])).to_degrees()
+    });
+    turns.sum::<f64>() / (at.len() - 2) as f64
+}
+
 fn snakes(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
     if !wanted(&format!("curve/snake/{name}")) {
         return;
@@ -142,14 +167,15 @@ fn snakes(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
             tell(&id, &format!("median {:.3} ms, greatest {:.3} ms", median(&mut times, 0.5), median(&mut times, 1.0)));
         }
     }
-    // An impulse: the middle of a curve at rest is pulled aside by a tenth of its length; back to within a tenth of
-    // an edge of the rest.
+    // An impulse: the middle of a curve at rest is pulled aside by a twentieth of its length. Every way of sweeping has
+    // a rest of its own on a rough surface: the state that it is in after many sweeps, settled by fine solves. Counted
+    // are the sweeps until the curve stays within a tenth of an edge of that.
     let rest_params = SnakeParams { settle: 1e-6, sweeps: 400, ..params.clone() };
     let mut rest = start_snake();
     rest.relax(&rest_params, &Silent).expect("a snake");
-    let goal: Vec<DVec3> = rest.positions().to_vec();
-    let chord = (goal[999] - goal[0]).normalize();
-    let aside = chord.any_orthonormal_vector() * (0.1 * rest.curve().length(mesh));
+    let (first, last) = (rest.positions()[0], rest.positions()[999]);
+    let chord = (last - first).normalize();
+    let aside = chord.any_orthonormal_vector() * (0.05 * rest.curve().length(mesh));
     let mut pulled = rest.clone();
     for k in 300..=700 {
         let share = 1.0 - (k as f64 - 500.0).abs() / 200.0;
@@ -157,7 +183,7 @@ fn snakes(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
         pulled.pin(k, false).expect("a point");
     }
     let near = 0.1 * canvas.edge;
-    let away = |snake: &Snake| {
+    let away = |snake: &Snake, goal: &[DVec3]| {
         let to_goal = |p: &DVec3| {
             goal.windows(2)
                 .map(|w| {
@@ -169,57 +195,118 @@ fn snakes(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
         };
         snake.positions().iter().step_by(10).map(to_goal).fold(0.0, f64::max)
     };
-    tell(
-        &format!("curve/impulse/{name}"),
-        &format!("{:.1} edges aside, {:.1} points per edge", away(&pulled) / canvas.edge, canvas.edge / rest.spacing()),
-    );
-    for sweep in [Sweep::CoarseToFine, Sweep::Solve, Sweep::Single] {
-        let mut snake = pulled.clone();
-        let most = if sweep == Sweep::Single { 40_000 } else { 400 };
-        let start = Instant::now();
-        let mut sweeps = 0;
-        let mut left = away(&snake);
-        while left > near && sweeps < most {
-            let kind = if sweep == Sweep::CoarseToFine && sweeps >= 24 { Sweep::Solve } else { sweep };
+    for (sweep, most, step) in [(Sweep::CoarseToFine, 400, 1), (Sweep::Solve, 400, 1), (Sweep::Single, 40_000, 100)] {
+        let run = |snake: &mut Snake, k: usize| {
+            let kind = if sweep == Sweep::CoarseToFine && k >= 24 { Sweep::Solve } else { sweep };
             snake.step(&params, kind);
-            sweeps += 1;
-            if sweep != Sweep::Single || sweeps % 50 == 0 {
-                left = away(&snake);
+        };
+        let mut snake = pulled.clone();
+        let start = Instant::now();
+        (0..most).for_each(|k| run(&mut snake, k));
+        let each = milliseconds(start) / most as f64;
+        snake.relax(&SnakeParams { sweep: Sweep::Solve, ..rest_params.clone() }, &Silent).expect("a snake");
+        let goal: Vec<DVec3> = snake.positions().to_vec();
+        let mut snake = pulled.clone();
+        let pulled_by = away(&snake, &goal);
+        let mut last_outside = 0;
+        for k in 0..most {
+            if k % step == 0 && away(&snake, &goal) > near {
+                last_outside = k + step;
             }
+            run(&mut snake, k);
         }
-        let told = format!(
-            "{sweeps} sweeps to a tenth of an edge, {:.1} ms, {:.3} edges left",
-            milliseconds(start),
-            away(&snake) / canvas.edge
+        let told = match last_outside {
+            n if n >= most => format!("not in {most} sweeps, {:.2} edges left", away(&snake, &goal) / canvas.edge),
+            n => format!("{n} sweeps"),
+        };
+        tell(
+            &format!("curve/converge_{sweep:?}/{name}").to_lowercase(),
+            &format!("{told} from {:.1} edges aside, {each:.3} ms each", pulled_by / canvas.edge),
         );
-        tell(&format!("curve/converge_{sweep:?}/{name}").to_lowercase(), &told);
     }
-    // Against the geodesic in the same course, with points a share of an edge apart.
-    for pair in picks(mesh, &canvas.adjacency).iter().take(4) {
-        let params = PaintParams { mode: PaintMode::Geodesic, ..PaintParams::default() };
-        let geodesic = SurfaceCurve::open(way(&canvas, pair[0], pair[1], &params, None).expect("a way"));
-        for (share, curvature) in
-            [(0.5, 0.0), (0.5, 2.0), (0.5, 10.0), (1.0, 0.0), (1.0, 1.0), (1.0, 4.0), (2.0, 0.0), (2.0, 1.0)]
-        {
-            let rest_params = SnakeParams { curvature, ..rest_params.clone() };
+    // Against the geodesic in the same course: the mean over pairs, with points a share of an edge apart.
+    let pairs = picks(mesh, &canvas.adjacency);
+    let mut normals = vec![DVec3::ZERO; mesh.points.len()];
+    for (t, corners) in mesh.triangles.iter().enumerate() {
+        corners.iter().for_each(|&v| normals[v as usize] += mesh.area_vector(t));
+    }
+    normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());
+    for share in [0.5, 1.0] {
+        let (mut length, mut worst, mut turns, mut less, mut uneven) = (0.0, 0.0f64, [0.0; 4], 0, 0.0f64);
+        let count = 20;
+        for pair in pairs.iter().take(count) {
+            let params = PaintParams { mode: PaintMode::Geodesic, ..PaintParams::default() };
+            let geodesic = SurfaceCurve::open(way(&canvas, pair[0], pair[1], &params, None).expect("a way"));
             let even = geodesic.spaced(mesh, &canvas.adjacency, share * canvas.edge).expect("a curve");
             let mut snake = Snake::new(mesh, &canvas.adjacency, &even).expect("a snake");
-            let told = snake.relax(&rest_params, &Silent).expect("a snake");
+            snake.relax(&rest_params, &Silent).expect("a snake");
             let traced = SurfaceCurve::open(snake.curve().trace(mesh, &canvas.adjacency).expect("a trace"));
-            tell(
-                &format!("curve/geodesic_{share}_{curvature}/{name}"),
-                &format!(
-                    "{} points, {} sweeps: length over geodesic {:.6}, turn per point {:.3} against {:.3} deg, unevenness {:.3}",
-                    even.points.len(),
-                    told.sweeps,
-                    traced.length(mesh) / geodesic.length(mesh),
-                    turn(snake.positions()),
-                    turn(&even.positions(mesh)),
-                    snake.unevenness()
-                ),
-            );
+            let ratio = traced.length(mesh) / geodesic.length(mesh);
+            let four = [
+                turn(snake.positions()),
+                turn(&even.positions(mesh)),
+                turn_within(mesh, &normals, &snake.curve()),
+                turn_within(mesh, &normals, &even),
+            ];
+            length += ratio / count as f64;
+            worst = worst.max(ratio);
+            (0..4).for_each(|k| turns[k] += four[k] / count as f64);
+            less += (four[0] < four[1]) as usize;
+            uneven = uneven.max(snake.unevenness().expect("one piece"));
         }
+        tell(
+            &format!("curve/geodesic_{share}/{name}"),
+            &format!(
+                "length over geodesic {length:.5} in the mean, {worst:.5} at most; turn per point {:.3} against {:.3} deg, \
+                 less in {less} of {count}, within the surface {:.3} against {:.3}; unevenness {uneven:.3} at most",
+                turns[0], turns[1], turns[2], turns[3]
+            ),
+        );
     }
+}
+
+/// Two patches of 25 thousand vertices each: their common curve is pulled, and one of them is made anew.
+fn one_patch(wanted: &dyn Fn(&str) -> bool) {
+    let id = "curve/patch/sheet_25k";
+    if !wanted(id) {
+        return;
+    }
+    let bump = |x: f64, y: f64| 0.1 * (7.0 * x).sin() * (5.0 * y).cos() + 0.01 * (61.0 * x + 47.0 * y).sin();
+    let mesh = shapes::sheet(316, 158, false, false, |s, t| DVec3::new(2.0 * s, t, bump(2.0 * s, t)));
+    let adjacency = Adjacency::new(&mesh);
+    let bvh = Bvh::new(&mesh);
+    let mut editor = Editor::new(&mesh, &adjacency, Default::default());
+    let at = |x: f64, y: f64| bvh.closest(DVec3::new(x, y, bump(x, y))).place;
+    for (x, y) in [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (0.0, 1.0)] {
+        editor.add_corner(at(x, y), 1e-9).expect("a corner");
+    }
+    editor.add_boundaries().expect("curves");
+    let ends = [1, 4].map(|k: usize| editor.network.corners[k].place);
+    let middle = SurfaceCurve::open(vec![ends[0], ends[1]]);
+    let curve = editor.add_curve(&middle, CurveKind::Smooth, 1e-9).expect("a curve");
+    assert!(editor.diagnose().is_finished());
+    let params = SnakeParams { fairness: 0.1, curvature: 1.0, ..SnakeParams::default() };
+    let start = Instant::now();
+    editor.drag_curve(curve, 0.5, DVec3::X * 0.03, 0.6, &params, &Silent).expect("a drag");
+    let drag = milliseconds(start);
+    let (cutting, patches) = least(|| imprint(&mesh, &editor.network).expect("patches"));
+    let grid_params = GridParams::default();
+    let sizes = grid::choose_sizes(&editor.network, &patches, &grid_params);
+    let (relaxing, grids) =
+        least(|| grid::relax(&mesh, &patches[..1], &sizes[..1], &grid_params, &Silent).expect("a grid"));
+    let control = [sizes[0].0, sizes[0].1].map(|n| (n / 4).max(4));
+    let (fitting, _) =
+        least(|| surface::fit(&grids[0].points, grids[0].rows, grids[0].cols, control).expect("a surface"));
+    tell(
+        id,
+        &format!(
+            "{} vertices, {} x {} nodes: drag {drag:.1} ms, cut {cutting:.0} ms (both patches), relax {relaxing:.0} ms, \
+             fit {fitting:.1} ms",
+            patches[0].mesh.points.len(),
+            grids[0].cols,
+            grids[0].rows
+        ),
+    );
 }
 
 fn drags(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
@@ -271,6 +358,7 @@ fn main() {
             inputs.push((file.to_string(), mesh::repair(&mesh).expect("a mesh").0));
         }
     }
+    one_patch(&wanted);
     for (name, mesh) in &inputs {
         painting(name, mesh, &wanted);
         snakes(name, mesh, &wanted);

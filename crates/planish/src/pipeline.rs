@@ -249,13 +249,10 @@ fn remade(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Resu
     model.grids = clock.stage(
         "grids",
         |o| -> Result<_, PipelineError> {
-            let plain = grid::resample(mesh, network, &patches, &params.grid, o)?;
-            if drawn.0.is_empty() {
-                return Ok(plain);
+            match drawn.0 {
+                [] => Ok(grid::resample(mesh, network, &patches, &params.grid, o)?),
+                _ => Ok(grid::resample_with_features(mesh, network, &patches, drawn, &params.grid, o)?),
             }
-            // As fine as the patches want without the curves.
-            let sizes: Vec<(usize, usize)> = plain.iter().map(|g| (g.cols, g.rows)).collect();
-            Ok(grid::relax_network(mesh, network, &patches, &sizes, drawn, &params.grid, o)?)
         },
         |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;
@@ -319,12 +316,20 @@ fn draw(
 fn surfaces(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Result<(), PipelineError> {
     let (network, grids) = (&model.network, &model.grids);
     let control = |s: &Vec<surface::Surface>| [("control_points", s.iter().map(|s| s.control.len()).sum())];
-    let fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &params.fit, o), control)?;
-    let smooth = clock.stage(
+    let symmetric = |leveled: bool, surfaces: &mut Vec<surface::Surface>| {
+        if let Some(plane) = &model.sketch.symmetry {
+            surface::mirror_surfaces(&model.mesh, network, plane, leveled, surfaces);
+        }
+    };
+    let mut fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &params.fit, o), control)?;
+    // Seams are smoothed between images already, and what that takes from their symmetry is given back.
+    symmetric(true, &mut fitted);
+    let mut smooth = clock.stage(
         "seams",
         |o| surface::stitch(network, grids, &fitted, &params.stitch, o),
         |_| [("curves", network.curves.len())],
     )?;
+    symmetric(false, &mut smooth);
     let reliefs = clock.stage(
         "relief",
         |_| {

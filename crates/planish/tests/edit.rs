@@ -375,12 +375,12 @@ fn patches_beside_a_feature_curve_share_its_nodes_and_the_model_has_no_gaps() {
     let mut model: Model = fitted.model;
     let bvh = Bvh::new(&model.mesh);
     let patches = imprint(&model.mesh, &model.network).unwrap();
-    // Across the first patch, at two fifths of one side and a half of the other.
+    // Across the first patch, at a third of one side and a half of the other.
     let at = |k: usize, share: f64| {
         let chain = &patches[0].sides[k];
         patches[0].mesh.points[chain[((chain.len() - 1) as f64 * share) as usize] as usize]
     };
-    let (p, q) = (at(0, 0.4), at(2, 0.5));
+    let (p, q) = (at(0, 0.33), at(2, 0.5));
     let points: Vec<FacePoint> = (1..20).map(|i| near(&bvh, p.lerp(q, i as f64 / 20.0))).collect();
     let mut edited = model.drawing();
     edited.sketch.features.push(FeatureCurve { patch: 0, family: Family::V, points });
@@ -414,6 +414,130 @@ fn patches_beside_a_feature_curve_share_its_nodes_and_the_model_has_no_gaps() {
     assert!(model.redo());
     pipeline::rework(&mut model, &params, &Silent).unwrap();
     assert_eq!(model, with);
+}
+
+#[test]
+fn slanted_feature_curves_of_both_families_on_a_torus_leave_no_fold() {
+    let mesh = shapes::torus(2.0, 0.7, 72, 36);
+    let network = layout(&mesh, &LayoutParams { patches: 16, ..Default::default() }, &Silent).unwrap();
+    let bvh = Bvh::new(&mesh);
+    let patches = imprint(&mesh, &network).unwrap();
+    for patch in [0, 5] {
+        for (family, sides) in [(Family::V, [0, 2]), (Family::U, [3, 1])] {
+            for shares in [[0.33, 0.5], [0.25, 0.4], [0.7, 0.6]] {
+                let at = |k: usize, share: f64| {
+                    let chain = &patches[patch].sides[k];
+                    patches[patch].mesh.points[chain[((chain.len() - 1) as f64 * share) as usize] as usize]
+                };
+                let (p, q) = (at(sides[0], shares[0]), at(sides[1], shares[1]));
+                let points: Vec<FacePoint> = (1..20).map(|i| near(&bvh, p.lerp(q, i as f64 / 20.0))).collect();
+                let features = [FeatureCurve { patch: patch as u32, family, points }];
+                let drawn = (&features[..], &[][..]);
+                let params = GridParams::default();
+                let grids = grid::resample_with_features(&mesh, &network, &patches, drawn, &params, &Silent).unwrap();
+                let folds: Vec<usize> = grids.iter().zip(&patches).map(|(g, p)| grid::measure(g, p).folds).collect();
+                assert_eq!(folds.iter().sum::<usize>(), 0, "{patch} {family:?} {shares:?} {folds:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn points_slide_along_feature_curves_so_that_iso_curves_cross_them_with_half_the_bend() {
+    // A flat patch whose middle v curve leans: nodes at even distances on it would bend the rows.
+    let mesh = shapes::rectangle(2.0, 1.0, 60, 30);
+    let network = one_patch(&mesh);
+    let patches = imprint(&mesh, &network).unwrap();
+    let bvh = Bvh::new(&mesh);
+    let low = mesh.bounds().min;
+    // An S: dense to one side below, to the other above.
+    let on = |t: f64| low + DVec3::new(1.0 + 0.3 * (std::f64::consts::TAU * t).sin(), t, 0.0);
+    let points: Vec<FacePoint> = (1..60).map(|i| near(&bvh, on(i as f64 / 60.0))).collect();
+    let features = [FeatureCurve { patch: 0, family: Family::V, points }];
+    let params = GridParams::default();
+    let made =
+        relax_with_features(&mesh, &patches[0], &features, (81, 41), &Sections::default(), &params, &Silent).unwrap();
+    let (grid, column) = (&made.grid, made.lines[0]);
+    let at = |i: usize, j: usize| grid.points[j * grid.cols + i];
+    // Nodes on the curve, by its length: even ones would all be this far apart.
+    let line: Vec<DVec3> = (0..grid.rows).map(|j| at(column, j)).collect();
+    let gaps: Vec<f64> = line.windows(2).map(|w| w[0].distance(w[1])).collect();
+    let mean = gaps.iter().sum::<f64>() / gaps.len() as f64;
+    assert!(gaps.iter().all(|g| *g > 0.3 * mean), "{gaps:?}");
+    // The mean bend of rows over four cells at the curve, against that of rows joined to even nodes.
+    let curve = &made.curves[0];
+    let even = planish::curve::attract::sample_polyline(curve, grid.rows);
+    let bend = |p: DVec3, j: usize| {
+        let (a, b) = (at(column - 4, j), at(column + 4, j));
+        (p - a).angle_between(b - p).to_degrees()
+    };
+    let inner = 2..grid.rows - 2;
+    let (mut slid, mut unslid) = (0.0, 0.0);
+    for j in inner {
+        slid += bend(line[j], j);
+        unslid += bend(even[j], j);
+    }
+    assert!(slid < 0.5 * unslid, "{slid} {unslid}");
+}
+
+#[test]
+fn fits_on_both_sides_of_a_plane_of_symmetry_are_exact_mirror_images_and_bend_no_more_in_it_than_free_ones() {
+    // An ellipsoid with a bulge, symmetric in x as a shape but not in its triangles.
+    let mut mesh = shapes::sphere(1.0, 4);
+    for p in &mut mesh.points {
+        let q = turned(*p);
+        *p = DVec3::new(1.2 * q.x, q.y + 0.2 * q.x * q.x, 0.9 * q.z * (1.0 + 0.3 * q.y));
+    }
+    let start = run(
+        &mesh,
+        Drawing::default(),
+        &[
+            r#"{"edit":"symmetry","plane":{"point":[0,0,0],"normal":[1,0,0]}}"#,
+            r#"{"edit":"cut","through":[0,1,0],"normal":[1,0,0]}"#,
+            r#"{"edit":"complete","patches":24}"#,
+            r#"{"edit":"mirror"}"#,
+        ],
+    );
+    let plane = start.sketch.symmetry.unwrap();
+    let mut model = Model { mesh: mesh.clone(), network: start.network, sketch: start.sketch, ..Model::default() };
+    let told = pipeline::rework(&mut model, &PipelineParams::default(), &Silent).unwrap();
+    let count = model.surfaces.len();
+    assert!(count >= 12 && count.is_multiple_of(2), "{count}");
+    // Every set of control points is the image of another, to the last bits.
+    let key = |p: DVec3| p.to_array().map(|x| (x * 1e9).round() as i64);
+    let sorted = |points: &mut dyn Iterator<Item = DVec3>| {
+        let mut all: Vec<[i64; 3]> = points.map(key).collect();
+        all.sort_unstable();
+        all
+    };
+    let sets: Vec<_> = model.surfaces.iter().map(|s| sorted(&mut s.control.iter().copied())).collect();
+    for s in &model.surfaces {
+        let image = sorted(&mut s.control.iter().map(|c| plane.mirror(*c)));
+        assert!(sets.contains(&image));
+    }
+    assert!(told.quality["seam.gap_max"].value() < 1e-9 * mesh.bounds().diagonal());
+    // Displaced, the model is still the mesh.
+    assert!(told.quality["relief.roundtrip_max_rel"].value() < 1e-12);
+    // Seams in the plane bend no more than those of free fits and half a degree.
+    let mut free = Model { sketch: Default::default(), ..model.clone() };
+    let unmirrored = pipeline::rework(&mut free, &PipelineParams::default(), &Silent).unwrap();
+    let in_plane = |c: u32| {
+        model.network.curves[c as usize].points.iter().all(|p| plane.height(p.position(&mesh)).abs() < 2e-3 * 2.0)
+    };
+    let bends = |seams: &[planish::surface::SeamQuality]| -> Vec<f64> {
+        seams.iter().filter(|s| in_plane(s.curve)).map(|s| s.angle_mean_deg).collect()
+    };
+    let (mirrored, unmirrored) = (bends(&told.seams), bends(&unmirrored.seams));
+    assert!(mirrored.len() >= 4);
+    let mean = |list: &[f64]| list.iter().sum::<f64>() / list.len() as f64;
+    assert!(mean(&mirrored) < mean(&unmirrored) + 0.5, "{mirrored:?} {unmirrored:?}");
+}
+
+/// A turn that takes the triangles out of symmetry.
+fn turned(p: DVec3) -> DVec3 {
+    let (s, c) = 0.37f64.sin_cos();
+    let q = DVec3::new(c * p.x - s * p.y, s * p.x + c * p.y, p.z);
+    DVec3::new(q.x, c * q.y - s * q.z, s * q.y + c * q.z)
 }
 
 #[test]

@@ -92,6 +92,42 @@ fn corners_of_a_torus_of_60_patches_are_square_within_20_degrees_in_the_mean() {
     assert!(mean < 20.0, "{mean} degrees");
 }
 
+/// Angles of the corners of patches a twentieth of their sides away, degrees.
+fn near_corners(mesh: &TriMesh, network: &Network) -> Vec<f64> {
+    let mut angles = Vec::new();
+    for patch in imprint(mesh, network).expect("disks") {
+        for k in 0..4 {
+            let points = |side: &[u32]| side.iter().map(|&v| patch.mesh.points[v as usize]).collect::<Vec<DVec3>>();
+            let (out, mut back) = (points(&patch.sides[k]), points(&patch.sides[(k + 3) % 4]));
+            back.reverse();
+            let at = |line: &[DVec3]| {
+                let length: f64 = line.windows(2).map(|w| w[0].distance(w[1])).sum();
+                let mut left = length / 20.0;
+                for w in line.windows(2) {
+                    let step = w[0].distance(w[1]);
+                    if step >= left {
+                        return w[0].lerp(w[1], left / step);
+                    }
+                    left -= step;
+                }
+                line[line.len() - 1]
+            };
+            angles.push((at(&out) - out[0]).angle_between(at(&back) - out[0]).to_degrees());
+        }
+    }
+    angles
+}
+
+#[test]
+fn near_their_nodes_the_curves_of_a_torus_meet_at_90_degrees_within_12_in_the_mean_and_none_below_40() {
+    let mesh = shapes::torus(1.0, 0.4, 180, 90);
+    let network = layout(&mesh, &params(60), &Silent).expect("a torus has a layout");
+    let angles = near_corners(&mesh, &network);
+    let off = angles.iter().map(|a| (a - 90.0).abs()).sum::<f64>() / angles.len() as f64;
+    let least = angles.iter().fold(f64::INFINITY, |a, &b| a.min(b));
+    assert!(off < 12.0 && least > 40.0, "{off} degrees off, least {least}");
+}
+
 #[test]
 fn a_pinhole_in_a_sphere_of_24_patches_adds_at_most_16() {
     let mut mesh = shapes::sphere(1.0, 5);

@@ -14,17 +14,26 @@ use planish::network::{Diagnosis, diagnose};
 use planish::pipeline::{self, PipelineParams, Warning};
 use planish_io::report::{Report, count};
 use serde::Deserialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
 
-/// A script.
+/// A script as it stands in its file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Script {
+struct Text {
     /// The edits, one after the other.
     #[serde(default)]
-    step: Vec<Edit>,
+    step: Vec<Spanned<toml::Value>>,
     /// What pictures show.
     #[serde(default)]
+    view: View,
+}
+
+/// A script.
+struct Script {
+    /// The edits, one after the other, with their lines.
+    steps: Vec<(Edit, usize)>,
+    /// What pictures show.
     view: View,
 }
 
@@ -40,14 +49,11 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
     files::check_extension(&output, &["planish"])?;
     let script = read_script(&args.script)?;
     let own_report = session.stage_report()?;
-    if let Some(folder) = &args.pictures {
-        std::fs::create_dir_all(folder).map_err(|e| Failure::usage(folder, format!("cannot be made ({e})")))?;
-    }
     let (mut model, read) = session.step("read", || start(session, args))?;
     let params = params(session, args, &model)?;
     let mut report = Report::new("edit", files::model_facts(&args.input, &model, model.units));
     report.stages.push(read);
-    let (found, record) = session.step("edit", || replay(session, args, &script, &mut model))?;
+    let ((found, pictures), record) = session.step("edit", || replay(session, args, &script, &mut model))?;
     report.stages.push(record);
     for fault in &found.faults {
         report.warnings.push(Warning::new("network_unfinished", fault.to_string(), ""));
@@ -66,6 +72,12 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
     let write = || planish_io::write_model(staged.file_path(), &model).map_err(|e| Failure::usage(&output, e));
     let ((), record) = session.step("write", write)?;
     report.stages.push(record);
+    if let Some(folder) = &args.pictures {
+        std::fs::create_dir_all(folder).map_err(|e| Failure::usage(folder, format!("cannot be made ({e})")))?;
+    }
+    for (file, png) in &pictures {
+        std::fs::write(file, png).map_err(|e| Failure::usage(file, e))?;
+    }
     staged.commit()?;
     commit_report(own_report, &report)?;
     let demanded = args.stages.demanded_tolerance();
@@ -73,7 +85,7 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
         session.tell_warnings(&report);
         let mut table = if model.surfaces.is_empty() { Summary::default() } else { summary(&report, demanded) };
         let network = &model.network;
-        table.row("edits", count(script.step.len() as u64));
+        table.row("edits", count(script.steps.len() as u64));
         table.row(
             "network",
             format!(
@@ -96,13 +108,21 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
 
 fn read_script(path: &Path) -> Result<Script, Failure> {
     let text = std::fs::read_to_string(path).map_err(|e| Failure::input(path, format!("cannot be read ({e})")))?;
-    toml::from_str(&text).map_err(|e| {
-        let place = e.span().map_or(String::new(), |s| {
-            let line = text[..s.start.min(text.len())].lines().count().max(1);
-            format!(" (line {line})")
-        });
-        Failure::input(path, format!("{}{place}", e.message())).hint("see docs/guide/edit.md for the edits")
-    })
+    let line = |at: usize| text[..at.min(text.len())].matches('\n').count() + 1;
+    let wrong = |message: &str, line: Option<usize>| {
+        let place = line.map_or(String::new(), |n| format!(" (line {n})"));
+        let message = message.trim().replace('\n', ", ");
+        Failure::input(path, format!("{message}{place}")).hint("see docs/guide/edit.md for the edits")
+    };
+    let script: Text = toml::from_str(&text).map_err(|e| wrong(e.message(), e.span().map(|s| line(s.start))))?;
+    let mut steps = Vec::with_capacity(script.step.len());
+    for (k, step) in script.step.into_iter().enumerate() {
+        let line = line(step.span().start);
+        let edit =
+            step.into_inner().try_into().map_err(|e| wrong(&format!("step {}: {}", k + 1, e.message()), Some(line)))?;
+        steps.push((edit, line));
+    }
+    Ok(Script { steps, view: script.view })
 }
 
 /// The model to start from.
@@ -131,25 +151,35 @@ fn params(session: &Session, args: &EditArgs, model: &Model) -> Result<PipelineP
     }
 }
 
-/// Applies the edits; returns what is left to do on the network.
-fn replay(session: &Session, args: &EditArgs, script: &Script, model: &mut Model) -> Result<Diagnosis, Failure> {
+/// Pictures with the files that they go to.
+type Pictures = Vec<(PathBuf, Vec<u8>)>;
+
+/// Applies the edits; returns what is left to do on the network, and the pictures if they are asked for.
+fn replay(
+    session: &Session,
+    args: &EditArgs,
+    script: &Script,
+    model: &mut Model,
+) -> Result<(Diagnosis, Pictures), Failure> {
     // The mesh stays as it is, so that all edits share what is made ready of it.
     let mesh = std::mem::take(&mut model.mesh);
     let ground = Ground::new(&mesh);
     let others = |name: &str| other(&args.script, name);
-    let mut step = |k: usize, edit: &Edit| -> Result<(), Failure> {
-        one(model, edit, &ground, &others, session).map_err(|e| told(&args.script, k, edit, e))?;
-        let Some(folder) = &args.pictures else { return Ok(()) };
-        let file = folder.join(format!("{:02}-{}.png", k + 1, edit.name()));
-        let png = pictures::drawing(&mesh, &model.drawing(), &script.view)?;
-        std::fs::write(&file, png).map_err(|e| Failure::usage(&file, e))
+    let mut pictures = Pictures::new();
+    let mut step = |k: usize, edit: &Edit, line: usize| -> Result<(), Failure> {
+        one(model, edit, &ground, &others, session).map_err(|e| told(&args.script, k, line, edit, e))?;
+        if let Some(folder) = &args.pictures {
+            let file = folder.join(format!("{:02}-{}.png", k + 1, edit.name()));
+            pictures.push((file, pictures::drawing(&mesh, &model.drawing(), &script.view)?));
+        }
+        Ok(())
     };
-    let outcome = script.step.iter().enumerate().try_for_each(|(k, edit)| step(k, edit));
+    let outcome = script.steps.iter().enumerate().try_for_each(|(k, (edit, line))| step(k, edit, *line));
     let found = diagnose(&mesh, &ground.canvas.adjacency, &model.network);
     drop(ground);
     model.mesh = mesh;
     outcome?;
-    Ok(found)
+    Ok((found, pictures))
 }
 
 enum Wrong {
@@ -182,8 +212,8 @@ fn one(model: &mut Model, edit: &Edit, ground: &Ground, others: &edit::Others, s
     }
 }
 
-fn told(script: &Path, k: usize, edit: &Edit, wrong: Wrong) -> Failure {
-    let name = edit.name();
+fn told(script: &Path, k: usize, line: usize, edit: &Edit, wrong: Wrong) -> Failure {
+    let name = format!("{}, line {line}", edit.name());
     match wrong {
         Wrong::Apply(ApplyError::Cancelled) => Failure::interrupted(),
         Wrong::Apply(e) => {

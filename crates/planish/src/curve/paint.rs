@@ -167,10 +167,7 @@ pub fn way(
     }
     let (a, b) = (nearest_corner(mesh, &from), nearest_corner(mesh, &to));
     match (params.mode, magnet) {
-        (PaintMode::Straight, _) => {
-            let chain = canvas.greedy(a, b)?;
-            straight(canvas, from, &chain, to, params.spacing)
-        }
+        (PaintMode::Straight, _) => straight(canvas, from, [a, b], to, params.spacing),
         (PaintMode::Magnetic, Some(magnet)) => {
             let chain = canvas.path(a, b, Some(magnet))?;
             let mut points = vec![from];
@@ -193,27 +190,36 @@ const BULGE: f64 = 1.3;
 /// chain is then pulled to a geodesic instead.
 const TORN: f64 = 6.0;
 
-/// A chain of vertices sampled to places and drawn to the segment between its ends.
+/// A greedy chain of vertices, or a shortest one where that runs into a dead end, sampled to places and drawn to the
+/// segment between its ends.
 fn straight(
     canvas: &Canvas,
     from: FacePoint,
-    chain: &[u32],
+    [a, b]: [u32; 2],
     to: FacePoint,
     spacing: f64,
 ) -> Result<Vec<FacePoint>, CurveError> {
     let (mesh, adjacency) = (canvas.mesh, &canvas.adjacency);
-    let mut rough = vec![from];
-    rough.extend(path::places(mesh, adjacency, chain));
-    rough.push(to);
+    let greedy = canvas.greedy(a, b);
+    let shortest = if greedy.is_none() { Some(canvas.path(a, b, None)?) } else { None };
+    // From a shortest chain: the greedy one may run far astray, and would take long to pull straight.
+    let geodesic = || {
+        let own = if shortest.is_none() { canvas.path(a, b, None)? } else { Vec::new() };
+        let chain = shortest.as_deref().unwrap_or(&own);
+        straighten(mesh, adjacency, from, chain, to).ok_or_else(|| no_way(mesh, &from, &to))
+    };
+    let chain = greedy.as_deref().or(shortest.as_deref()).unwrap_or(&[]);
     let (p, q) = (from.position(mesh), to.position(mesh));
     let length: f64 = chain.windows(2).map(|w| mesh.points[w[0] as usize].distance(mesh.points[w[1] as usize])).sum();
-    let count = (length / (spacing * canvas.edge)).round().clamp(2.0, 1e6) as usize + 1;
-    let places = sample(mesh, adjacency, &rough, count);
     let segment = p.distance(q);
-    let geodesic = || straighten(mesh, adjacency, from, chain, to).ok_or_else(|| no_way(mesh, &from, &to));
     if length > BULGE * segment + 2.0 * canvas.edge {
         return geodesic();
     }
+    let count = (length / (spacing * canvas.edge)).round().clamp(2.0, 1e6) as usize + 1;
+    let mut rough = vec![from];
+    rough.extend(path::places(mesh, adjacency, chain));
+    rough.push(to);
+    let places = sample(mesh, adjacency, &rough, count);
     let tolerance = SLIDE * canvas.edge;
     let gap = TORN * length / (count - 1) as f64;
     let mut drawn: Vec<FacePoint> = vec![from];

@@ -6,8 +6,11 @@ use crate::geom::Bvh;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, boundary_loops, next, path, previous};
 use glam::DVec3;
 
+/// A cut nearer to the end of an edge than this share of it goes through the vertex.
+const AT_VERTEX: f64 = 1e-9;
+
 /// The cut of the surface by a plane through `point` with `normal`, followed from the face `start` (which the plane
-/// must meet) both ways until it closes or ends at a boundary. Looks at the faces along the cut only; neighbours of
+/// must meet or touch) both ways until it closes or ends at a boundary. Looks at the faces along the cut only; neighbours of
 /// the curve share a face.
 /// # Errors
 /// `NothingMet` if the plane misses the face.
@@ -31,15 +34,24 @@ pub fn cut_plane(
         let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
         // The same bits from both sides of the edge.
         let (low, high) = (a.min(b), a.max(b));
-        let t = (height(low) / (height(low) - height(high))).clamp(0.0, 1.0);
+        let t = match (height(low) / (height(low) - height(high))).clamp(0.0, 1.0) {
+            t if t < AT_VERTEX => 0.0,
+            t if t > 1.0 - AT_VERTEX => 1.0,
+            t => t,
+        };
         let t = if a == low { t } else { 1.0 - t };
         let mut bary = [0.0; 3];
         bary[h as usize % 3] = 1.0 - t;
         bary[next(h) as usize % 3] = t;
         FacePoint { face: h / 3, bary }
     };
-    let out: Vec<u32> = (3 * start..3 * start + 3).filter(|&h| crossed(h)).collect();
-    let [first, second] = out[..] else {
+    // The plane may run along an edge of the face or touch a corner: then a face beside it is crossed.
+    let beside = mesh.triangles[start as usize].into_iter().flat_map(|v| adjacency.fan(v).map(|h| h / 3));
+    let met = std::iter::once(start).chain(beside).find_map(|face| {
+        let out: Vec<u32> = (3 * face..3 * face + 3).filter(|&h| crossed(h)).collect();
+        <[u32; 2]>::try_from(out).ok()
+    });
+    let Some([first, second]) = met else {
         return Err(CurveError::NothingMet { place: "by the plane at the face picked" });
     };
     // From one crossed edge on to the next, until back at the start or at a boundary.

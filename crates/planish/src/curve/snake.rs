@@ -13,8 +13,9 @@
 //! - the pull of a scalar is a step to its ridge along the normal of the curve, so that its weight does not depend
 //!   on the units of the scalar.
 
-use super::chain::{SurfaceCurve, sample};
-use super::strip::connect;
+mod even;
+
+use super::chain::SurfaceCurve;
 use super::{CurveError, ScalarField};
 use crate::linalg::{Banded, BandedCholesky};
 use crate::mesh::{Adjacency, FacePoint, TriMesh, move_point_on_surface};
@@ -48,8 +49,6 @@ const SHARES: [f64; 2] = [1.0, 0.3];
 const LONGEST_MOVE: f64 = 24.0;
 /// Longest step to the ridge of a scalar, in mean spacings.
 const RIDGE_STEP: f64 = 1.0;
-/// Points whose distances differ from even by more than this are put at equal distances after a relaxation.
-const UNEVEN: f64 = 0.05;
 /// "No slot", "no face".
 const NONE: u32 = u32::MAX;
 
@@ -314,23 +313,6 @@ impl<'m> Snake<'m> {
         let n = self.points.len();
         let segments = if self.closed { n } else { n - 1 };
         (0..segments).map(|i| self.at[i].distance(self.at[(i + 1) % n])).sum::<f64>() / segments as f64
-    }
-
-    /// Greatest deviation of the distance of neighbours from even, as a fraction: over all stretches between pins.
-    pub fn unevenness(&self) -> f64 {
-        let n = self.points.len();
-        let segments = if self.closed { n } else { n - 1 };
-        let start = (0..n).find(|&i| self.pinned[i]).unwrap_or(0);
-        let (mut worst, mut lengths) = (0.0f64, Vec::new());
-        for k in 0..segments {
-            let (i, j) = ((start + k) % n, (start + k + 1) % n);
-            lengths.push(self.at[i].distance(self.at[j]));
-            if self.pinned[j] || k + 1 == segments {
-                let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
-                worst = lengths.drain(..).map(|l| (l / mean - 1.0).abs()).fold(worst, f64::max);
-            }
-        }
-        worst
     }
 
     /// Unit normal of the blended surface at point `i`.
@@ -639,56 +621,10 @@ impl<'m> Snake<'m> {
             observer.progress(out.sweeps as f64 / params.sweeps as f64);
         }
         if params.arc_length > 0.0 {
-            self.even_out()?;
+            self.even_out(observer)?;
         }
         out.energy[1] = self.energy(params);
         Ok(out)
-    }
-
-    /// Evens the inner points of a stretch, measured along the surface.
-    fn even_stretch(&mut self, stretch: &[usize]) -> Result<(), CurveError> {
-        let (mut chain, mut lengths) = (vec![self.points[stretch[0]]], Vec::with_capacity(stretch.len()));
-        for w in stretch.windows(2) {
-            let way = connect(self.mesh, self.adjacency, self.points[w[0]], self.points[w[1]])?;
-            let at: Vec<DVec3> = way.iter().map(|p| p.position(self.mesh)).collect();
-            lengths.push(at.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>());
-            chain.extend_from_slice(&way[1..]);
-        }
-        let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
-        if lengths.iter().any(|l| (l / mean - 1.0).abs() > UNEVEN) {
-            let even = sample(self.mesh, self.adjacency, &chain, stretch.len());
-            for (&i, &place) in stretch.iter().zip(&even).skip(1).take(stretch.len() - 2) {
-                self.move_to(i, place);
-            }
-        }
-        Ok(())
-    }
-
-    /// Puts the moving points of every stretch between fixed ones at equal arc length along the curve, where they are
-    /// uneven: fairness pulls points of a rough surface together.
-    fn even_out(&mut self) -> Result<(), CurveError> {
-        let n = self.points.len();
-        let Some(start) = (0..n).find(|&i| !self.moves(i)) else {
-            if self.unevenness() > UNEVEN {
-                let even = self.curve().resampled(self.mesh, self.adjacency, n)?;
-                (0..n).for_each(|i| self.move_to(i, even.points[i]));
-            }
-            return Ok(());
-        };
-        let mut stretch = vec![start];
-        let segments = if self.closed { n } else { n - 1 - start };
-        for k in 1..=segments {
-            let i = (start + k) % n;
-            stretch.push(i);
-            if self.moves(i) {
-                continue;
-            }
-            if stretch.len() > 2 {
-                self.even_stretch(&stretch)?;
-            }
-            stretch = vec![i];
-        }
-        Ok(())
     }
 }
 

@@ -12,7 +12,7 @@
 use super::CurveError;
 use crate::mesh::path::neighbours;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next, previous};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use std::cmp::Ordering;
 use std::collections::{BinaryHeap, HashMap};
 
@@ -52,15 +52,46 @@ pub fn connect(
         return Ok(vec![from, to]);
     }
     // Most neighbours of a curve lie on adjacent faces.
-    for h in 3 * from.face..3 * from.face + 3 {
+    let beside = (3 * from.face..3 * from.face + 3).find(|&h| {
         let o = adjacency.opposite[h as usize];
-        if o != NONE && o / 3 == to.face {
-            return Ok(straightened(mesh, adjacency, from, vec![h], to));
+        o != NONE && o / 3 == to.face
+    });
+    let (a, b) = (nearest_corner(mesh, &from), nearest_corner(mesh, &to));
+    let along = |a: u32, b: u32| {
+        let chain = local_path(mesh, adjacency, a, b)?;
+        straighten(mesh, adjacency, from, &chain, to)
+    };
+    let first = match beside {
+        Some(h) => straightened(mesh, adjacency, from, vec![h], to),
+        None => along(a, b).ok_or_else(|| no_way(mesh, &from, &to))?,
+    };
+    let straight = from.position(mesh).distance(to.position(mesh));
+    let mut best = (length(mesh, &first), first);
+    if best.0 <= BENT * straight || best.1.len() > NEAR {
+        return Ok(best.1);
+    }
+    // Past a tip there are several geodesics; the nearest corners need not tell which is shortest.
+    for v in mesh.triangles[from.face as usize] {
+        for w in mesh.triangles[to.face as usize] {
+            let other = if (v, w) == (a, b) && beside.is_none() { None } else { along(v, w) };
+            if let Some(way) = other {
+                let reached = length(mesh, &way);
+                if reached < best.0 {
+                    best = (reached, way);
+                }
+            }
         }
     }
-    let (a, b) = (nearest_corner(mesh, &from), nearest_corner(mesh, &to));
-    let chain = local_path(mesh, adjacency, a, b).ok_or_else(|| no_way(mesh, &from, &to))?;
-    straighten(mesh, adjacency, from, &chain, to).ok_or_else(|| no_way(mesh, &from, &to))
+    Ok(best.1)
+}
+
+/// A way between near places longer than this times the segment is compared with those by other corners, ...
+const BENT: f64 = 1.02;
+/// ... unless it has more places than this: they do not lie near each other.
+const NEAR: usize = 24;
+
+fn length(mesh: &TriMesh, places: &[FacePoint]) -> f64 {
+    places.windows(2).map(|w| w[0].position(mesh).distance(w[1].position(mesh))).sum()
 }
 
 pub(crate) fn no_way(mesh: &TriMesh, from: &FacePoint, to: &FacePoint) -> CurveError {
@@ -79,6 +110,27 @@ pub fn straighten(
 ) -> Option<Vec<FacePoint>> {
     let portals = strip_along(mesh, adjacency, from.face, chain, to.face)?;
     Some(straightened(mesh, adjacency, from, portals, to))
+}
+
+/// A half-edge that a strip leaves a face by, from `a` to `b`, with the place of the third vertex of the face beyond:
+/// it lies at `a + (b - a) * beyond` in the plane, as complex numbers.
+#[derive(Clone, Copy, Debug)]
+struct Gate {
+    half_edge: u32,
+    beyond: DVec2,
+}
+
+impl Gate {
+    fn new(mesh: &TriMesh, adjacency: &Adjacency, half_edge: u32) -> Gate {
+        let o = adjacency.opposite[half_edge as usize];
+        let point = |h: u32| mesh.points[mesh.origin(h) as usize];
+        let (a, apex) = (point(half_edge), point(previous(o)));
+        let (edge, c) = (point(o) - a, apex - a);
+        let square = edge.length_squared();
+        // On an edge without length nothing can be laid out; its face has no area, and is passed by.
+        let beyond = if square > 0.0 { DVec2::new(c.dot(edge), -c.cross(edge).length()) / square } else { DVec2::ZERO };
+        Gate { half_edge, beyond }
+    }
 }
 
 /// Half-edges that a strip leaves its faces by, from `first` along `chain` to `last`.
@@ -155,6 +207,7 @@ fn push_all(adjacency: &Adjacency, portals: &mut Vec<u32>, more: &[u32]) {
 }
 
 /// A strip laid out in the plane.
+#[derive(Default)]
 struct Layout {
     start: DVec2,
     end: DVec2,
@@ -171,53 +224,62 @@ struct Bend {
     at: DVec2,
 }
 
-fn lay_out(mesh: &TriMesh, from: &FacePoint, portals: &[u32], to: &FacePoint) -> Layout {
-    let point = |v: u32| mesh.points[v as usize];
-    let [a, b, c] = mesh.triangles[from.face as usize];
-    let mut flat = [DVec2::ZERO, DVec2::new(point(a).distance(point(b)), 0.0), DVec2::ZERO];
-    flat[2] = beyond(point(b), flat[1], point(a), flat[0], point(c));
-    let mut names = [a, b, c];
-    let weigh = |flat: &[DVec2; 3], w: [f64; 3]| flat[0] * w[0] + flat[1] * w[1] + flat[2] * w[2];
-    let start = weigh(&flat, from.bary);
-    let (mut left, mut right) = (Vec::with_capacity(portals.len()), Vec::with_capacity(portals.len()));
-    for (i, &h) in portals.iter().enumerate() {
-        let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
-        let find = |v: u32| names.iter().position(|&w| w == v).unwrap_or(0);
-        let (fa, fb) = (flat[find(a)], flat[find(b)]);
-        right.push((a, fa));
-        left.push((b, fb));
-        // The face beyond: that of the next half-edge, or the last.
-        let face = portals.get(i + 1).map_or(to.face, |&g| g / 3);
-        let apex = mesh.triangles[face as usize].into_iter().find(|&v| v != a && v != b).unwrap_or(a);
-        names = [b, a, apex];
-        flat = [fb, fa, beyond(point(a), fa, point(b), fb, point(apex))];
+impl Layout {
+    /// Lays out the strip from `from` through `gates` to `to`.
+    fn lay(&mut self, mesh: &TriMesh, adjacency: &Adjacency, from: &FacePoint, gates: &[Gate], to: &FacePoint) {
+        let weigh = |flat: [DVec2; 3], w: [f64; 3]| flat[0] * w[0] + flat[1] * w[1] + flat[2] * w[2];
+        self.left.clear();
+        self.right.clear();
+        let [a, b, c] = mesh.corners(from.face as usize);
+        let base = a.distance(b);
+        let along = if base > 0.0 { (c - a).dot(b - a) / base } else { 0.0 };
+        // Counter-clockwise: the third corner lies to the left of the first edge.
+        let mut flat = [DVec2::ZERO, DVec2::new(base, 0.0), DVec2::new(along, (c - a).length_squared())];
+        flat[2].y = (flat[2].y - along * along).max(0.0).sqrt();
+        self.start = weigh(flat, from.bary);
+        // Corners of the face that is reached, and the half-edge that its first corner starts.
+        let mut names = mesh.triangles[from.face as usize];
+        let mut first = 3 * from.face;
+        for gate in gates {
+            let h = gate.half_edge;
+            // The faces of a strip hang together: the half-edge is one of the face that is reached.
+            let k = (0..3).find(|&k| turned_by(first, k) == h).unwrap_or(0);
+            let (a, b) = (k, (k + 1) % 3);
+            let (fa, fb) = (flat[a], flat[b]);
+            self.right.push((names[a], fa));
+            self.left.push((names[b], fb));
+            let edge = fb - fa;
+            first = adjacency.opposite[h as usize];
+            let apex = fa
+                + DVec2::new(
+                    edge.x * gate.beyond.x - edge.y * gate.beyond.y,
+                    edge.x * gate.beyond.y + edge.y * gate.beyond.x,
+                );
+            names = [names[b], names[a], mesh.origin(previous(first))];
+            flat = [fb, fa, apex];
+        }
+        let shift = (3 - first as usize % 3) % 3;
+        self.end = weigh([0, 1, 2].map(|k| flat[(k + shift) % 3]), to.bary);
     }
-    let corner = |v: u32| flat[names.iter().position(|&w| w == v).unwrap_or(0)];
-    let end = weigh(&mesh.triangles[to.face as usize].map(corner), to.bary);
-    Layout { start, end, left, right }
 }
 
-/// Where `c` comes to lie in the plane, to the right of the way from `a` to `b`.
-fn beyond(a: DVec3, fa: DVec2, b: DVec3, fb: DVec2, c: DVec3) -> DVec2 {
-    let (edge, flat) = (b - a, fb - fa);
-    let length = edge.length();
-    if length == 0.0 {
-        return fa + DVec2::new(c.distance(a), 0.0);
+/// The half-edge `k` steps on from `h` in its face.
+fn turned_by(h: u32, k: usize) -> u32 {
+    match k {
+        0 => h,
+        1 => next(h),
+        _ => previous(h),
     }
-    let along = (c - a).dot(edge) / length;
-    let height = (c - a).cross(edge).length() / length;
-    let unit = flat / flat.length().max(f64::MIN_POSITIVE);
-    fa + unit * along + DVec2::new(unit.y, -unit.x) * height
 }
 
 /// Bends of the shortest way through a laid-out strip (the funnel of Lee and Preparata).
-fn funnel(lay: &Layout) -> Vec<Bend> {
+fn funnel(lay: &Layout, bends: &mut Vec<Bend>) {
     let count = lay.left.len();
     let sides = |i: usize| if i < count { (lay.left[i].1, lay.right[i].1) } else { (lay.end, lay.end) };
-    let mut bends = Vec::new();
+    bends.clear();
     let mut apex = lay.start;
     if count == 0 {
-        return bends;
+        return;
     }
     let (mut l, mut r) = sides(0);
     let (mut li, mut ri) = (0, 0);
@@ -253,7 +315,6 @@ fn funnel(lay: &Layout) -> Vec<Bend> {
     // The funnel may name the end itself, or one vertex twice.
     bends.retain(|b| b.portal < count);
     bends.dedup_by(|b, a| a.at == b.at);
-    bends
 }
 
 /// Turns the strip until its shortest way is straight; returns the places of that way.
@@ -267,19 +328,18 @@ fn straightened(
     let ends = [from, to];
     let (from, to) =
         (beyond_its_edge(adjacency, from, &mut portals, true), beyond_its_edge(adjacency, to, &mut portals, false));
-    let finish = |mut places: Vec<FacePoint>| {
-        let last = places.len() - 1;
-        (places[0], places[last]) = (ends[0], ends[1]);
-        places
-    };
-    let rounds = ROUNDS_PER_FACE * portals.len() + LEAST_ROUNDS;
-    for _ in 0..rounds {
-        let lay = lay_out(mesh, &from, &portals, &to);
-        let bends = funnel(&lay);
-        let mut turned: Vec<u32> = Vec::with_capacity(portals.len());
+    let mut gates: Vec<Gate> = portals.into_iter().map(|h| Gate::new(mesh, adjacency, h)).collect();
+    let mut turned: Vec<Gate> = Vec::with_capacity(gates.len());
+    let mut lay = Layout::default();
+    let mut bends: Vec<Bend> = Vec::new();
+    let mut angles: HashMap<u32, f64> = HashMap::new();
+    let rounds = ROUNDS_PER_FACE * gates.len() + LEAST_ROUNDS;
+    for round in 0..=rounds {
+        lay.lay(mesh, adjacency, &from, &gates, &to);
+        funnel(&lay, &mut bends);
+        turned.clear();
         let mut done = 0;
-        let mut changed = false;
-        for (k, bend) in bends.iter().enumerate() {
+        for (k, bend) in bends.iter().enumerate().take_while(|_| round < rounds) {
             let side = if bend.on_left { &lay.left } else { &lay.right };
             let w = side[bend.portal].0;
             let first = (0..=bend.portal).rev().take_while(|&i| side[i].0 == w).last().unwrap_or(bend.portal);
@@ -289,22 +349,47 @@ fn straightened(
             }
             let before = if k > 0 { bends[k - 1].at } else { lay.start };
             let after = bends.get(k + 1).map_or(lay.end, |b| b.at);
-            if let Some(other) = other_side(mesh, adjacency, &lay, bend, [first, last], &portals, [before, after]) {
-                push_all(adjacency, &mut turned, &portals[done..first]);
-                push_all(adjacency, &mut turned, &other);
+            let mut around = |w: u32| *angles.entry(w).or_insert_with(|| whole_angle(mesh, adjacency, w));
+            let range = [first, last];
+            if let Some(other) = other_side(adjacency, &lay, bend, range, &gates, [before, after], &mut around) {
+                push_gates(adjacency, &mut turned, gates[done..first].iter().copied());
+                push_gates(adjacency, &mut turned, other.into_iter().map(|h| Gate::new(mesh, adjacency, h)));
                 done = last + 1;
-                changed = true;
             }
         }
-        if !changed {
-            return finish(places(mesh, &from, &portals, &to, &lay, &bends));
+        if done == 0 {
+            break;
         }
-        push_all(adjacency, &mut turned, &portals[done..]);
-        portals = turned;
+        push_gates(adjacency, &mut turned, gates[done..].iter().copied());
+        std::mem::swap(&mut gates, &mut turned);
     }
-    let lay = lay_out(mesh, &from, &portals, &to);
-    let bends = funnel(&lay);
-    finish(places(mesh, &from, &portals, &to, &lay, &bends))
+    let mut places = places(mesh, &from, &gates, &to, &lay, &bends);
+    let last = places.len() - 1;
+    (places[0], places[last]) = (ends[0], ends[1]);
+    places
+}
+
+/// Appends gates to a strip; going back through the last one takes it away.
+fn push_gates(adjacency: &Adjacency, strip: &mut Vec<Gate>, more: impl Iterator<Item = Gate>) {
+    for gate in more {
+        match strip.last() {
+            Some(last) if adjacency.opposite[last.half_edge as usize] == gate.half_edge => {
+                strip.pop();
+            }
+            _ => strip.push(gate),
+        }
+    }
+}
+
+/// Angle of the surface around a vertex, radians.
+fn whole_angle(mesh: &TriMesh, adjacency: &Adjacency, w: u32) -> f64 {
+    let p = mesh.points[w as usize];
+    let corner = |h: u32| {
+        let (e, f) =
+            (mesh.points[mesh.origin(next(h)) as usize] - p, mesh.points[mesh.origin(previous(h)) as usize] - p);
+        e.cross(f).length().atan2(e.dot(f))
+    };
+    adjacency.fan(w).map(corner).sum()
 }
 
 /// Weights below this are zero: the place lies on the edge.
@@ -344,13 +429,13 @@ fn beyond_its_edge(adjacency: &Adjacency, place: FacePoint, portals: &mut Vec<u3
 /// The half-edges that pass the vertex of `bend` on its other side, if the surface opens by less than 180 degrees
 /// there.
 fn other_side(
-    mesh: &TriMesh,
     adjacency: &Adjacency,
     lay: &Layout,
     bend: &Bend,
     [first, last]: [usize; 2],
-    portals: &[u32],
+    gates: &[Gate],
     [before, after]: [DVec2; 2],
+    around: &mut dyn FnMut(u32) -> f64,
 ) -> Option<Vec<u32>> {
     let (own, far) = if bend.on_left { (&lay.left, &lay.right) } else { (&lay.right, &lay.left) };
     let w = own[bend.portal].0;
@@ -364,21 +449,13 @@ fn other_side(
         inside += arm.perp_dot(edge).abs().atan2(arm.dot(edge));
         arm = edge;
     }
-    let p = mesh.points[w as usize];
-    let whole: f64 = adjacency
-        .fan(w)
-        .map(|h| {
-            let (e, f) =
-                (mesh.points[mesh.origin(next(h)) as usize] - p, mesh.points[mesh.origin(previous(h)) as usize] - p);
-            e.cross(f).length().atan2(e.dot(f))
-        })
-        .sum();
-    if whole - inside >= std::f64::consts::PI - STRAIGHT {
+    if around(w) - inside >= std::f64::consts::PI - STRAIGHT {
         return None;
     }
-    let goal = adjacency.opposite[portals[last] as usize] / 3;
+    let goal = adjacency.opposite[gates[last].half_edge as usize] / 3;
     let mut crossed = Vec::new();
-    let mut out = if bend.on_left { next(portals[first]) } else { previous(portals[first]) };
+    let entry = gates[first].half_edge;
+    let mut out = if bend.on_left { next(entry) } else { previous(entry) };
     for _ in 0..3 * (last - first) + 64 {
         crossed.push(out);
         let g = adjacency.opposite[out as usize];
@@ -398,7 +475,7 @@ fn other_side(
 fn places(
     mesh: &TriMesh,
     from: &FacePoint,
-    portals: &[u32],
+    gates: &[Gate],
     to: &FacePoint,
     lay: &Layout,
     bends: &[Bend],
@@ -406,7 +483,7 @@ fn places(
     let mut out = vec![*from];
     let mut last_vertex = vertex_of(mesh, from);
     let (mut a, mut bend) = (lay.start, 0);
-    for (i, &h) in portals.iter().enumerate() {
+    for (i, h) in gates.iter().map(|g| g.half_edge).enumerate() {
         while bend < bends.len() && bends[bend].portal < i {
             a = bends[bend].at;
             bend += 1;
@@ -513,10 +590,7 @@ fn local_path(mesh: &TriMesh, adjacency: &Adjacency, from: u32, to: u32) -> Opti
 mod tests {
     use super::*;
     use crate::mesh::shapes;
-
-    fn length(mesh: &TriMesh, places: &[FacePoint]) -> f64 {
-        places.windows(2).map(|w| w[0].position(mesh).distance(w[1].position(mesh))).sum()
-    }
+    use glam::DVec3;
 
     #[test]
     fn a_way_over_a_flat_sheet_is_the_straight_segment_within_1e_12() {

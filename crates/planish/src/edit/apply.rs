@@ -1,5 +1,6 @@
 //! What each edit does to a drawing.
 
+use super::mirror::ON_PLANE;
 use super::{ApplyError, Edit, Forces, LINE_KIND, Magnetism, Others, Pull, Scalar, SplineMove, Spot};
 use super::{carry_network, mirror_network};
 use crate::curve::{
@@ -13,6 +14,9 @@ use crate::model::Drawing;
 use crate::network::{CurveKind, Editor, LayoutParams, imprint};
 use crate::observe::Observer;
 use glam::DVec3;
+
+/// A position further off the mesh than this share of its diagonal is a mistake: of units, or of axes.
+const FAR: f64 = 0.25;
 
 /// A mesh made ready for edits.
 pub struct Ground<'m> {
@@ -55,6 +59,7 @@ pub fn apply(
     others: &Others,
     observer: &dyn Observer,
 ) -> Result<(), ApplyError> {
+    super::check::check(edit)?;
     let before = drawing.clone();
     let made = Work { ground, drawing, observer }.make(edit, others);
     if observer.cancelled() || made.is_err() {
@@ -112,7 +117,11 @@ impl Work<'_, '_> {
     fn place(&self, spot: &Spot) -> Result<FacePoint, ApplyError> {
         let faces = self.mesh().triangles.len();
         match *spot {
-            Spot::Position(p) => Ok(self.ground.bvh.closest(DVec3::from_array(p)).place),
+            Spot::Position(p) => {
+                let found = self.ground.bvh.closest(DVec3::from_array(p));
+                let away = found.distance / self.mesh().bounds().diagonal().max(f64::MIN_POSITIVE);
+                if away > FAR { Err(ApplyError::OffMesh { place: p, away }) } else { Ok(found.place) }
+            }
             Spot::Place(p) if (p.face as usize) < faces => Ok(p),
             Spot::Place(p) => Err(CurveError::NoSuchFace { face: p.face, faces }.into()),
             Spot::Corner { corner } => {
@@ -274,7 +283,10 @@ impl Work<'_, '_> {
                 let attraction = pull.as_ref().map_or(0.0, |p| p.weight);
                 let params = SnakeParams { attraction, ..forces.params() };
                 let section = section.map(|s| (s[0], s[1]));
-                self.edit(|e, _, o| e.relax_curve(*curve, section, field.as_ref(), &params, o))
+                match curve {
+                    Some(curve) => self.edit(|e, _, o| e.relax_curve(*curve, section, field.as_ref(), &params, o)),
+                    None => self.relax_all(section, field.as_ref(), &params),
+                }
             }
             Edit::Spline { curve, control, moves } => self.spline(*curve, *control, moves),
             Edit::SplitRegion { at, from } => {
@@ -341,6 +353,40 @@ impl Work<'_, '_> {
             }
             Edit::Undo { .. } | Edit::Redo { .. } => Err(ApplyError::NotADrawing),
         }
+    }
+
+    /// Relaxes one curve after the other; one that would run into another stays as it is.
+    fn relax_all(
+        &mut self,
+        section: Option<(f64, f64)>,
+        field: Option<&ScalarField>,
+        params: &SnakeParams,
+    ) -> Result<(), ApplyError> {
+        let mesh = self.ground.canvas.mesh;
+        let plane = self.drawing.sketch.symmetry;
+        let near = ON_PLANE * mesh.bounds().diagonal();
+        self.edit(|e, _, observer| -> Result<(), ApplyError> {
+            let count = e.network.curves.len();
+            let mut faults = e.glance().faults.len();
+            for c in 0..count {
+                observer.progress(c as f64 / count as f64);
+                let curve = &e.network.curves[c];
+                let in_plane =
+                    |plane: symmetry::Plane| curve.points.iter().all(|p| plane.height(p.position(mesh)).abs() < near);
+                if curve.kind != CurveKind::Smooth || plane.is_some_and(in_plane) {
+                    continue;
+                }
+                let before = curve.points.clone();
+                e.relax_curve(c as u32, section, field, params, observer)?;
+                let after = e.glance().faults.len();
+                if after > faults {
+                    e.network.curves[c].points = before;
+                } else {
+                    faults = after;
+                }
+            }
+            Ok(())
+        })
     }
 
     fn spline(&mut self, curve: u32, control: usize, moves: &[SplineMove]) -> Result<(), ApplyError> {

@@ -9,7 +9,7 @@ use crate::network::{Corner, Curve, CurveKind, Network};
 use crate::observe::Observer;
 
 /// A corner nearer to the plane than this share of the diagonal lies on it.
-const ON_PLANE: f64 = 2e-3;
+pub(super) const ON_PLANE: f64 = 2e-3;
 
 /// The curves before `plane` (on the side of its normal) and in it, and their mirror images; curves behind it go.
 /// Every curve lies on one side, with corners where it meets the plane; those corners are moved into it.

@@ -5,6 +5,7 @@
 //! Places are world positions (taken to the nearest place of the mesh), places by face, or corners.
 
 mod apply;
+mod check;
 mod mirror;
 
 pub use apply::{Ground, apply};
@@ -246,10 +247,12 @@ pub enum Edit {
         #[serde(default)]
         forces: Forces,
     },
-    /// Relaxes a curve or a section of it.
+    /// Relaxes a curve, a section of it, or all curves.
     Relax {
-        /// The curve.
-        curve: u32,
+        /// The curve; absent for all that are free to move and do not lie in the plane of symmetry. Of these one stays
+        /// as it is where it would run into another.
+        #[serde(default)]
+        curve: Option<u32>,
         /// Middle and width of the section, shares of the length.
         #[serde(default)]
         section: Option<[f64; 2]>,
@@ -397,6 +400,23 @@ pub enum ApplyError {
         corner: u32,
         /// How many there are.
         count: usize,
+    },
+    /// A place or a number that is not finite.
+    #[error("{what} is not a finite number - hint: give numbers in the units of the mesh")]
+    NotFinite {
+        /// What it is of.
+        what: &'static str,
+    },
+    /// A position far off the mesh.
+    #[error(
+        "({:.6}, {:.6}, {:.6}) is {:.0} % of the diagonal off the mesh - hint: check the units and the axes",
+        place[0], place[1], place[2], 100.0 * away
+    )]
+    OffMesh {
+        /// The position.
+        place: [f64; 3],
+        /// Its distance over the diagonal.
+        away: f64,
     },
     /// No patch where one is wanted.
     #[error("there is no patch at ({:.6}, {:.6}, {:.6}) yet - hint: finish the curves around it", place[0], place[1], place[2])]

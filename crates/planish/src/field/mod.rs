@@ -124,6 +124,12 @@ pub trait Field: Sync {
         true
     }
 
+    /// The same field, bit for bit, for points of this box, where it answers faster there; a hook for fields of many
+    /// parts of which a small box meets few.
+    fn within(&self, _aabb: &Aabb) -> Option<Box<dyn Field + '_>> {
+        None
+    }
+
     /// Typical angle by which [`Field::gradient`] misses the true normal, degrees: 0 for exact sources. Normals that
     /// differ by less than about three times this are no evidence of a feature; the extractor widens its
     /// threshold accordingly.

@@ -15,6 +15,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 const BRICK: usize = 8;
 /// Bricks are ruled out in groups of so many along x and y first.
 const GROUPS: [usize; 2] = [8, 2];
+/// Nodes along an edge of the smallest boxes of fields that get faster in them.
+const FEW: usize = 2;
 
 /// Samples a field on a lattice.
 /// # Errors
@@ -91,7 +93,7 @@ impl Slab<'_> {
                 return None;
             }
             for i in (0..nx).step_by(group) {
-                self.divide([i, j], [(i + group).min(nx), (j + group).min(ny)], 1, &mut bits);
+                self.divide(self.field, [i, j], [(i + group).min(nx), (j + group).min(ny)], 1, &mut bits);
             }
         }
         let row = |r: usize| {
@@ -101,13 +103,15 @@ impl Slab<'_> {
         Some((0..rows).map(row).collect())
     }
 
-    /// Settles the nodes `from..to` of all planes of the slab.
-    fn divide(&self, from: [usize; 2], to: [usize; 2], level: usize, bits: &mut Bits) {
+    /// Settles the nodes `from..to` of all planes of the slab; `field` is good for them.
+    fn divide(&self, field: &dyn Field, from: [usize; 2], to: [usize; 2], level: usize, bits: &mut Bits) {
         let low = self.lattice.node(from[0], from[1], self.k0);
         let high = self.lattice.node(to[0] - 1, to[1] - 1, self.k1 - 1);
         let aabb = Aabb { min: low, max: high };
-        if !self.field.crosses(&aabb) {
-            let side = self.field.side(aabb.center());
+        let near = field.within(&aabb);
+        let field = near.as_deref().unwrap_or(field);
+        if !field.crosses(&aabb) {
+            let side = field.side(aabb.center());
             if side != Side::Outside {
                 for k in self.k0..self.k1 {
                     for j in from[1]..to[1] {
@@ -121,21 +125,55 @@ impl Slab<'_> {
             let step = GROUPS.get(level).map_or(BRICK, |g| g * BRICK);
             for j in (from[1]..to[1]).step_by(step) {
                 for i in (from[0]..to[0]).step_by(step) {
-                    self.divide([i, j], [(i + step).min(to[0]), (j + step).min(to[1])], level + 1, bits);
+                    self.divide(field, [i, j], [(i + step).min(to[0]), (j + step).min(to[1])], level + 1, bits);
                 }
             }
             return;
         }
-        let mut points = Vec::with_capacity(BRICK * BRICK * BRICK);
-        for k in self.k0..self.k1 {
+        if near.is_some() {
+            self.halve(field, [from[0], from[1], self.k0], [to[0], to[1], self.k1], bits);
+        } else {
+            self.ask(field, [from[0], from[1], self.k0], [to[0], to[1], self.k1], bits);
+        }
+    }
+
+    /// Settles the nodes `from..to` by halves, down to a few nodes: for a field that gets faster in small boxes.
+    fn halve(&self, field: &dyn Field, from: [usize; 3], to: [usize; 3], bits: &mut Bits) {
+        let node = |n: [usize; 3]| self.lattice.node(n[0], n[1], n[2]);
+        let aabb = Aabb { min: node(from), max: node(to.map(|n| n - 1)) };
+        let near = field.within(&aabb);
+        let field = near.as_deref().unwrap_or(field);
+        if !field.crosses(&aabb) {
+            let side = field.side(aabb.center());
+            for (j, k) in (from[1]..to[1]).flat_map(|j| (from[2]..to[2]).map(move |k| (j, k))) {
+                bits.put(from[0]..to[0], j, k - self.k0, side);
+            }
+            return;
+        }
+        let axis = (0..3).fold(0, |best, a| if to[a] - from[a] > to[best] - from[best] { a } else { best });
+        if to[axis] - from[axis] <= FEW {
+            self.ask(field, from, to, bits);
+            return;
+        }
+        let middle = from[axis].midpoint(to[axis]);
+        let (mut end, mut start) = (to, from);
+        (end[axis], start[axis]) = (middle, middle);
+        self.halve(field, from, end, bits);
+        self.halve(field, start, to, bits);
+    }
+
+    /// Asks the field for the nodes `from..to`.
+    fn ask(&self, field: &dyn Field, from: [usize; 3], to: [usize; 3], bits: &mut Bits) {
+        let mut points = Vec::with_capacity((0..3).map(|a| to[a] - from[a]).product());
+        for k in from[2]..to[2] {
             for j in from[1]..to[1] {
                 points.extend((from[0]..to[0]).map(|i| self.lattice.node(i, j, k)));
             }
         }
         let mut values = vec![0.0; points.len()];
-        self.field.values(&points, &mut values);
+        field.values(&points, &mut values);
         let mut values = values.into_iter();
-        for k in self.k0..self.k1 {
+        for k in from[2]..to[2] {
             for j in from[1]..to[1] {
                 for (i, value) in (from[0]..to[0]).zip(&mut values) {
                     bits.put(i..i + 1, j, k - self.k0, super::side_of(value));
@@ -176,6 +214,8 @@ pub fn hit_on_edge(field: &dyn Field, lattice: &Lattice, axis: usize, [i, j, k]:
     let mut end = [i, j, k];
     end[axis] += 1;
     let high = lattice.node(end[0], end[1], end[2]);
+    let near = field.within(&Aabb { min: low, max: high });
+    let field = near.as_deref().unwrap_or(field);
     let (f0, f1) = (field.value(low), field.value(high));
     let t = root(|t| field.value(at(t)), f0, f1);
     let p = at(t);

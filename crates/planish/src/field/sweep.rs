@@ -3,7 +3,8 @@
 //! METHODS 2.1 ([K01] §5.1, milling): a tool is a convex body of revolution, so its sweep along a straight move is
 //! convex, and the distance from it is the least over the move of the distance from the tool. That is a convex function
 //! of the place on the move: closed forms where the move is level or upright or the tool is ball-ended, a search
-//! otherwise. Moves sit in a tree of boxes.
+//! otherwise. Moves sit in a tree of boxes; in a small box of space only those are looked at that can be the nearest one
+//! somewhere in it.
 
 use super::Field;
 use crate::geom::Aabb;
@@ -185,49 +186,148 @@ impl Milling {
         [at(0.0), at(1.0), fy].into_iter().fold(fx, |best, f| if f.0 < best.0 { f } else { best })
     }
 
-    /// Distance from everything that the tools sweep, and its gradient.
-    fn cut(&self, p: DVec3) -> (f64, DVec3) {
-        let mut best = (f64::INFINITY, DVec3::Z);
+    /// No move under a node is nearer to `p` than this.
+    fn reach(&self, at: u32, p: DVec3) -> f64 {
+        let n = &self.nodes[at as usize];
+        let flat = (n.bounds.min - p).max(p - n.bounds.max).truncate().max(DVec2::ZERO).length() - n.radius;
+        flat.max(n.bounds.min.z - p.z)
+    }
+
+    /// Visits the moves that may be nearer to `p` than `limit`, which `visit` may lower, the nearest first.
+    fn visit(&self, p: DVec3, limit: &mut f64, mut visit: impl FnMut(u32, &mut f64)) {
         if self.nodes.is_empty() {
-            return best;
+            return;
         }
-        let reach = |n: &Node| {
-            let flat = (n.bounds.min - p).max(p - n.bounds.max).truncate().max(DVec2::ZERO).length() - n.radius;
-            let below = n.bounds.min.z - p.z;
-            flat.max(below)
-        };
-        let mut stack = [0u32; 64];
+        let mut stack = [(0u32, f64::NEG_INFINITY); 64];
         let mut top = 1;
         while top > 0 {
             top -= 1;
-            let at = stack[top] as usize;
-            let node = &self.nodes[at];
-            if reach(node) >= best.0 {
+            let (at, reach) = stack[top];
+            // Not less: of moves at the same distance the first counts.
+            if reach > *limit {
                 continue;
             }
+            let node = &self.nodes[at as usize];
             if node.second == 0 {
-                for m in &self.moves[node.first as usize..(node.first + node.count) as usize] {
-                    let found = self.swept(m, p);
-                    if found.0 < best.0 {
-                        best = found;
-                    }
-                }
+                (node.first..node.first + node.count).for_each(|m| visit(m, limit));
                 continue;
             }
-            let (one, other) = (at as u32 + 1, node.second);
-            let (a, b) = (reach(&self.nodes[one as usize]), reach(&self.nodes[other as usize]));
+            let [a, b] = [at + 1, node.second].map(|n| (n, self.reach(n, p)));
             // The nearer one on top.
-            (stack[top], stack[top + 1]) = if a <= b { (other, one) } else { (one, other) };
+            (stack[top], stack[top + 1]) = if a.1 <= b.1 { (b, a) } else { (a, b) };
             top += 2;
         }
-        best
+    }
+
+    /// Distance from everything that the tools sweep, and its gradient.
+    fn cut(&self, p: DVec3) -> (f64, DVec3) {
+        let mut nearest = Nearest::default();
+        let mut limit = f64::INFINITY;
+        self.visit(p, &mut limit, |m, limit| {
+            nearest.take(m, self.swept(&self.moves[m as usize], p));
+            *limit = nearest.value;
+        });
+        (nearest.value, nearest.gradient)
+    }
+
+    /// The body at `p`, where the swept volumes have this distance and gradient.
+    fn body(&self, p: DVec3, (cut, g): (f64, DVec3)) -> (f64, DVec3) {
+        let half = self.stock.size() / 2.0;
+        let (stock, h) = super::Solid::Cuboid { size: half * 2.0, round: 0.0 }.evaluate(p - self.stock.center());
+        if -cut > stock { (-cut, -g) } else { (stock, h) }
     }
 
     fn evaluate(&self, p: DVec3) -> (f64, DVec3) {
-        let half = self.stock.size() / 2.0;
-        let (stock, g) = super::Solid::Cuboid { size: half * 2.0, round: 0.0 }.evaluate(p - self.stock.center());
-        let (cut, h) = self.cut(p);
-        if -cut > stock { (-cut, -h) } else { (stock, g) }
+        self.body(p, self.cut(p))
+    }
+}
+
+/// The nearest of some moves; of those at the same distance the first.
+struct Nearest {
+    value: f64,
+    gradient: DVec3,
+    at: u32,
+}
+
+impl Default for Nearest {
+    fn default() -> Nearest {
+        Nearest { value: f64::INFINITY, gradient: DVec3::Z, at: u32::MAX }
+    }
+}
+
+impl Nearest {
+    fn take(&mut self, at: u32, (value, gradient): (f64, DVec3)) {
+        if value < self.value || (value == self.value && at < self.at) {
+            *self = Nearest { value, gradient, at };
+        }
+    }
+}
+
+/// A milled body in a small box: the moves that decide there.
+struct Corner<'a> {
+    milling: &'a Milling,
+    moves: Vec<u32>,
+}
+
+impl<'a> Corner<'a> {
+    /// The moves that can be the nearest one at any place of a box: distances change by no more than the way.
+    fn new(milling: &'a Milling, aabb: &Aabb, among: Option<&[u32]>) -> Corner<'a> {
+        let (center, way) = (aabb.center(), SLACK * aabb.diagonal());
+        let mut found: Vec<(u32, f64)> = Vec::new();
+        let mut least = f64::INFINITY;
+        let mut take = |m: u32, limit: &mut f64| {
+            let value = milling.swept(&milling.moves[m as usize], center).0;
+            least = least.min(value);
+            *limit = least + way;
+            if value <= *limit {
+                found.push((m, value));
+            }
+        };
+        let mut limit = f64::INFINITY;
+        match among {
+            Some(moves) => moves.iter().for_each(|&m| take(m, &mut limit)),
+            None => milling.visit(center, &mut limit, take),
+        }
+        Corner { milling, moves: found.into_iter().filter(|x| x.1 <= limit).map(|x| x.0).collect() }
+    }
+
+    fn evaluate(&self, p: DVec3) -> (f64, DVec3) {
+        let mut nearest = Nearest::default();
+        self.moves.iter().for_each(|&m| nearest.take(m, self.milling.swept(&self.milling.moves[m as usize], p)));
+        self.milling.body(p, (nearest.value, nearest.gradient))
+    }
+}
+
+/// Twice the way from the middle of a box to its corners, a little more for rounding.
+const SLACK: f64 = 1.000_001;
+
+/// A box with the fastest answer for its points is smaller than this part of the stock, or few moves would go.
+const SMALL: f64 = 0.1;
+
+/// True if a surface of `field`, which is made of distances, can cross a box: they change by no more than the way.
+fn crosses(field: &dyn Field, aabb: &Aabb) -> bool {
+    field.value(aabb.center()).abs() <= aabb.diagonal() / 2.0
+}
+
+impl Field for Corner<'_> {
+    fn bounds(&self) -> Aabb {
+        self.milling.stock
+    }
+
+    fn value(&self, p: DVec3) -> f64 {
+        self.evaluate(p).0
+    }
+
+    fn gradient(&self, p: DVec3) -> DVec3 {
+        self.evaluate(p).1
+    }
+
+    fn crosses(&self, aabb: &Aabb) -> bool {
+        crosses(self, aabb)
+    }
+
+    fn within(&self, aabb: &Aabb) -> Option<Box<dyn Field + '_>> {
+        Some(Box::new(Corner::new(self.milling, aabb, Some(&self.moves))))
     }
 }
 
@@ -245,8 +345,12 @@ impl Field for Milling {
     }
 
     fn crosses(&self, aabb: &Aabb) -> bool {
-        // Both are distances: they change by no more than the way.
-        self.value(aabb.center()).abs() <= aabb.diagonal() / 2.0
+        crosses(self, aabb)
+    }
+
+    fn within(&self, aabb: &Aabb) -> Option<Box<dyn Field + '_>> {
+        let small = aabb.diagonal() < SMALL * self.stock.diagonal();
+        small.then(|| Box::new(Corner::new(self, aabb, None)) as Box<dyn Field>)
     }
 }
 
@@ -276,6 +380,30 @@ mod tests {
                         .fold(f64::INFINITY, f64::min);
                     let found = milling.cut(p).0;
                     assert!(found <= least + 1e-9 && found > least - 4e-4, "{tool:?} {to} {p}: {found} {least}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn in_small_boxes_of_300_moves_values_and_gradients_are_bitwise_those_of_the_whole() {
+        let stock = Aabb { min: DVec3::ZERO, max: DVec3::splat(10.0) };
+        let r = |a: u64, b: u64| random::unit(a, b);
+        let place = |n: u64| DVec3::new(10.0 * r(n, 0), 10.0 * r(n, 1), 4.0 + 6.0 * r(n, 2));
+        let tools =
+            vec![Tool::Ball { radius: 0.5 }, Tool::Flat { radius: 0.4 }, Tool::Bull { radius: 0.5, corner: 0.2 }];
+        let moves = (0..300).map(|n| Move { from: place(n), to: place(n + 1), tool: n as usize % 3 }).collect();
+        let milling = Milling::new(stock, tools, moves);
+        for n in 0..400u64 {
+            let low = DVec3::new(10.0 * r(n, 10), 10.0 * r(n, 11), 10.0 * r(n, 12));
+            let aabb = Aabb { min: low, max: low + DVec3::splat(0.3) };
+            let near = milling.within(&aabb).expect("a small box");
+            let nearer = near.within(&Aabb { min: low, max: low + DVec3::splat(0.2) }).expect("a smaller box");
+            for k in 0..8 {
+                let p = low + 0.2 * DVec3::new(r(n, 20 + k), r(n, 30 + k), r(n, 40 + k));
+                for field in [&*near, &*nearer] {
+                    assert_eq!(field.value(p).to_bits(), milling.value(p).to_bits(), "{p}");
+                    assert_eq!(field.gradient(p), milling.gradient(p), "{p}");
                 }
             }
         }

@@ -4,19 +4,20 @@
 //! side 2. Curves of different families cross once, in an anchor; curves of one family never.
 //! 1. the v curves are imprinted, the u curves traced over that: their crossings are anchors
 //! 2. the sub-patches between curves are exact disks of their own; every one gets its part of the grid  - §5.11.2
-//! 3. curve points lie at even arc length between anchors  - eq. 5.14
+//! 3. curve points slide along their curves  - eq. 5.14 to 5.17, `feature_slide`
 //!
 //! Departs from [K98]: sub-patches are relaxed one by one with their sides fixed instead of all at once with curve
 //! points sliding; every curve point and anchor lies on its curve by construction, and no sub-patch can fold.
 //! Sections have their own numbers of points, so one is refined alone by giving it more.
 
+use super::feature_slide;
 use super::feature_strand::{Pieces, Strands, cut_family, to_input, to_patch};
 use super::{Grid, GridError, GridParams, SideStops, relax_at, rim_node, side};
 use crate::curve::SurfaceCurve;
 use crate::mesh::{Adjacency, FacePoint, TriMesh, next};
 use crate::network::imprint::{self, Place};
 use crate::network::{Corner, Curve, CurveKind, ImprintError, Network, Patch, PatchMesh, Side};
-use crate::observe::Observer;
+use crate::observe::{Observer, Part};
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -169,6 +170,8 @@ pub enum FeatureError {
     Imprint(#[from] ImprintError),
 }
 
+/// Share of the time that reading the slides takes.
+const READING: f64 = 0.3;
 /// Fewest cells of a section: with fewer its points would tell nothing of its shape.
 const FEWEST_CELLS: usize = 2;
 
@@ -247,12 +250,14 @@ pub(super) fn relax_along(
     let (start_u, start_v) = (starts(u), starts(v));
     let (cols, rows) = (u.iter().sum::<usize>() + 1, v.iter().sum::<usize>() + 1);
     let sizes: Vec<(usize, usize)> = (0..nu * nv).map(|p| (u[p % nu] + 1, v[p / nu] + 1)).collect();
+    // Where the points of every inner side lie: read from small grids of the sub-patches.
+    let slides = feature_slide::read(ground, &sub, nu, params, &Part::new(observer, 0.0, READING))?;
     let sub_stops: Vec<SideStops> = (0..nu * nv)
         .map(|p| {
             let (i, j) = (p % nu, p / nu);
             let part = |side: usize, at_rim: bool, from: usize, count: usize| match at_rim {
                 true => part_of(&stops[side], from, from + count, if side.is_multiple_of(2) { cols } else { rows }),
-                false => side::Stops::new(),
+                false => slides[p][side].as_ref().map_or_else(side::Stops::new, |s| s.stops(count)),
             };
             [
                 part(0, j == 0, start_u[i], u[i]),
@@ -262,7 +267,8 @@ pub(super) fn relax_along(
             ]
         })
         .collect();
-    let grids = relax_at(ground, &sub, &sizes, &sub_stops, params, observer)?;
+    let rest = Part::new(observer, READING, 1.0 - READING);
+    let grids = relax_at(ground, &sub, &sizes, &sub_stops, params, &rest)?;
     // 4. One grid of all.
     let mut grid =
         Grid { rows, cols, points: vec![DVec3::ZERO; rows * cols], places: vec![FacePoint::corner(0, 0); rows * cols] };

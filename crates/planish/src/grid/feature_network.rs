@@ -15,26 +15,42 @@ use std::collections::BTreeMap;
 /// one curve drawn on over several patches.
 const SAME_END: f64 = 1e-6;
 
+/// What is drawn in the patches of a network: feature curves with the patch that each is in, and for some patches the
+/// cells between theirs.
+pub type Drawn<'a> = (&'a [FeatureCurve], &'a [(u32, Sections)]);
+
 /// Resamples every patch of a network; those with feature curves follow them exactly.
-/// * `sizes` - as of [`super::choose_sizes`]; numbers given by `sections` go over them along their chord
-/// * `features` - curves with the patches that they are in
-/// * `sections` - for some patches the cells between their feature curves
+/// * `sizes` - as of [`super::choose_sizes`]; numbers given by sections go over them along their chord
 /// # Errors
-/// See [`FeatureError`]; curves are named by their index in `features`.
+/// See [`FeatureError`]; curves are named by their index.
 pub fn relax_network(
     input: &TriMesh,
     network: &Network,
     patches: &[PatchMesh],
     sizes: &[(usize, usize)],
-    (features, sections): (&[FeatureCurve], &[(u32, Sections)]),
+    drawn: Drawn,
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<Vec<Grid>, FeatureError> {
+    let mut sizes = sizes.to_vec();
+    give_sums(network, drawn, &mut sizes)?;
+    let all: Vec<usize> = (0..patches.len()).collect();
+    relax_some(input, network, patches, &sizes, drawn, &all, params, observer)
+}
+
+/// As [`relax_network`] for some of the patches, `which`, rising, with the sums of given sections in `sizes` already.
+pub(super) fn relax_some(
+    input: &TriMesh,
+    network: &Network,
+    patches: &[PatchMesh],
+    sizes: &[(usize, usize)],
+    (features, sections): Drawn,
+    which: &[usize],
     params: &GridParams,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, FeatureError> {
     if patches.len() != sizes.len() || patches.len() != network.patches.len() {
         return Err(GridError::SizeCount { patches: patches.len(), sizes: sizes.len() }.into());
-    }
-    if features.is_empty() {
-        return Ok(relax_at(input, patches, sizes, &[], params, observer)?);
     }
     let mut of_patch: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (k, feature) in features.iter().enumerate() {
@@ -44,8 +60,6 @@ pub fn relax_network(
         of_patch.entry(feature.patch as usize).or_default().push(k);
     }
     let given = |p: usize| sections.iter().rfind(|s| s.0 as usize == p).map(|s| &s.1);
-    let mut sizes = sizes.to_vec();
-    give_sums(network, &of_patch, &given, &mut sizes)?;
     let mut strands: BTreeMap<usize, (Strands, [Vec<usize>; 2])> = BTreeMap::new();
     for (&p, own) in &of_patch {
         let curves: Vec<FeatureCurve> = own.iter().map(|&k| features[k].clone()).collect();
@@ -59,8 +73,8 @@ pub fn relax_network(
         ];
         strands.insert(p, (found, cells));
     }
-    let on_curve = stops_of_curves(network, &strands, &sizes)?;
-    let stops: Vec<SideStops> = (network.patches.iter().zip(&sizes))
+    let on_curve = stops_of_curves(network, &strands, sizes)?;
+    let stops: Vec<SideStops> = (network.patches.iter().zip(sizes))
         .map(|(patch, size)| {
             std::array::from_fn(|k| {
                 let side = patch.sides[k];
@@ -71,17 +85,17 @@ pub fn relax_network(
         })
         .collect();
     // Patches without feature curves together, those with them one by one.
-    let plain: Vec<usize> = (0..patches.len()).filter(|p| !strands.contains_key(p)).collect();
+    let plain: Vec<usize> = which.iter().copied().filter(|p| !strands.contains_key(p)).collect();
     let pick = |list: &[usize]| -> (Vec<PatchMesh>, Vec<(usize, usize)>, Vec<SideStops>) {
         let patches = list.iter().map(|&p| patches[p].clone()).collect();
         (patches, list.iter().map(|&p| sizes[p]).collect(), list.iter().map(|&p| stops[p].clone()).collect())
     };
     let (some, some_sizes, some_stops) = pick(&plain);
-    let each = 1.0 / patches.len() as f64;
+    let each = 1.0 / which.len().max(1) as f64;
     let first = Part::new(observer, 0.0, plain.len() as f64 * each);
     let made = relax_at(input, &some, &some_sizes, &some_stops, params, &first).map_err(|e| of_plain(e, &plain))?;
     let mut grids: BTreeMap<usize, Grid> = plain.into_iter().zip(made).collect();
-    for (&p, (found, cells)) in &strands {
+    for (&p, (found, cells)) in strands.iter().filter(|s| which.contains(s.0)) {
         let part = Part::new(observer, grids.len() as f64 * each, each);
         let made = relax_along(input, &patches[p], found, cells, &stops[p], params, &part);
         grids.insert(p, made.map_err(|e| named(e, &of_patch[&p]))?.grid);
@@ -116,17 +130,17 @@ fn named(error: FeatureError, own: &[usize]) -> FeatureError {
 }
 
 /// Puts the sums of given sections in the place of the sizes along their chords.
-fn give_sums<'a>(
+pub(super) fn give_sums(
     network: &Network,
-    of_patch: &BTreeMap<usize, Vec<usize>>,
-    given: &dyn Fn(usize) -> Option<&'a Sections>,
+    (features, sections): Drawn,
     sizes: &mut [(usize, usize)],
 ) -> Result<(), FeatureError> {
     let chords = network.chords();
     let chord = |p: usize, k: usize| chords[network.patches[p].sides[k].curve as usize];
     let mut sums: BTreeMap<u32, usize> = BTreeMap::new();
-    for &p in of_patch.keys() {
-        let Some(sections) = given(p) else { continue };
+    let with_curves: std::collections::BTreeSet<usize> = features.iter().map(|f| f.patch as usize).collect();
+    for p in with_curves.into_iter().filter(|&p| p < sizes.len()) {
+        let Some((_, sections)) = sections.iter().rfind(|s| s.0 as usize == p) else { continue };
         for (k, cells) in [(0, &sections.u), (1, &sections.v)] {
             if cells.is_empty() {
                 continue;

@@ -16,6 +16,7 @@ mod chart;
 mod even;
 mod feature_curve;
 mod feature_network;
+mod feature_slide;
 mod feature_strand;
 mod fold;
 mod locate;
@@ -31,7 +32,7 @@ mod walk;
 pub use feature_curve::{Family, FeatureCurve, FeatureError, FeatureGrid, Sections, relax_with_features};
 pub use feature_network::relax_network;
 pub use quality::{GridQuality, measure};
-pub use resample::resample;
+pub use resample::{resample, resample_with_features};
 pub use sizes::choose_sizes;
 
 use crate::mesh::{FacePoint, TriMesh};

@@ -1,8 +1,10 @@
 //! Grids of a whole network: sizes chosen, patches relaxed, and grids that miss detail made finer.
 
+use super::feature_curve::FeatureError;
+use super::feature_network::{Drawn, give_sums, relax_some};
 use super::quality::{folds, miss};
 use super::sizes::{bounds, total};
-use super::{Grid, GridError, GridParams, Job, choose_sizes, relax, relax_jobs};
+use super::{Grid, GridError, GridParams, Job, choose_sizes, relax_jobs};
 use crate::mesh::TriMesh;
 use crate::network::{Network, PatchMesh};
 use crate::observe::{Observer, Part};
@@ -43,36 +45,88 @@ pub fn resample(
     params: &GridParams,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, GridError> {
+    let make = |which: &[usize], sizes: &[(usize, usize)], observer: &dyn Observer| {
+        let jobs: Vec<Job> = which.iter().map(|&p| (p, &patches[p], sizes[p])).collect();
+        relax_jobs(input, &jobs, &[], params, observer)
+    };
+    refined(input, network, patches, params, &|_| Ok(()), &make, observer)
+}
+
+/// As [`resample`], with feature curves as iso-curves of the grids of their patches; cells that sections give go over
+/// what the patches want.
+/// # Errors
+/// As [`relax_network`](super::relax_network).
+pub fn resample_with_features(
+    input: &TriMesh,
+    network: &Network,
+    patches: &[PatchMesh],
+    drawn: Drawn,
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<Vec<Grid>, FeatureError> {
+    let make = |which: &[usize], sizes: &[(usize, usize)], observer: &dyn Observer| {
+        relax_some(input, network, patches, sizes, drawn, which, params, observer)
+    };
+    refined(input, network, patches, params, &|sizes| give_sums(network, drawn, sizes), &make, observer)
+}
+
+/// Points along u and v.
+type Size = (usize, usize);
+type Give<'a, E> = dyn Fn(&mut [Size]) -> Result<(), E> + 'a;
+type Make<'a, E> = dyn Fn(&[usize], &[Size], &dyn Observer) -> Result<Vec<Grid>, E> + 'a;
+
+/// Relaxes all patches, and those that need it again with more points.
+/// * `give` - puts sizes that are given in the place of those chosen
+/// * `make` - grids of some patches, rising, by the sizes of all
+fn refined<E: From<GridError>>(
+    input: &TriMesh,
+    network: &Network,
+    patches: &[PatchMesh],
+    params: &GridParams,
+    give: &Give<E>,
+    make: &Make<E>,
+    observer: &dyn Observer,
+) -> Result<Vec<Grid>, E> {
     let mut sizes = choose_sizes(network, patches, params);
-    let mut grids = relax(input, patches, &sizes, params, &Part::new(observer, 0.0, FIRST_SHARE))?;
+    give(&mut sizes)?;
+    let all: Vec<usize> = (0..patches.len()).collect();
+    let mut grids = make(&all, &sizes, &Part::new(observer, 0.0, FIRST_SHARE))?;
     let allowed = params.miss * input.bounds().diagonal();
     let chords = network.chords();
     let [_, most] = bounds(params);
     let budget = ((GROWTH * total(&sizes) as f64) as usize).min(params.max_points);
-    let mut suspects: Vec<usize> = (0..patches.len()).collect();
+    let mut suspects = all;
+    let mut folds_before = vec![usize::MAX; patches.len()];
     for round in 0..ROUNDS {
         if observer.cancelled() {
-            return Err(GridError::Cancelled);
+            return Err(GridError::Cancelled.into());
         }
-        let need = |&p: &usize| {
-            let folded = folds(&grids[p], &patches[p]) > 0;
-            miss(&grids[p], &patches[p]).0.max(if folded { FOLDED * allowed } else { 0.0 })
+        let measured: Vec<(f64, usize)> =
+            suspects.par_iter().map(|&p| (miss(&grids[p], &patches[p]).0, folds(&grids[p], &patches[p]))).collect();
+        let need = |(&p, &(miss, folds)): (&usize, &(f64, usize))| {
+            // Where more points have not helped against folds, still more would not.
+            let helps = folds > 0 && folds < std::mem::replace(&mut folds_before[p], folds) / 2;
+            miss.max(if helps { FOLDED * allowed } else { 0.0 })
         };
-        let misses: Vec<f64> = suspects.par_iter().map(need).collect();
+        let misses: Vec<f64> = suspects.iter().zip(&measured).map(need).collect();
+        let wish = |limit: f64| -> Result<Vec<(usize, usize)>, E> {
+            let mut sizes = finer(network, &chords, &grids, &suspects, &misses, limit, most);
+            give(&mut sizes)?;
+            Ok(sizes)
+        };
         // Long chords carry one patch's need far: where that asks for too many points, only the worst are heeded.
-        let (mut limit, mut wanted) = (allowed, finer(network, &chords, &grids, &suspects, &misses, allowed, most));
+        let (mut limit, mut wanted) = (allowed, wish(allowed)?);
         while total(&wanted) > budget && wanted != sizes {
             limit *= LESS;
-            wanted = finer(network, &chords, &grids, &suspects, &misses, limit, most);
+            wanted = wish(limit)?;
         }
         suspects = (0..patches.len()).filter(|&p| wanted[p] != sizes[p]).collect();
         if suspects.is_empty() {
             break;
         }
-        let jobs: Vec<Job> = suspects.iter().map(|&p| (p, &patches[p], wanted[p])).collect();
         let share = (1.0 - FIRST_SHARE) / ROUNDS as f64;
         let part = Part::new(observer, FIRST_SHARE + share * round as f64, share);
-        for (&p, grid) in suspects.iter().zip(relax_jobs(input, &jobs, &[], params, &part)?) {
+        for (&p, grid) in suspects.iter().zip(make(&suspects, &wanted, &part)?) {
             grids[p] = grid;
         }
         sizes = wanted;

@@ -178,43 +178,95 @@ impl Disk {
     /// What the straight segment from vertex `a` to vertex `b` meets in the map `uv`, ends excluded. `None`
     /// if it runs along the boundary or the map is folded there.
     pub fn straight(&self, uv: &[DVec2], a: u32, b: u32) -> Option<Vec<Met>> {
-        let coord = |v: u32| Coord { x: uv[v as usize].x, y: uv[v as usize].y };
-        let target = coord(b);
+        self.polyline(uv, a, &[], b)
+    }
+
+    /// The same for the line from `a` to `b` through the points `via` of the map.
+    pub fn polyline(&self, uv: &[DVec2], a: u32, via: &[DVec2], b: u32) -> Option<Vec<Met>> {
         let mut met = Vec::new();
-        let mut v = a;
+        let mut at = At::Vertex(a);
+        for &point in via {
+            at = self.march(uv, at, Goal::Point(point), &mut met)?;
+        }
+        self.march(uv, at, Goal::Vertex(b), &mut met)?;
+        Some(met)
+    }
+
+    /// Walks straight from `at` to `goal` in the map `uv`, and tells what is met on the way.
+    fn march(&self, uv: &[DVec2], at: At, goal: Goal, met: &mut Vec<Met>) -> Option<At> {
+        let coord = |p: DVec2| Coord { x: p.x, y: p.y };
+        let place = |v: u32| coord(uv[v as usize]);
+        let end = match goal {
+            Goal::Vertex(b) => uv[b as usize],
+            Goal::Point(p) => p,
+        };
+        let target = coord(end);
+        let edges = |f: u32| (3 * f..3 * f + 3).map(|h| (h, self.from(h), self.from(next(h))));
+        let arrived = |f: u32| match goal {
+            Goal::Vertex(b) => self.triangles[f as usize].contains(&b).then_some(At::Vertex(b)),
+            Goal::Point(p) => {
+                edges(f).all(|(_, p, q)| orient2d(place(p), place(q), target) >= 0.0).then_some(At::Face(f, p))
+            }
+        };
+        let mut at = at;
         let mut steps = 0;
-        'vertex: loop {
+        'start: loop {
             steps += 1;
             if steps > self.vertices.len() {
                 return None;
             }
-            let source = coord(v);
-            let mut exit = None;
-            for h in self.adjacency.fan(v) {
-                let (p, q) = (self.from(next(h)), self.from(previous(h)));
-                for (w, edge) in [(p, h), (q, previous(h))] {
-                    if w == b {
-                        let open = self.adjacency.opposite[edge as usize] == NONE;
-                        return if open { None } else { Some(met) };
+            let (source, mut edge) = match at {
+                At::Vertex(v) => {
+                    let mut exit = None;
+                    for h in self.adjacency.fan(v) {
+                        let (p, q) = (self.from(next(h)), self.from(previous(h)));
+                        if let Goal::Vertex(b) = goal {
+                            for (w, edge) in [(p, h), (q, previous(h))] {
+                                if w == b {
+                                    let open = self.adjacency.opposite[edge as usize] == NONE;
+                                    return if open { None } else { Some(At::Vertex(b)) };
+                                }
+                            }
+                        } else if let Some(at) = arrived(h / 3) {
+                            return Some(at);
+                        }
+                        let (right, left) =
+                            (orient2d(place(v), place(p), target), orient2d(place(v), place(q), target));
+                        let ahead = |w: u32| (uv[w as usize] - uv[v as usize]).dot(end - uv[v as usize]) > 0.0;
+                        if right == 0.0 && ahead(p) {
+                            exit = Some(Err(p));
+                        } else if left == 0.0 && ahead(q) {
+                            exit = Some(Err(q));
+                        } else if right > 0.0 && left < 0.0 {
+                            exit = Some(Ok(next(h)));
+                        }
+                    }
+                    match exit? {
+                        Err(w) => {
+                            met.push(Met::Vertex(w));
+                            at = At::Vertex(w);
+                            continue 'start;
+                        }
+                        Ok(edge) => (place(v), edge),
                     }
                 }
-                let (right, left) = (orient2d(source, coord(p), target), orient2d(source, coord(q), target));
-                let ahead = |w: u32| (uv[w as usize] - uv[v as usize]).dot(uv[b as usize] - uv[v as usize]) > 0.0;
-                if right == 0.0 && ahead(p) {
-                    exit = Some(Err(p));
-                } else if left == 0.0 && ahead(q) {
-                    exit = Some(Err(q));
-                } else if right > 0.0 && left < 0.0 {
-                    exit = Some(Ok(next(h)));
+                At::Face(f, from) => {
+                    if let Some(at) = arrived(f) {
+                        return Some(at);
+                    }
+                    let source = coord(from);
+                    let (h, p, q) = edges(f).find(|&(_, p, q)| {
+                        orient2d(place(p), place(q), target) < 0.0
+                            && orient2d(source, target, place(p)) <= 0.0
+                            && orient2d(source, target, place(q)) >= 0.0
+                    })?;
+                    if let Some(w) = [p, q].into_iter().find(|&w| orient2d(source, target, place(w)) == 0.0) {
+                        met.push(Met::Vertex(w));
+                        at = At::Vertex(w);
+                        continue 'start;
+                    }
+                    (source, h)
                 }
-            }
-            let mut edge = match exit? {
-                Err(w) => {
-                    met.push(Met::Vertex(w));
-                    v = w;
-                    continue 'vertex;
-                }
-                Ok(edge) => edge,
             };
             loop {
                 steps += 1;
@@ -222,7 +274,7 @@ impl Disk {
                     return None;
                 }
                 let (p, q) = (self.from(edge), self.from(next(edge)));
-                let (right, left) = (-orient2d(source, target, coord(p)), orient2d(source, target, coord(q)));
+                let (right, left) = (-orient2d(source, target, place(p)), orient2d(source, target, place(q)));
                 if right <= 0.0 || left <= 0.0 {
                     return None;
                 }
@@ -231,15 +283,15 @@ impl Disk {
                 if other == NONE {
                     return None;
                 }
-                let r = self.from(previous(other));
-                if r == b {
-                    return Some(met);
+                if let Some(at) = arrived(other / 3) {
+                    return Some(at);
                 }
-                let side = orient2d(source, target, coord(r));
+                let r = self.from(previous(other));
+                let side = orient2d(source, target, place(r));
                 if side == 0.0 {
                     met.push(Met::Vertex(r));
-                    v = r;
-                    continue 'vertex;
+                    at = At::Vertex(r);
+                    continue 'start;
                 }
                 edge = if side > 0.0 { next(other) } else { previous(other) };
             }
@@ -247,11 +299,89 @@ impl Disk {
     }
 }
 
-/// What a straight line meets.
+/// Where a line in a map is.
+#[derive(Clone, Copy)]
+enum At {
+    Vertex(u32),
+    /// In a triangle, at a point of the map.
+    Face(u32, DVec2),
+}
+
+/// Where a line in a map goes.
+#[derive(Clone, Copy)]
+enum Goal {
+    Vertex(u32),
+    Point(DVec2),
+}
+
+/// What a line meets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Met {
     /// A vertex of the disk.
     Vertex(u32),
     /// The edge between two vertices, the fraction of the way from the first.
     Edge(u32, u32, f64),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriMesh;
+
+    /// A square of `n` x `n` cells in the plane, which is its own map.
+    fn square(n: u32) -> (Disk, Vec<DVec2>) {
+        let point = |k: u32| DVec3::new((k % (n + 1)) as f64, (k / (n + 1)) as f64, 0.0);
+        let cell = |k: u32| {
+            let a = k / n * (n + 1) + k % n;
+            [[a, a + 1, a + n + 2], [a, a + n + 2, a + n + 1]]
+        };
+        let mesh = TriMesh::new((0..(n + 1) * (n + 1)).map(point).collect(), (0..n * n).flat_map(cell).collect());
+        let adjacency = Adjacency::new(&mesh);
+        let faces: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
+        let open = |h: u32| adjacency.opposite[h as usize] == NONE;
+        let start = (0..adjacency.opposite.len() as u32).find(|&h| open(h)).expect("a rim");
+        let disk = Disk::new(&mesh.triangles, &adjacency, &faces, open, start).expect("a disk");
+        let uv = disk.vertices.iter().map(|&v| mesh.points[v as usize].truncate()).collect();
+        (disk, uv)
+    }
+
+    fn vertex(uv: &[DVec2], x: f64, y: f64) -> u32 {
+        uv.iter().position(|p| *p == DVec2::new(x, y)).expect("a vertex") as u32
+    }
+
+    #[test]
+    fn a_line_through_three_places_meets_the_mesh_on_its_segments_within_1e_12_and_in_order() {
+        let (disk, uv) = square(9);
+        let (a, b) = (vertex(&uv, 1.0, 1.0), vertex(&uv, 8.0, 7.0));
+        let via = [DVec2::new(3.3, 6.2), DVec2::new(3.4, 6.1), DVec2::new(6.1, 2.7)];
+        let stops = [uv[a as usize], via[0], via[1], via[2], uv[b as usize]];
+        let met = disk.polyline(&uv, a, &via, b).expect("a line");
+        let mut part = 0;
+        let mut last = 0.0;
+        for m in met {
+            let p = match m {
+                Met::Vertex(v) => uv[v as usize],
+                Met::Edge(p, q, t) => uv[p as usize].lerp(uv[q as usize], t),
+            };
+            let off = |k: usize| {
+                let (line, at) = (stops[k + 1] - stops[k], p - stops[k]);
+                (line.perp_dot(at).abs() / line.length(), at.dot(line) / line.length_squared())
+            };
+            while off(part).0 > 1e-12 || off(part).1 > 1.0 {
+                (part, last) = (part + 1, 0.0);
+                assert!(part < 4, "{p} lies on no segment");
+            }
+            assert!(off(part).1 >= last, "{p} lies before what was met before");
+            last = off(part).1;
+        }
+        assert_eq!(part, 3);
+    }
+
+    #[test]
+    fn a_line_through_vertices_of_the_mesh_meets_them() {
+        let (disk, uv) = square(6);
+        let (a, b) = (vertex(&uv, 1.0, 1.0), vertex(&uv, 4.0, 4.0));
+        let want: Vec<Met> = [2.0, 3.0].iter().map(|&x| Met::Vertex(vertex(&uv, x, x))).collect();
+        assert_eq!(disk.straight(&uv, a, b), Some(want));
+    }
 }

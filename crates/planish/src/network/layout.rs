@@ -5,10 +5,12 @@
 //! 3. all cells are made even and parted into quads ([`polygon`]);
 //! 4. nodes, arcs and connectivity are improved by changes inside the union of a few cells, each drawn in a one-to-one
 //!    map of that union ([`recut`]), so that nothing ever crosses or gets lost; this happens on a coarser mesh of the
-//!    same surface, and the arcs are carried back ([`coarse`]).
+//!    same surface, and the arcs are carried back ([`coarse`]);
+//! 5. near every node its arcs are spread to even angles ([`fan`]).
 
 mod coarse;
 mod complex;
+mod fan;
 mod fill;
 mod improve;
 mod lines;
@@ -167,6 +169,7 @@ pub(super) fn layout_around(
                 } else {
                     make_good(&mut bench, side, patches, params, observer)?;
                 }
+                fan::spread(&mut bench);
                 observer.progress(1.0);
                 return Ok(network(&work, &work_adjacency, &bench.complex));
             }

@@ -4,6 +4,7 @@
 //! 1. basis and evaluation - `basis`, `evaluate`      2. one grid - `fit`, eq. 4.4
 //! 3. a network without gaps and folds - `network_fit`, `resolution`, `fold`
 //! 4. smooth seams - `corner`, `seam_curve`, `stitch`, §8.1      5. how good it is - `quality`, eq. 6.1
+//! 6. exact mirror images where there is a plane of symmetry - `mirrored`
 
 pub mod basis;
 mod corner;
@@ -11,6 +12,7 @@ mod error;
 mod evaluate;
 mod fit;
 mod fold;
+mod mirrored;
 mod network_fit;
 mod quality;
 mod resolution;
@@ -23,6 +25,7 @@ pub use evaluate::Jet;
 pub(crate) use evaluate::RowSampler;
 pub use fit::{FEWEST_CONTROL, fit};
 pub use fold::folds;
+pub use mirrored::mirror_surfaces;
 pub use network_fit::{FitParams, fit_network};
 pub use quality::{Deviation, SeamAngle, SeamQuality, deviation, deviation_of, measure_seams, seam_angles};
 pub use resolution::Resolution;

@@ -119,7 +119,9 @@ pub(super) fn coarsen(
     let points = vertex.iter().map(|&v| mesh.points[v as usize]).collect();
     let triangles = face.iter().map(|&f| melt.triangles[f as usize].map(|v| number[v as usize])).collect();
     let coarse = TriMesh::new(points, triangles);
-    let complex = renumbered(complex, (&coarse, &Adjacency::new(&coarse)), &strands, |v| number[v as usize])?;
+    let mut complex = complex.clone();
+    complex.nodes.iter_mut().for_each(|n| n.vertex = number[n.vertex as usize]);
+    strands.put((&coarse, &Adjacency::new(&coarse)), |v| number[v as usize], &mut complex)?;
     Some(Coarse { mesh: coarse, complex, vertex, face, stars })
 }
 
@@ -132,24 +134,11 @@ impl Coarse {
         for star in self.stars.iter().rev() {
             strands.put_in(star, &mesh.points);
         }
-        let mut named = complex.clone();
-        named.nodes.iter_mut().for_each(|n| n.vertex = self.vertex[n.vertex as usize]);
-        strands.put((mesh, adjacency), |v| v, &mut named)?;
-        Some(named)
+        let mut complex = complex.clone();
+        complex.nodes.iter_mut().for_each(|n| n.vertex = self.vertex[n.vertex as usize]);
+        strands.put((mesh, adjacency), |v| v, &mut complex)?;
+        Some(complex)
     }
-}
-
-/// `complex` on another mesh.
-fn renumbered(
-    complex: &Complex,
-    ground: (&TriMesh, &Adjacency),
-    strands: &Strands,
-    number: impl Fn(u32) -> u32,
-) -> Option<Complex> {
-    let mut complex = complex.clone();
-    complex.nodes.iter_mut().for_each(|n| n.vertex = number(n.vertex));
-    strands.put(ground, number, &mut complex)?;
-    Some(complex)
 }
 
 /// Vertices that must not go: nodes, and all of lines and boundaries.

@@ -2,7 +2,8 @@
 //!
 //! 1. sites by farthest-point sampling, at least one per region between feature lines;
 //! 2. Lloyd: grow all cells from their sites, move every site to the middle of its cell;
-//! 3. wherever a cell is no disk, or meets itself across a feature line, add sites there and grow again.
+//! 3. wherever a cell is no disk, or meets itself across a feature line, add sites there and grow again; also where
+//!    its front first closes around the hole or handle.
 
 use super::LayoutError;
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
@@ -312,8 +313,8 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// Parts the faces into about `count` cells (more where one would reach further than `reach`), each a disk that does not meet itself: a label per face and the
-/// number of labels.
+/// Parts the faces into about `count` cells (more where one would reach further than `reach`), each a disk that does not
+/// meet itself: a label per face and the number of labels.
 pub(super) fn partition(
     ground: &Ground,
     count: usize,

@@ -2,6 +2,7 @@
 //! straight lines of the map. New arcs can therefore neither cross nor leave the union.
 
 use super::complex::{Arc, Complex, Node};
+use super::fan::{self, Fan};
 use super::shape::{Shape, Trace};
 use super::slide::Slide;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
@@ -39,10 +40,10 @@ pub(super) struct Change {
 
 /// The complex cut into the working mesh.
 pub(super) struct Embedding {
-    cut: Cut,
-    adjacency: Adjacency,
+    pub cut: Cut,
+    pub adjacency: Adjacency,
     /// For each half-edge of the cut mesh its half-arc.
-    half_arc: Vec<u32>,
+    pub half_arc: Vec<u32>,
     /// First half-edge of each half-arc.
     first: Vec<u32>,
     /// Faces of each cell, sorted.
@@ -210,7 +211,18 @@ impl Embedding {
         a: u32,
         b: u32,
     ) -> Option<Vec<Place>> {
-        let met = disk.straight(uv, a, b)?;
+        self.polyline((mesh, adjacency), (disk, uv), [a, b], &[])
+    }
+
+    /// The same through points of the map.
+    pub fn polyline(
+        &self,
+        (mesh, adjacency): (&TriMesh, &Adjacency),
+        (disk, uv): (&Disk, &[DVec2]),
+        [a, b]: [u32; 2],
+        via: &[DVec2],
+    ) -> Option<Vec<Place>> {
+        let met = disk.polyline(uv, a, via, b)?;
         let places = met.iter().filter_map(|m| self.on_ground(mesh, adjacency, disk, m));
         let name = |v: u32| self.cut.origin[disk.vertices[v as usize] as usize];
         Some(tighten(mesh, adjacency, [name(a)].into_iter().chain(places).chain([name(b)]).collect()))
@@ -289,6 +301,15 @@ impl Embedding {
             })
         };
         (0..complex.cells.len() as u32).into_par_iter().map(shape).collect()
+    }
+
+    /// The vertices of the cut mesh along a half-arc.
+    pub fn chain(&self, half: u32) -> Vec<u32> {
+        let mut chain = self.cut.chains[half as usize / 2].clone();
+        if half % 2 == 1 {
+            chain.reverse();
+        }
+        chain
     }
 
     /// The vertices inside a disk that are vertices of the working mesh: places for a node.
@@ -395,7 +416,7 @@ pub(super) fn outline_with_cells(complex: &Complex, change: &Change) -> Option<V
 }
 
 /// Takes out of a chain what turns back in the edge it came from.
-fn tighten(mesh: &TriMesh, adjacency: &Adjacency, chain: Vec<Place>) -> Vec<Place> {
+pub(super) fn tighten(mesh: &TriMesh, adjacency: &Adjacency, chain: Vec<Place>) -> Vec<Place> {
     let ends =
         |h: u32| [mesh.triangles[h as usize / 3][h as usize % 3], mesh.triangles[h as usize / 3][next(h) as usize % 3]];
     let named = |p: Place| match p {
@@ -500,6 +521,11 @@ impl<'a> Bench<'a> {
             }
         }
         0
+    }
+
+    /// Draws fans of nodes that share no arc. Returns how many were drawn.
+    pub fn apply_fans(&mut self, fans: Vec<Fan>) -> usize {
+        self.commit(fans, fan::put)
     }
 
     /// Makes slides of nodes whose cells are disjoint. Returns how many were made.
@@ -663,19 +689,26 @@ fn spread(complex: &mut Complex) {
     }
     on_edge.sort_by(|x, y| x.0.cmp(&y.0).then(x.1.total_cmp(&y.1)).then((x.2, x.3).cmp(&(y.2, y.3))));
     for run in on_edge.chunk_by_mut(|x, y| x.0 == y.0) {
-        let gap = APART.min(0.5 / (run.len() + 1) as f64);
-        let mut least = gap;
-        for x in run.iter_mut() {
-            x.1 = x.1.max(least);
-            least = x.1 + gap;
-        }
-        let mut most = 1.0 - gap;
-        for x in run.iter_mut().rev() {
-            x.1 = x.1.min(most);
-            most = x.1 - gap;
-        }
-        for &(h, t, a, i) in run.iter() {
+        let mut parts: Vec<f64> = run.iter().map(|x| x.1).collect();
+        keep_apart(&mut parts, APART);
+        for (&(h, _, a, i), t) in run.iter().zip(parts) {
             complex.arcs[a as usize].as_mut().expect("a live arc").chain[i as usize] = Place::Edge(h, t);
         }
+    }
+}
+
+/// Moves places along an edge, given in rising order, at least `gap` away from each other and from its ends (less where
+/// many share it).
+pub(super) fn keep_apart(parts: &mut [f64], gap: f64) {
+    let gap = gap.min(0.5 / (parts.len() + 1) as f64);
+    let mut least = gap;
+    for part in parts.iter_mut() {
+        *part = part.max(least);
+        least = *part + gap;
+    }
+    let mut most = 1.0 - gap;
+    for part in parts.iter_mut().rev() {
+        *part = part.min(most);
+        most = *part - gap;
     }
 }

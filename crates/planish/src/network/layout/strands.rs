@@ -5,6 +5,7 @@
 //! vertex decides which edges it meets and in which order, so nothing ever crosses, whatever the rounding.
 
 use super::complex::Complex;
+use super::recut::keep_apart;
 use crate::geom::predicates::orient2d;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::imprint::{Place, Shared, canonical, half_edge, shared_face};
@@ -386,17 +387,7 @@ impl Strands {
                 })
                 .collect();
             part.sort_by(f64::total_cmp);
-            let gap = APART.min(0.5 / (part.len() + 1) as f64);
-            let mut least = gap;
-            for x in &mut part {
-                *x = x.max(least);
-                least = *x + gap;
-            }
-            let mut most = 1.0 - gap;
-            for x in part.iter_mut().rev() {
-                *x = x.min(most);
-                most = *x - gap;
-            }
+            keep_apart(&mut part, APART);
             for (&(_, r, i), part) in here.iter().zip(part) {
                 knots[r][i] = self.knots.len() as u32;
                 let at = Spot::Edge(star.ring[m], apex.0, part);

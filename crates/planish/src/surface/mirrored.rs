@@ -1,0 +1,215 @@
+//! Fits of a symmetric network: surfaces behind a plane of symmetry as exact mirror images of those before it.
+//!
+//! 1. corners and patches are matched with their images; nothing is done unless every patch has one
+//! 2. before the plane, boundaries in it are put into it exactly, and where that is asked for the control points next to
+//!    them level with them: what their steps from the boundary have along its normal in the plane is taken away, and the
+//!    surface has one tangent plane there
+//! 3. every patch behind the plane gets the mirror image of its mate. What the shape itself lacks of symmetry goes to
+//!    the reliefs.
+
+use super::Surface;
+use super::basis::{is_uniform, uniform_knots};
+use crate::curve::symmetry::Plane;
+use crate::mesh::TriMesh;
+use crate::network::Network;
+use glam::DVec3;
+
+/// Corners and middles of sides nearer to the mirror image of others than this share of the diagonal are their images:
+/// far above what a scan lacks of symmetry, far below the size of a patch.
+const SAME: f64 = 5e-3;
+/// A control point next to the plane keeps at least this share of its distance from the boundary: where a patch runs
+/// into the plane at a flat angle its surface would turn over there.
+const LEAST_AWAY: f64 = 0.2;
+
+/// Puts mirror images of the surfaces before `plane` (on the side of its normal) in the place of those behind it. False,
+/// and nothing changed, if the network is not symmetric.
+/// * `leveled` - make them level across the plane, too: before seams are smoothed, for it disturbs smooth ones
+pub fn mirror_surfaces(
+    mesh: &TriMesh,
+    network: &Network,
+    plane: &Plane,
+    leveled: bool,
+    surfaces: &mut [Surface],
+) -> bool {
+    let Some(matched) = Matched::new(mesh, network, plane) else { return false };
+    if surfaces.len() != network.patches.len() {
+        return false;
+    }
+    for p in (0..surfaces.len()).filter(|&p| matched.is_before(p)) {
+        flatten(&mut surfaces[p], &matched, network, plane, p);
+        if leveled {
+            level(&mut surfaces[p], &matched, network, plane, p);
+        }
+    }
+    for q in (0..surfaces.len()).filter(|&q| !matched.is_before(q)) {
+        surfaces[q] = image(&surfaces[matched.mates[q].0], &matched, network, plane, q);
+    }
+    true
+}
+
+/// A network with the images of its parts.
+struct Matched {
+    /// True for corners in the plane.
+    in_plane: Vec<bool>,
+    /// True for curves in the plane.
+    curve_in_plane: Vec<bool>,
+    /// For each patch its mate, and the corner of the mate that is the image of its first.
+    mates: Vec<(usize, usize)>,
+    /// Heights of the middles of the patches.
+    heights: Vec<f64>,
+}
+
+impl Matched {
+    fn new(mesh: &TriMesh, network: &Network, plane: &Plane) -> Option<Matched> {
+        let same = SAME * mesh.bounds().diagonal();
+        let corners: Vec<DVec3> = network.corners.iter().map(|c| c.place.position(mesh)).collect();
+        let images: Vec<usize> =
+            corners.iter().map(|p| nearest(&corners, plane.mirror(*p), same)).collect::<Option<_>>()?;
+        if (0..images.len()).any(|k| images[images[k]] != k) {
+            return None;
+        }
+        let middles: Vec<DVec3> = network.curves.iter().map(|c| middle(mesh, c)).collect();
+        let in_plane: Vec<bool> = images.iter().enumerate().map(|(k, &image)| k == image).collect();
+        let on_plane = |c: usize| {
+            network.curves[c].corners.iter().all(|&k| in_plane[k as usize]) && plane.height(middles[c]).abs() < same
+        };
+        let curve_in_plane: Vec<bool> = (0..network.curves.len()).map(on_plane).collect();
+        let side = |p: usize, k: usize| network.patches[p].sides[k].curve as usize;
+        let count = network.patches.len();
+        let mate_of = |q: usize| {
+            (0..count).find_map(|p| {
+                let turned = |s: usize| {
+                    (0..4).all(|k| {
+                        let other = (s + 4 - k) % 4;
+                        let (a, b) = (network.corner(q, k) as usize, network.corner(p, other) as usize);
+                        // Side k runs from corner k; its image runs towards corner `other`.
+                        let (c, d) = (side(q, k), side(p, (other + 3) % 4));
+                        images[a] == b && plane.mirror(middles[c]).distance(middles[d]) < 2.0 * same
+                    })
+                };
+                (0..4).find(|&s| turned(s)).map(|s| (p, s))
+            })
+        };
+        let mates: Vec<(usize, usize)> = (0..count).map(mate_of).collect::<Option<_>>()?;
+        // A patch that is its own image crosses the plane.
+        if (0..count).any(|p| mates[p].0 == p || mates[mates[p].0].0 != p) {
+            return None;
+        }
+        let heights: Vec<f64> =
+            (0..count).map(|p| (0..4).map(|k| plane.height(middles[side(p, k)])).sum::<f64>()).collect();
+        Some(Matched { in_plane, curve_in_plane, mates, heights })
+    }
+
+    fn is_before(&self, p: usize) -> bool {
+        let mate = self.mates[p].0;
+        self.heights[p] > self.heights[mate] || (self.heights[p] == self.heights[mate] && p < mate)
+    }
+
+    /// True if side `k` of patch `p` lies in the plane.
+    fn side_in_plane(&self, network: &Network, p: usize, k: usize) -> bool {
+        self.curve_in_plane[network.patches[p].sides[k].curve as usize]
+    }
+}
+
+fn nearest(places: &[DVec3], p: DVec3, within: f64) -> Option<usize> {
+    let all = places.iter().enumerate().map(|(k, q)| (q.distance(p), k));
+    all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).filter(|x| x.0 < within).map(|x| x.1)
+}
+
+/// The place halfway along a curve.
+fn middle(mesh: &TriMesh, curve: &crate::network::Curve) -> DVec3 {
+    let at: Vec<DVec3> = curve.points.iter().map(|p| p.position(mesh)).collect();
+    let mut left = at.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>() / 2.0;
+    for w in at.windows(2) {
+        let d = w[0].distance(w[1]);
+        if left <= d && d > 0.0 {
+            return w[0].lerp(w[1], left / d);
+        }
+        left -= d;
+    }
+    at.last().copied().unwrap_or_default()
+}
+
+/// Index of the `n`-th control point along side `k`, `depth` rows in.
+fn control_at(surface: &Surface, k: usize, n: usize, depth: usize) -> usize {
+    let (cols, rows) = (surface.cols, surface.rows);
+    match k {
+        0 => depth * cols + n,
+        1 => n * cols + cols - 1 - depth,
+        2 => (rows - 1 - depth) * cols + cols - 1 - n,
+        _ => (rows - 1 - n) * cols + depth,
+    }
+}
+
+fn count_along(surface: &Surface, k: usize) -> usize {
+    if k.is_multiple_of(2) { surface.cols } else { surface.rows }
+}
+
+/// Control points of surface `p` that lie in the plane.
+fn fixed(surface: &Surface, matched: &Matched, network: &Network, p: usize) -> Vec<usize> {
+    let mut out = Vec::new();
+    for k in 0..4 {
+        let count = count_along(surface, k);
+        if matched.side_in_plane(network, p, k) {
+            out.extend((0..count).map(|n| control_at(surface, k, n, 0)));
+        } else if matched.in_plane[network.corner(p, k) as usize] {
+            out.push(control_at(surface, k, 0, 0));
+        }
+    }
+    out
+}
+
+/// Puts boundaries into the plane.
+fn flatten(surface: &mut Surface, matched: &Matched, network: &Network, plane: &Plane, p: usize) {
+    for k in fixed(surface, matched, network, p) {
+        let height = plane.height(surface.control[k]);
+        surface.control[k] -= plane.normal * height;
+    }
+}
+
+/// Puts the control points next to boundaries in the plane level with them, but those of the curves that end there: they
+/// belong to two patches.
+fn level(surface: &mut Surface, matched: &Matched, network: &Network, plane: &Plane, p: usize) {
+    for k in (0..4).filter(|&k| matched.side_in_plane(network, p, k)) {
+        for n in 1..count_along(surface, k) - 1 {
+            let (rim, inner) = (control_at(surface, k, n, 0), control_at(surface, k, n, 1));
+            let beside = |n: usize| surface.control[control_at(surface, k, n, 0)];
+            let along = (beside(n + 1) - beside(n - 1)).normalize_or_zero();
+            let step = surface.control[inner] - surface.control[rim];
+            let away = plane.normal.dot(step).max(LEAST_AWAY * step.length());
+            surface.control[inner] = surface.control[rim] + plane.normal * away + along * step.dot(along);
+        }
+    }
+}
+
+/// The mirror image of the surface of the mate of patch `q`, over the parameters of `q`.
+fn image(mate: &Surface, matched: &Matched, network: &Network, plane: &Plane, q: usize) -> Surface {
+    let (p, s) = matched.mates[q];
+    let kept = fixed(mate, matched, network, p);
+    let mut control: Vec<DVec3> = mate.control.iter().map(|c| plane.mirror(*c)).collect();
+    for k in kept {
+        control[k] = mate.control[k];
+    }
+    // Corner k of q is the image of corner s - k: u and v swap where s is even.
+    let swap = s.is_multiple_of(2);
+    let (cols, rows) = if swap { (mate.rows, mate.cols) } else { (mate.cols, mate.rows) };
+    let (turn_u, turn_v) = [(false, false), (true, false), (true, true), (false, true)][s];
+    let knots = |of: &[f64], turned: bool| -> Vec<f64> {
+        match turned {
+            true if is_uniform(of) => uniform_knots(of.len() - 4),
+            true => of.iter().rev().map(|x| 1.0 - x).collect(),
+            false => of.to_vec(),
+        }
+    };
+    // The first parameter of the mate is `u` of q, or `v` where they swap; turned as the corners tell.
+    let at = |i: usize, j: usize| {
+        let (a, b) = if swap { (j, i) } else { (i, j) };
+        let a = if turn_u { mate.cols - 1 - a } else { a };
+        let b = if turn_v { mate.rows - 1 - b } else { b };
+        control[b * mate.cols + a]
+    };
+    let (knots_a, knots_b) = (knots(&mate.knots_u, turn_u), knots(&mate.knots_v, turn_v));
+    let (knots_u, knots_v) = if swap { (knots_b, knots_a) } else { (knots_a, knots_b) };
+    let control = (0..rows).flat_map(|j| (0..cols).map(move |i| (i, j))).map(|(i, j)| at(i, j)).collect();
+    Surface { rows, cols, control, knots_u, knots_v }
+}
