@@ -2,11 +2,12 @@
 //!
 //! 1. stations one after the other where they see most of what none before has seen, as an operator would
 //! 2. each sees the first surface along the rays of a square picture, so the density differs from place to place and what
-//!    nobody sees stays empty; hits at grazing angles get lost
+//!    nobody sees stays empty; hits at grazing angles get lost, and where many stations see the same their points are
+//!    thinned, as programs do that merge scans
 //! 3. noise runs along the rays, some ranges are wrong altogether, and every station is a little misplaced
 
 use super::{Cloud, CloudError};
-use crate::geom::{Bvh, random};
+use crate::geom::{Bvh, KdTree, random};
 use crate::mesh::TriMesh;
 use crate::observe::Observer;
 use glam::{DQuat, DVec3};
@@ -69,6 +70,13 @@ const TRIAL: usize = 64;
 const MOST: usize = 16_384;
 /// Hits flatter than the first angle begin to get lost, beyond the second all are, degrees from the normal.
 const GRAZE_DEG: [f64; 2] = [70.0, 85.0];
+/// Spots looked at for one whose normal is like that of a hit, and the cosine between those.
+const AROUND: usize = 12;
+const ALIKE: f64 = 0.8;
+/// Places are thinned to this many times the density of those that are seen least, this part of the surface: a bore keeps
+/// far fewer points than the face around it even so.
+const EVEN: f64 = 2.0;
+const LEAST_SEEN: f64 = 0.05;
 /// Random numbers per pixel.
 const DRAWS: u64 = 8;
 
@@ -87,12 +95,11 @@ pub fn virtual_scan(
     let tree = Bvh::new(truth);
     let bounds = truth.bounds();
     let (center, size) = (bounds.center(), bounds.diagonal());
-    let stations: Vec<Station> = chosen(truth, &tree, params)
-        .into_iter()
-        .enumerate()
-        .map(|(k, out)| Station::new(k, out, center, size, params))
-        .collect();
-    let seen: f64 = stations.iter().map(|s| s.look(truth, &tree, TRIAL).iter().map(|h| h.chance).sum::<f64>()).sum();
+    let (places, thinning) = chosen(truth, &tree, params);
+    let stations: Vec<Station> =
+        places.into_iter().enumerate().map(|(k, out)| Station::new(k, out, center, size, params)).collect();
+    let seen: f64 =
+        stations.iter().map(|s| s.look(truth, &tree, &thinning, TRIAL).iter().map(|h| h.chance).sum::<f64>()).sum();
     if seen == 0.0 {
         return Err(nothing);
     }
@@ -105,7 +112,7 @@ pub fn virtual_scan(
         }
         observer.progress(k as f64 / stations.len() as f64);
         scan.cloud.scanners.push(station.placed(station.eye));
-        for hit in station.look(truth, &tree, pixels) {
+        for hit in station.look(truth, &tree, &thinning, pixels) {
             let draw = |n: u64| random::unit(station.seed, DRAWS * hit.pixel + n);
             if draw(0) >= hit.chance {
                 continue;
@@ -125,8 +132,8 @@ pub fn virtual_scan(
     Ok(scan)
 }
 
-/// Directions from the middle to the stations.
-fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> Vec<DVec3> {
+/// Directions from the middle to the stations, and what is kept where many of them see the same.
+fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> (Vec<DVec3>, Thinning) {
     let bounds = truth.bounds();
     let (center, size) = (bounds.center(), bounds.diagonal());
     let start = TAU * random::unit(params.seed, u64::MAX);
@@ -169,7 +176,8 @@ fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> Vec<DVec3> {
         })
         .collect();
     let mut seen = vec![0f32; SPOTS];
-    (0..params.stations)
+    let mut density = vec![0.0; SPOTS];
+    let places = (0..params.stations)
         .map(|_| {
             let gain = |k: usize| chances[k].iter().zip(&seen).map(|(c, s)| (c - s).max(0.0) as f64).sum::<f64>();
             // Where nothing new is to be seen the stations fall back to an even spread.
@@ -180,9 +188,40 @@ fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> Vec<DVec3> {
                 .map_or(0, |b| b.1);
             // Grazing views add up.
             seen.iter_mut().zip(&chances[best]).for_each(|(s, c)| *s = (*s + MEETINGS * c).min(1.0).max(*s));
+            for ((d, &chance), &(p, n)) in density.iter_mut().zip(&chances[best]).zip(&spots) {
+                let ray = (p - center - places[best] * AWAY * size).normalize();
+                *d += chance as f64 * n.dot(ray).abs();
+            }
             places[best]
         })
-        .collect()
+        .collect();
+    (places, Thinning::new(spots, density))
+}
+
+/// How much of the hits around each spot is kept.
+struct Thinning {
+    tree: KdTree,
+    normals: Vec<DVec3>,
+    keep: Vec<f64>,
+}
+
+impl Thinning {
+    /// * `density` - of hits at every spot, to any scale
+    fn new(spots: Vec<(DVec3, DVec3)>, density: Vec<f64>) -> Thinning {
+        let mut sorted: Vec<f64> = density.iter().copied().filter(|&d| d > 0.0).collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let even = sorted.get((LEAST_SEEN * sorted.len() as f64) as usize).map_or(1.0, |d| EVEN * d);
+        let keep = density.into_iter().map(|d| if d > even { even / d } else { 1.0 }).collect();
+        let (points, normals): (Vec<DVec3>, Vec<DVec3>) = spots.into_iter().unzip();
+        Thinning { tree: KdTree::new(&points), normals, keep }
+    }
+
+    /// The part of the hits that is kept at a place with this normal: that of the nearest spot on the same side.
+    fn kept(&self, p: DVec3, normal: DVec3, near: &mut Vec<(f64, u32)>) -> f64 {
+        self.tree.nearest(p, AROUND, near);
+        let alike = near.iter().find(|n| self.normals[n.1 as usize].dot(normal) > ALIKE);
+        alike.or(near.first()).map_or(1.0, |n| self.keep[n.1 as usize])
+    }
 }
 
 /// Chance that a hit at this cosine between ray and normal is not lost.
@@ -246,13 +285,16 @@ impl Station {
         self.turn * (p - self.center) + self.center + self.shift
     }
 
-    fn look(&self, truth: &TriMesh, tree: &Bvh, pixels: usize) -> Vec<Hit> {
+    fn look(&self, truth: &TriMesh, tree: &Bvh, thinning: &Thinning, pixels: usize) -> Vec<Hit> {
         let across = |k: usize| (2.0 * (k as f64 + 0.5) / pixels as f64 - 1.0) * self.slope;
         let row = |j: usize| {
+            let mut near = Vec::new();
             (0..pixels).filter_map(move |i| {
                 let ray = (self.forward + self.right * across(i) + self.up * across(j)).normalize();
                 let hit = tree.first_hit(self.eye, ray, f64::INFINITY)?;
-                let chance = kept(truth.normal(hit.face as usize).dot(ray).abs());
+                let normal = truth.normal(hit.face as usize);
+                let thin = thinning.kept(self.eye + ray * hit.distance, normal, &mut near);
+                let chance = kept(normal.dot(ray).abs()) * thin;
                 Some(Hit { pixel: (j * pixels + i) as u64, ray, range: hit.distance, chance })
             })
         };

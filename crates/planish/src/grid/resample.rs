@@ -96,19 +96,15 @@ fn refined<E: From<GridError>>(
     let [_, most] = bounds(params);
     let budget = ((GROWTH * total(&sizes) as f64) as usize).min(params.max_points);
     let mut suspects = all;
-    let mut folds_before = vec![usize::MAX; patches.len()];
     for round in 0..ROUNDS {
         if observer.cancelled() {
             return Err(GridError::Cancelled.into());
         }
-        let measured: Vec<(f64, usize)> =
-            suspects.par_iter().map(|&p| (miss(&grids[p], &patches[p]).0, folds(&grids[p], &patches[p]))).collect();
-        let need = |(&p, &(miss, folds)): (&usize, &(f64, usize))| {
-            // Where more points have not helped against folds, still more would not.
-            let helps = folds > 0 && folds < std::mem::replace(&mut folds_before[p], folds) / 2;
-            miss.max(if helps { FOLDED * allowed } else { 0.0 })
+        let need = |&p: &usize| {
+            let folded = folds(&grids[p], &patches[p]) > 0;
+            miss(&grids[p], &patches[p]).0.max(if folded { FOLDED * allowed } else { 0.0 })
         };
-        let misses: Vec<f64> = suspects.iter().zip(&measured).map(need).collect();
+        let misses: Vec<f64> = suspects.par_iter().map(need).collect();
         let wish = |limit: f64| -> Result<Vec<(usize, usize)>, E> {
             let mut sizes = finer(network, &chords, &grids, &suspects, &misses, limit, most);
             give(&mut sizes)?;
