@@ -33,7 +33,7 @@ def data(name):
 def demo(tmp_path_factory):
     """Folder of a small demonstration run, in centimetres."""
     folder = tmp_path_factory.mktemp("demo")
-    planish("demo", "-o", folder, "--points", 12000, "--units", "cm")
+    planish("demo", "-o", folder, "--points", 20000, "--units", "cm")
     return folder
 
 

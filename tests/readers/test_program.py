@@ -67,7 +67,7 @@ def test_the_page_is_well_formed_and_asks_for_nothing_from_outside(demo):
 
     Parser().feed(page)
     assert not open_tags and not outside
-    assert page.count("<img ") == 6
+    assert page.count("<img ") == 7
 
 
 @pytest.mark.parametrize(

@@ -40,15 +40,15 @@ def test_a_project_alone_is_exported_to_the_same_step_file(demo, tmp_path):
     sys.path.insert(0, str(ROOT / "crates" / "planish-io" / "tests"))
     from step_facts import facts
 
-    shutil.copy(demo / "model.planish", tmp_path / "demo.planish")
-    planish("export", "demo.planish", "-o", "demo.step", cwd=tmp_path)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["demo.planish", "demo.step"]
+    shutil.copy(demo / "model.planish", tmp_path / "scan.planish")
+    planish("export", "scan.planish", "-o", "scan.step", cwd=tmp_path)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["scan.planish", "scan.step"]
 
     def records(path: pathlib.Path):
         return [line for line in path.read_text().splitlines() if line.startswith("#")]
 
-    assert records(tmp_path / "demo.step") == records(demo / "surface.step")
-    found = facts(str(tmp_path / "demo.step"))
+    assert records(tmp_path / "scan.step") == records(demo / "surface.step")
+    found = facts(str(tmp_path / "scan.step"))
     assert (found["solids"], found["free_edges"], found["same_way_edges"], found["valid"]) == (1, 0, 0, True)
 
 

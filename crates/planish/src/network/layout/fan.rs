@@ -20,6 +20,9 @@ use std::f64::consts::{PI, TAU};
 /// Radii of the discs that are tried, in parts of the shortest arc at the node: discs of neighbours stay apart.
 const RADII: [f64; 3] = [0.3, 0.2, 0.12];
 
+/// Fewest faces of a disc: with less than three rings of them there is no smooth way to turn.
+const FEWEST: usize = 60;
+
 /// How far from where it leaves the disc an arc may leave its node, radians.
 const GREATEST_TURN: f64 = 0.9;
 
@@ -144,6 +147,9 @@ fn disc(embedding: &Embedding, star: &[u32], node: u32, radius: f64) -> Option<D
     let mut faces: Vec<u32> = distance.keys().flat_map(|&v| adjacency.fan(v).map(|h| h / 3)).filter(whole).collect();
     faces.sort_unstable();
     faces.dedup();
+    if faces.len() < FEWEST {
+        return None;
+    }
     let inside = |h: u32| {
         let o = adjacency.opposite[h as usize];
         o != NONE && faces.binary_search(&(o / 3)).is_ok()
