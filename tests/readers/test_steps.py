@@ -17,7 +17,9 @@ def fit(folder, *arguments, status=0):
 def same_surfaces(a, b):
     skip = {"mesh.feature_edges"}
     # A model does not know the scan that it comes from.
-    fitted = lambda one: sorted(k for k in set(one["quality"]) - skip if not k.startswith(("scan.", "truth.")))
+    def fitted(one):
+        return sorted(k for k in set(one["quality"]) - skip if not k.startswith(("scan.", "truth.")))
+
     keys = fitted(a)
     assert keys == fitted(b)
     for key in keys:

@@ -156,7 +156,7 @@ fn even(mesh: &TriMesh, count: u64, noise: f64, seed: u64) -> Vec<DVec3> {
     (0..count)
         .map(|i| {
             let r: [f64; 9] = std::array::from_fn(|k| random::unit(seed, 9 * i + k as u64));
-            let g = |u: f64, v: f64| (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos();
+            let g = random::normal;
             pick(mesh, &sums, [r[0], r[1], r[2]]).0 + noise * DVec3::new(g(r[3], r[4]), g(r[5], r[6]), g(r[7], r[8]))
         })
         .collect()

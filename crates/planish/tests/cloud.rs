@@ -11,8 +11,7 @@ use planish::pipeline::{ScanParams, mesh_scan};
 
 /// A normally distributed number.
 fn normal(seed: u64, n: u64) -> f64 {
-    let (u, v) = (random::unit(seed, 2 * n), random::unit(seed, 2 * n + 1));
-    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    random::normal(random::unit(seed, 2 * n), random::unit(seed, 2 * n + 1))
 }
 
 /// Points of a mesh, evenly by area, with noise in all directions.

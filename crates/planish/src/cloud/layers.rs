@@ -114,8 +114,7 @@ mod tests {
     use crate::geom::random;
 
     fn gauss(n: u64) -> f64 {
-        let (u, v) = (random::unit(4, 2 * n), random::unit(4, 2 * n + 1));
-        (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+        random::normal(random::unit(4, 2 * n), random::unit(4, 2 * n + 1))
     }
 
     /// Points in the unit disk on `of(u, v, k)`, noise .03.

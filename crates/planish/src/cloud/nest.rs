@@ -203,8 +203,7 @@ mod tests {
     use glam::DVec3;
 
     fn gauss(n: u64) -> f64 {
-        let (u, v) = (random::unit(9, 2 * n), random::unit(9, 2 * n + 1));
-        (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+        random::normal(random::unit(9, 2 * n), random::unit(9, 2 * n + 1))
     }
 
     /// Distances to planes in noise levels, of points on the boundary of a corner of a cube 40 levels wide.

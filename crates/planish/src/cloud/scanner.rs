@@ -121,7 +121,7 @@ pub fn virtual_scan(
             let range = match stray {
                 // Anywhere along the ray where the shape might be.
                 true => size * (AWAY - 0.5 + draw(2)),
-                false => hit.range + params.noise * size * normal(draw(3), draw(4)),
+                false => hit.range + params.noise * size * random::normal(draw(3), draw(4)),
             };
             scan.cloud.points.push(station.placed(station.eye + hit.ray * range));
             scan.cloud.seen_by.push(k as u32);
@@ -230,11 +230,6 @@ fn kept(facing: f64) -> f64 {
     ((facing - lose) / (keep - lose)).clamp(0.0, 1.0)
 }
 
-/// A normally distributed number from two uniform ones (Box and Muller 1958).
-fn normal(u: f64, v: f64) -> f64 {
-    (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos()
-}
-
 struct Station {
     eye: DVec3,
     right: DVec3,
@@ -265,7 +260,7 @@ impl Station {
         let side = out.any_orthonormal_vector();
         let roll = TAU * draw(0);
         let right = side * roll.cos() + forward.cross(side) * roll.sin();
-        let gauss = |n: u64| normal(draw(n), draw(n + 1));
+        let gauss = |n: u64| random::normal(draw(n), draw(n + 1));
         let axis = DVec3::new(gauss(1), gauss(3), gauss(5)).normalize_or(DVec3::Z);
         Station {
             eye: center + out * AWAY * size,

@@ -301,7 +301,7 @@ impl<'a> Corner<'a> {
 /// Twice the way from the middle of a box to its corners, a little more for rounding.
 const SLACK: f64 = 1.000_001;
 
-/// A box with the fastest answer for its points is smaller than this part of the stock, or few moves would go.
+/// A box gets a list of its own if its diagonal is smaller than this part of the stock's: larger ones meet most moves.
 const SMALL: f64 = 0.1;
 
 /// True if a surface of `field`, which is made of distances, can cross a box: they change by no more than the way.

@@ -15,6 +15,11 @@ pub fn unit(seed: u64, counter: u64) -> f64 {
     (bits(seed, counter) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }
 
+/// A normally distributed number of mean 0 and deviation 1 from two uniform ones (Box and Muller 1958).
+pub fn normal(u: f64, v: f64) -> f64 {
+    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+}
+
 /// Odd part of 2^64 divided by the golden ratio: consecutive multiples spread evenly.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 

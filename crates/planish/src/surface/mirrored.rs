@@ -9,6 +9,7 @@
 
 use super::Surface;
 use super::basis::{is_uniform, uniform_knots};
+use super::sides::{node, side_len};
 use crate::curve::symmetry::Plane;
 use crate::mesh::TriMesh;
 use crate::network::Network;
@@ -130,30 +131,15 @@ fn middle(mesh: &TriMesh, curve: &crate::network::Curve) -> DVec3 {
     at.last().copied().unwrap_or_default()
 }
 
-/// Index of the `n`-th control point along side `k`, `depth` rows in.
-fn control_at(surface: &Surface, k: usize, n: usize, depth: usize) -> usize {
-    let (cols, rows) = (surface.cols, surface.rows);
-    match k {
-        0 => depth * cols + n,
-        1 => n * cols + cols - 1 - depth,
-        2 => (rows - 1 - depth) * cols + cols - 1 - n,
-        _ => (rows - 1 - n) * cols + depth,
-    }
-}
-
-fn count_along(surface: &Surface, k: usize) -> usize {
-    if k.is_multiple_of(2) { surface.cols } else { surface.rows }
-}
-
 /// Control points of surface `p` that lie in the plane.
 fn fixed(surface: &Surface, matched: &Matched, network: &Network, p: usize) -> Vec<usize> {
     let mut out = Vec::new();
     for k in 0..4 {
-        let count = count_along(surface, k);
+        let count = side_len(surface.rows, surface.cols, k);
         if matched.side_in_plane(network, p, k) {
-            out.extend((0..count).map(|n| control_at(surface, k, n, 0)));
+            out.extend((0..count).map(|n| node(surface.rows, surface.cols, k, n, 0)));
         } else if matched.in_plane[network.corner(p, k) as usize] {
-            out.push(control_at(surface, k, 0, 0));
+            out.push(node(surface.rows, surface.cols, k, 0, 0));
         }
     }
     out
@@ -171,9 +157,9 @@ fn flatten(surface: &mut Surface, matched: &Matched, network: &Network, plane: &
 /// belong to two patches.
 fn level(surface: &mut Surface, matched: &Matched, network: &Network, plane: &Plane, p: usize) {
     for k in (0..4).filter(|&k| matched.side_in_plane(network, p, k)) {
-        for n in 1..count_along(surface, k) - 1 {
-            let (rim, inner) = (control_at(surface, k, n, 0), control_at(surface, k, n, 1));
-            let beside = |n: usize| surface.control[control_at(surface, k, n, 0)];
+        for n in 1..side_len(surface.rows, surface.cols, k) - 1 {
+            let (rim, inner) = (node(surface.rows, surface.cols, k, n, 0), node(surface.rows, surface.cols, k, n, 1));
+            let beside = |n: usize| surface.control[node(surface.rows, surface.cols, k, n, 0)];
             let along = (beside(n + 1) - beside(n - 1)).normalize_or_zero();
             let step = surface.control[inner] - surface.control[rim];
             let away = plane.normal.dot(step).max(LEAST_AWAY * step.length());
