@@ -429,6 +429,11 @@ impl AllStages {
         Ok(PipelineParams { fit, stitch, ..stored })
     }
 
+    /// The parameters of the fit: `suited` with the given options in place.
+    pub fn fit_over(&self, suited: FitParams, seed: Option<u64>) -> Result<FitParams, Failure> {
+        self.fit.params_over(suited, seed)
+    }
+
     /// True if no option of any stage is given.
     pub fn none_given(&self) -> bool {
         self.layout.first_given().is_none()

@@ -217,7 +217,8 @@ fn row(kind: &str, mesh: &TriMesh, level: f64) -> Option<BTreeMap<&'static str, 
     if kind == "handover" {
         let start = Instant::now();
         let tags = &made.meshed.extracted.tags;
-        match pipeline::fit_tagged(got, Some(tags), None, &PipelineParams::default(), &Silent) {
+        let params = PipelineParams { fit: pipeline::fit_params_for(&made.samples), ..PipelineParams::default() };
+        match pipeline::fit_tagged(got, Some(tags), None, &params, &Silent) {
             Ok(fitted) => {
                 // A tenth of a percent, at noise above that two tenths.
                 let within = if level > 0.15 { 2e-3 } else { 1e-3 } * diagonal;

@@ -31,7 +31,8 @@ pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
     let wrong = |name: &str, e: &dyn std::fmt::Display| Failure::usage(args.output.join(name), e);
     planish_io::write_mesh(staged.path(TRUTH), &truth, &options).map_err(|e| wrong(TRUTH, &e))?;
     planish_io::write_scan(staged.path(SCAN), &scan.cloud).map_err(|e| wrong(SCAN, &e))?;
-    let Scanned { mesh, tags, mut facts, records } = from_scan(session, Path::new(SCAN), &scan.cloud, None, &staged)?;
+    let Scanned { mesh, tags, mut facts, fit, records } =
+        from_scan(session, Path::new(SCAN), &scan.cloud, None, &staged)?;
     let strays = scan.stray.iter().filter(|&&s| s).count();
     facts.quality.insert("truth.outliers".into(), Figure::Count(strays as u64));
     facts.quality.insert("truth.noise_rel".into(), Figure::Number(scanner.noise));
@@ -41,7 +42,7 @@ pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
         input: &mesh,
         tags: Some(&tags),
         network: None,
-        params: PipelineParams::default(),
+        params: PipelineParams { fit, ..PipelineParams::default() },
         demanded: None,
         output: &args.output,
         up: Up::Z,

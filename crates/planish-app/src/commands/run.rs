@@ -12,19 +12,21 @@ use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{HistoryEntry, Model};
 use planish::network::Network;
 use planish::pipeline::{self, Fitted, PipelineParams, StageRecord};
+use planish::surface::FitParams;
 use planish_io::report::{self, Report, SeamRow, count, distance, number, percent};
 use planish_io::{StepInput, Up, WriteOptions};
 use std::path::Path;
 
 pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
     let staged = Staged::folder(&args.output)?;
-    let params = args.stages.params(session.common.seed)?;
+    let mut params = args.stages.params(session.common.seed)?;
     let mut before = Vec::new();
     let mut extra = None;
     let (input, tags) = if planish_io::is_scan(&args.input) {
         let (scan, read) = session.step("read", || files::scan(&args.input, &args.scan))?;
-        let Scanned { mesh, tags, facts, records } =
+        let Scanned { mesh, tags, facts, fit, records } =
             from_scan(session, &args.input, &scan, args.holes.choice(), &staged)?;
+        params.fit = args.stages.fit_over(fit, session.common.seed)?;
         before.push(read);
         before.extend(records);
         extra = Some(facts);
@@ -59,6 +61,8 @@ pub struct Scanned {
     pub tags: FeatureTags,
     /// What was found.
     pub facts: ScanFacts,
+    /// How surfaces are fitted to it.
+    pub fit: FitParams,
     /// The stages that ran.
     pub records: Vec<StageRecord>,
 }
@@ -117,8 +121,9 @@ pub fn from_scan(
     for (p, &off) in scan.points.iter().zip(&points.strays) {
         facts.points[usize::from(off)].push(*p);
     }
+    let fit = pipeline::fit_params_for(&made.samples);
     let (mesh, tags) = (made.meshed.extracted.mesh, made.meshed.extracted.tags);
-    Ok(Scanned { mesh, tags, facts, records: vec![record, project] })
+    Ok(Scanned { mesh, tags, facts, fit, records: vec![record, project] })
 }
 
 /// A mesh on its way to a model.

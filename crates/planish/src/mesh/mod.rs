@@ -7,6 +7,7 @@ mod demo;
 mod diagnose;
 mod face_point;
 mod features;
+mod handles;
 mod intersect;
 pub mod path;
 mod repair;

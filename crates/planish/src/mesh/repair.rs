@@ -4,7 +4,8 @@
 //! 3. pair edges; those of more than two triangles stay unpaired     4. orient pieces by flood fill; where that
 //!    contradicts itself (a one-sided piece) the edge is cut; turn closed pieces that are inside out
 //! 5. one vertex per fan, which cuts along all unpaired edges     6. triangles without height: collapse their
-//!    short edge or flip their long one, so that no hole is left     7. drop unused vertices
+//!    short edge or flip their long one, so that no hole is left     7. close tiny handles (`handles`)
+//! 8. drop unused vertices
 //!
 //! Gueziec, Taubin, Lazarus, Horn, *Cutting and Stitching* (2001) is the source of step 5.
 
@@ -39,6 +40,8 @@ pub struct Repairs {
     pub flipped_edges: usize,
     /// Triangles without height dropped at the boundary.
     pub trimmed_faces: usize,
+    /// Handles too small to be meant, cut and closed.
+    pub closed_handles: usize,
     /// Triangles without height that could not be removed without tearing the surface.
     pub degenerate_left: usize,
     /// Vertices dropped because no triangle used them.
@@ -76,6 +79,10 @@ pub fn repair(mesh: &TriMesh) -> Result<(TriMesh, Repairs), MeshError> {
     }
     make_manifold(mesh, &mut triangles, &mut source, &mut done);
     super::slivers::remove(mesh, &mut triangles, &source, &mut done);
+    done.closed_handles = super::handles::close(mesh, &mut triangles, &mut source);
+    if done.closed_handles > 0 {
+        super::slivers::remove(mesh, &mut triangles, &source, &mut done);
+    }
 
     let mut used = vec![false; mesh.points.len()];
     mesh.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);

@@ -6,8 +6,10 @@ use crate::cloud::{self, CleanParams, Cloud, CloudError, Samples};
 use crate::contour::{self, ContourParams, Meshed, MeshingError, Sampling};
 use crate::field::{SampleField, Spacing};
 use crate::geom::Bvh;
+use crate::mesh::sets::Sets;
 use crate::mesh::{FeatureTags, TriMesh};
 use crate::observe::Observer;
+use crate::surface::{FitParams, Resolution};
 use rayon::prelude::*;
 
 /// Why a scan gives no mesh.
@@ -92,6 +94,24 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
     Ok(ScanMeshed { samples, meshed, specks, closed, to_points })
 }
 
+/// A surface fitted to a scan follows its mesh to this share of the noise, within these shares of the diagonal.
+const FIT_NOISE: f64 = 0.5;
+const FIT_CLOSEST: f64 = 2e-4;
+/// Ten times the smoothing that suits a mesh: what bends over a cell or two is noise. On the fandisk with noise of 0.1 %
+/// 81 % of its sharp edges keep their angle within 3 degrees, and 75 % with that of a mesh.
+const FIT_SMOOTHING: f64 = 0.1;
+
+/// How surfaces are fitted to the mesh of a scan.
+pub fn fit_params_for(samples: &Samples) -> FitParams {
+    let usual = FitParams::default();
+    let noise = samples.noise / samples.diagonal;
+    let resolution = match usual.resolution {
+        Resolution::Tolerance(most) => Resolution::Tolerance((FIT_NOISE * noise).max(FIT_CLOSEST).min(most)),
+        other => other,
+    };
+    FitParams { resolution, smoothing: FIT_SMOOTHING, ..usual }
+}
+
 struct Share<'a> {
     observer: &'a dyn Observer,
     from: f64,
@@ -109,21 +129,12 @@ impl Observer for Share<'_> {
 
 /// Leaves out the components whose area is next to nothing; returns how many.
 fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags) -> usize {
-    let mut parent: Vec<u32> = (0..mesh.points.len() as u32).collect();
-    fn root(parent: &mut [u32], mut i: u32) -> u32 {
-        while parent[i as usize] != i {
-            parent[i as usize] = parent[parent[i as usize] as usize];
-            i = parent[i as usize];
-        }
-        i
-    }
+    let mut sets = Sets::new(mesh.points.len());
     for t in &mesh.triangles {
-        for k in 1..3 {
-            let (a, b) = (root(&mut parent, t[0]), root(&mut parent, t[k]));
-            parent[a.max(b) as usize] = a.min(b);
-        }
+        sets.join(t[0], t[1]);
+        sets.join(t[0], t[2]);
     }
-    let label: Vec<u32> = (0..mesh.points.len() as u32).map(|i| root(&mut parent, i)).collect();
+    let label: Vec<u32> = (0..mesh.points.len() as u32).map(|i| sets.root(i)).collect();
     let mut area = vec![0.0; mesh.points.len()];
     for (t, triangle) in mesh.triangles.iter().enumerate() {
         area[label[triangle[0] as usize] as usize] += mesh.area(t);
