@@ -173,7 +173,7 @@ fn is_twisted(points: &[DVec3], cols: usize, c: usize) -> bool {
 }
 
 /// Draws the corners of turned cells towards the mean of their neighbours, in the square.
-fn smooth_turned(uv: &mut [DVec2], cols: usize, rows: usize) {
+pub fn smooth_turned(uv: &mut [DVec2], cols: usize, rows: usize) {
     const SWEEPS: usize = 100;
     for _ in 0..SWEEPS {
         let bad: Vec<usize> = (0..(cols - 1) * (rows - 1)).filter(|&c| turns_over(uv, cols, c)).collect();

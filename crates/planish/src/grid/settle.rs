@@ -21,8 +21,8 @@ const MEANT_CELLS: f64 = 32.0;
 const DAMPING: f64 = 0.003;
 /// Largest move of a round, in cells.
 const LARGEST_MOVE: f64 = 0.5;
-/// Steps of conjugate gradients in a round.
-const CG_STEPS: usize = 24;
+/// Steps of conjugate gradients in a round, for a net that is far from rest.
+pub const CG_STEPS: usize = 24;
 /// Solves of a round, and the factor by which the damping grows from one to the next if the energy rises (as of
 /// Levenberg and Marquardt).
 const ATTEMPTS: usize = 4;
@@ -30,10 +30,10 @@ const DAMPING_STEP: f64 = 10.0;
 /// A round that lowers the energy by less than this fraction ends the resolution.
 const SETTLED: f64 = 1e-3;
 
-/// Settles `net` in up to `rounds` rounds.
+/// Settles `net` in up to `rounds` rounds of `steps` steps of conjugate gradients.
 pub fn settle<'a>(
     mut net: Net<'a>,
-    rounds: usize,
+    (rounds, steps): (usize, usize),
     params: &GridParams,
     cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Net<'a>, Fault> {
@@ -43,7 +43,7 @@ pub fn settle<'a>(
         let system = System::new(&net, params);
         let before = energy;
         for attempt in 0..ATTEMPTS {
-            let Some(moves) = system.solve(damping, cancelled) else { return Err(Fault::Cancelled) };
+            let Some(moves) = system.solve(damping, steps, cancelled) else { return Err(Fault::Cancelled) };
             let trial = net.moved(true, &|k, fraction| {
                 let m = moves[k].clamp_length_max(LARGEST_MOVE) * fraction;
                 let [u, v] = system.tangents[k];
@@ -263,7 +263,7 @@ impl System {
     }
 
     /// Moves that lower the linearised energy: conjugate gradients, preconditioned by the 2 x 2 blocks.
-    fn solve(&self, damping: f64, cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Vec<DVec2>> {
+    fn solve(&self, damping: f64, steps: usize, cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Vec<DVec2>> {
         let count = self.cols * self.rows;
         let mut edge: Vec<f64> = self.edges.iter().map(|e| e.1).collect();
         let mut cell: Vec<f64> = self.cells.iter().map(|c| c.1).collect();
@@ -309,7 +309,7 @@ impl System {
         let mut p = z.clone();
         let mut rz = dot(&r, &z);
         let first = rz;
-        for _ in 0..CG_STEPS {
+        for _ in 0..steps {
             if rz <= 1e-6 * first || cancelled() {
                 break;
             }
