@@ -120,7 +120,8 @@ impl<'a> Net<'a> {
         };
         let mut suspects: Vec<usize> = (0..cells).collect();
         loop {
-            let bad: Vec<usize> = suspects.into_iter().filter(|&c| turned(c, &uv, &points)).collect();
+            let bad: Vec<usize> =
+                (suspects.into_par_iter().with_min_len(PARALLEL_LENGTH)).filter(|&c| turned(c, &uv, &points)).collect();
             if bad.is_empty() {
                 break;
             }

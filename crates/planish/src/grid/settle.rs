@@ -37,11 +37,12 @@ pub fn settle<'a>(
     params: &GridParams,
     cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Net<'a>, Fault> {
-    let mut energy = energy_of(&net, params);
+    let mut energy = None;
     let mut damping = DAMPING;
     for _ in 0..rounds {
         let system = System::new(&net, params);
-        let before = energy;
+        let before = energy.unwrap_or_else(|| system.energy());
+        let mut least = before;
         for attempt in 0..ATTEMPTS {
             let Some(moves) = system.solve(damping, steps, cancelled) else { return Err(Fault::Cancelled) };
             let trial = net.moved(true, &|k, fraction| {
@@ -50,9 +51,9 @@ pub fn settle<'a>(
                 net.chart.advance(net.spots[k], u * m.x + v * m.y)
             });
             let reached = energy_of(&trial, params);
-            if reached < energy {
+            if reached < least {
                 net = trial;
-                energy = reached;
+                least = reached;
                 if attempt == 0 {
                     damping = (damping / DAMPING_STEP).max(DAMPING);
                 }
@@ -60,9 +61,10 @@ pub fn settle<'a>(
             }
             damping *= DAMPING_STEP;
         }
-        if energy >= before * (1.0 - SETTLED) {
+        if least >= before * (1.0 - SETTLED) {
             break;
         }
+        energy = Some(least);
     }
     Ok(net)
 }
@@ -212,6 +214,18 @@ impl System {
             })
             .collect();
         System { cols, rows, tangents, curves, edges, cells, bends }
+    }
+
+    /// The energy of the net, as [`energy_of`] sums it up.
+    fn energy(&self) -> f64 {
+        let mut sum = 0.0;
+        let mut n = 0;
+        for &(_, _, count) in &self.curves {
+            sum += self.edges[n..n + count].iter().map(|e| e.1.powi(2)).sum::<f64>();
+            n += count;
+        }
+        let sum = self.bends.iter().fold(sum, |sum, b| sum + b.3.powi(2));
+        self.cells.iter().fold(sum, |sum, c| sum + c.1.powi(2))
     }
 
     /// `Jᵀ r` for residuals of edges and cells.
