@@ -1,5 +1,5 @@
-//! What stays of patches and of what is drawn in them when the curves change: their numbers, their feature curves, their
-//! sections.
+//! What stays of patches and of what is drawn in them when the curves change: their numbers, their feature curves,
+//! their sections.
 
 use super::mirror::{Images, ON_PLANE};
 use super::{Edit, Ground};
@@ -11,6 +11,9 @@ use crate::model::Drawing;
 use crate::network::{Network, Patch};
 use std::collections::BTreeMap;
 
+/// Sides that a patch before the plane or across it keeps at least: across it up to two sides lie behind it.
+const ACROSS: usize = 2;
+
 /// How a patch lies on another, by their curves: its side `k` on side `first + k`, or mirrored on `first - k`.
 #[derive(Clone, Copy)]
 struct Onto {
@@ -20,13 +23,23 @@ struct Onto {
 }
 
 impl Onto {
-    /// The patch among `patches` whose sides are those of `old` by way of `curve`, the new number of a curve.
-    fn find(old: &Patch, curve: &dyn Fn(u32) -> Option<u32>, patches: &[Patch], mirrored: bool) -> Option<Onto> {
-        let wanted: Vec<u32> = old.sides.iter().map(|s| curve(s.curve)).collect::<Option<_>>()?;
+    /// The patch among `patches` whose sides are those of `old` by way of `curve`, the new number of a curve; at least
+    /// `known` sides must have one.
+    fn find(
+        old: &Patch,
+        curve: &dyn Fn(u32) -> Option<u32>,
+        patches: &[Patch],
+        mirrored: bool,
+        known: usize,
+    ) -> Option<Onto> {
+        let wanted = old.sides.map(|s| curve(s.curve));
+        if wanted.iter().flatten().count() < known {
+            return None;
+        }
         (0..patches.len()).find_map(|p| {
+            let at = |first: usize, k: usize| if mirrored { (first + 4 - k) % 4 } else { (first + k) % 4 };
             let fits = |first: usize| {
-                let at = |k: usize| if mirrored { (first + 4 - k) % 4 } else { (first + k) % 4 };
-                (0..4).all(|k| patches[p].sides[at(k)].curve == wanted[k])
+                (0..4).all(|k| wanted[k].is_none_or(|curve| patches[p].sides[at(first, k)].curve == curve))
             };
             (0..4).find(|&first| fits(first)).map(|first| Onto { patch: p as u32, first, mirrored })
         })
@@ -67,7 +80,7 @@ pub(super) fn keep(edit: &Edit, drawing: &mut Drawing, before: &Drawing) {
         && old.patches.len() == new.patches.len()
         && old.curves.len() == new.curves.len()
         && old.curves.iter().zip(&new.curves).all(same_ends)
-        && old.patches.iter().all(|p| Onto::find(p, &Some, &new.patches, false).is_some())
+        && old.patches.iter().all(|p| Onto::find(p, &Some, &new.patches, false, 4).is_some())
     {
         drawing.network.patches = old.patches.clone();
         return;
@@ -78,7 +91,7 @@ pub(super) fn keep(edit: &Edit, drawing: &mut Drawing, before: &Drawing) {
     let numbers: BTreeMap<_, u32> = new.curves.iter().enumerate().map(|(k, c)| (key(&c.points), k as u32)).collect();
     let renamed = |c: u32| numbers.get(&key(&old.curves[c as usize].points)).copied();
     let sketch = &before.sketch;
-    let onto = |p: u32| Onto::find(old.patches.get(p as usize)?, &renamed, &new.patches, false);
+    let onto = |p: u32| Onto::find(old.patches.get(p as usize)?, &renamed, &new.patches, false, 4);
     let features = sketch.features.iter().filter_map(|f| {
         onto(f.patch).map(|o| FeatureCurve { patch: o.patch, family: o.family(f.family), points: f.points.clone() })
     });
@@ -86,8 +99,8 @@ pub(super) fn keep(edit: &Edit, drawing: &mut Drawing, before: &Drawing) {
     (drawing.sketch.features, drawing.sketch.sections) = (features.collect(), sections.collect());
 }
 
-/// Feature curves and sections of patches before the plane, and their images; those behind it go. A curve that crosses the
-/// plane, in a patch that does, goes on behind it as its own image.
+/// Feature curves and sections of patches before the plane, and their images; those behind it go. A curve that crosses
+/// the plane, in a patch that does, goes on behind it as its own image.
 pub(super) fn mirror(ground: &Ground, drawing: &mut Drawing, before: &Drawing, plane: &Plane, images: &Images) {
     let (old, new): (&Network, &Network) = (&before.network, &drawing.network);
     let mesh = ground.canvas.mesh;
@@ -96,8 +109,8 @@ pub(super) fn mirror(ground: &Ground, drawing: &mut Drawing, before: &Drawing, p
         let Some(patch) = old.patches.get(p as usize) else { return (None, None) };
         let kept = |c: u32| images.kept(c);
         let image = |c: u32| images.kept(c).map(|c| images.image[c as usize]);
-        let first = Onto::find(patch, &kept, &new.patches, false);
-        let second = Onto::find(patch, &image, &new.patches, true);
+        let first = Onto::find(patch, &kept, &new.patches, false, ACROSS);
+        let second = Onto::find(patch, &image, &new.patches, true, ACROSS);
         (first, second)
     };
     let near = ON_PLANE * mesh.bounds().diagonal();

@@ -48,8 +48,8 @@ pub(super) fn across(ground: &Ground, curve: &SurfaceCurve, plane: &Plane) -> Op
     SurfaceCurve::open(half).trace(mesh, adjacency).ok().map(SurfaceCurve::open)
 }
 
-/// The curves before `plane` (on the side of its normal) and in it, and their mirror images; curves behind it go. A curve
-/// that crosses the plane goes on behind it as its own image; corners near the plane are moved into it.
+/// The curves before `plane` (on the side of its normal) and in it, and their mirror images; curves behind it go. A
+/// curve that crosses the plane goes on behind it as its own image; corners near the plane are moved into it.
 /// # Errors
 /// `AcrossPlane` for a curve that crosses the plane more than once; `Curve` if an image cannot be drawn.
 pub fn mirror_network(ground: &Ground, network: &Network, plane: &Plane) -> Result<(Network, Images), ApplyError> {

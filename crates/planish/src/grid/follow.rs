@@ -1,10 +1,11 @@
 //! A grid that follows its patch through a small edit: the grid before the edit, its nodes carried along with the sides
 //! of the patch, settled again at its own resolution.
 //!
-//! The grid before is a map from its indices to the surface. Where on that map the nodes of the new sides lie is found by
-//! Newton's method; in between the shifts of the indices are blended from the four sides (Coons), and every node goes to
-//! where the old map has its shifted indices. So lines that were evenly spaced stay so, whatever the shape, and what is
-//! left for [`settle`] is small. The chart is made anew, for it is what tells exactly whether a cell turns over.
+//! The grid before is a map from its indices to the surface. Where on that map the nodes of the new sides lie is found
+//! by Newton's method; in between the shifts of the indices are blended from the four sides (Coons), and every node
+//! goes to where the old map has its shifted indices. So lines that were evenly spaced stay so, whatever the shape, and
+//! what is left for [`settle`] is small. The chart is made anew, for it is what tells exactly whether a cell turns
+//! over.
 //!
 //! Goes beyond [K98], §5.10: there sections of a grid are relaxed again from where they are.
 
@@ -21,11 +22,11 @@ use crate::observe::Observer;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-/// Rounds of Gauss-Newton and steps of conjugate gradients in each, on every [`COARSE`]-th line and then on all: the net as
-/// a whole comes to rest on the few lines, and what is left is a little from node to node.
+/// Rounds of Gauss-Newton and steps of conjugate gradients in each, on every [`COARSE`]-th line and then on all: the
+/// net as a whole comes to rest on the few lines, and what is left is a little from node to node.
 const COARSE_EFFORT: (usize, usize) = (4, 24);
 const FINE_EFFORT: (usize, usize) = (1, 8);
-/// One line of the coarse net per this many; nets with less than twice as many cells across have none.
+/// One line of the coarse net per this many; nets of no more points across than twice its square have none.
 const COARSE: usize = 4;
 /// A side that moves by more than this share of the cells across it is no small edit: the grid is made from nothing.
 const FARTHEST: f64 = 0.5;
@@ -35,7 +36,7 @@ const NEWTON_REACH: f64 = 4.0;
 const NEWTON_REST: f64 = 1e-6;
 /// Steps straight over the surface from a near node to a place.
 const WALKS: usize = 2;
-/// A side has gone out of the patch as it was by more than this many cells, and by no more than this share of those across.
+/// A side has gone out of the patch as it was by more than this many cells, and by no more than this share of all.
 const GROWN: f64 = 0.1;
 const FARTHEST_OUT: f64 = 0.05;
 /// Part of a cell to which places are found.
@@ -47,8 +48,8 @@ const NEAR_ENOUGH: f64 = 1e-3;
 /// * `patches` - the patches as they are now
 /// * `before` - for each the grid that it had; the new one has as many rows and columns
 ///
-/// Nodes on the sides are those that [`relax`](super::relax) would put there, bit for bit. Where a grid cannot follow (its sides moved
-/// far, or folds would be left) it is made from nothing.
+/// Nodes on the sides are those that [`relax`](super::relax) would put there, bit for bit. Where a grid cannot follow
+/// (its sides moved far, or folds would be left) it is made from nothing.
 /// # Errors
 /// As [`relax`](super::relax).
 pub fn follow(
@@ -339,8 +340,8 @@ fn carried<'a>(chart: &'a Chart, patch: &PatchMesh, old: &Grid) -> Option<Net<'a
     (!turned(&uv)).then(|| Net::new(chart, cols, rows, uv))
 }
 
-/// Walks over the surface to the foot of `goal`, in a few straight steps along the tangent plane, until it is nearer than
-/// `rest`.
+/// Walks over the surface to the foot of `goal`, in a few straight steps along the tangent plane, until it is nearer
+/// than `rest`.
 fn walk(chart: &Chart, start: Spot, goal: DVec3, rest: f64) -> Spot {
     let mut spot = start;
     for _ in 0..WALKS {

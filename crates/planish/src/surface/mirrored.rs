@@ -1,12 +1,12 @@
 //! Fits of a symmetric network: surfaces behind a plane of symmetry as exact mirror images of those before it.
 //!
 //! 1. corners and patches are matched with their images; nothing is done unless every patch has one
-//! 2. before the plane, boundaries in it are put into it exactly, and where that is asked for the control points next to
-//!    them level with them: what their steps from the boundary have along its normal in the plane is taken away, and the
-//!    surface has one tangent plane there
-//! 3. every patch behind the plane gets the mirror image of its mate, and a patch that crosses the plane becomes its own:
-//!    its control points behind the plane are images of those before it. What the shape itself lacks of symmetry goes to
-//!    the reliefs.
+//! 2. before the plane, boundaries in it are put into it exactly, and where that is asked for the control points next
+//!    to them level with them: what their steps from the boundary have along its normal in the plane is taken away, and
+//!    the surface has one tangent plane there
+//! 3. every patch behind the plane gets the mirror image of its mate, and a patch that crosses the plane becomes its
+//!    own: its control points behind the plane are images of those before it. What the shape itself lacks of symmetry
+//!    goes to the reliefs.
 
 use super::Surface;
 use super::basis::{is_uniform, uniform_knots};
@@ -23,8 +23,8 @@ const SAME: f64 = 5e-3;
 /// into the plane at a flat angle its surface would turn over there.
 const LEAST_AWAY: f64 = 0.2;
 
-/// Puts mirror images of the surfaces before `plane` (on the side of its normal) in the place of those behind it. False,
-/// and nothing changed, if the network is not symmetric.
+/// Puts mirror images of the surfaces before `plane` (on the side of its normal) in the place of those behind it.
+/// False, and nothing changed, if the network is not symmetric.
 /// * `leveled` - make them level across the plane, too: before seams are smoothed, for it disturbs smooth ones
 pub fn mirror_surfaces(
     mesh: &TriMesh,
@@ -163,8 +163,8 @@ fn flatten(surface: &mut Surface, matched: &Matched, network: &Network, plane: &
     }
 }
 
-/// Puts the control points next to boundaries in the plane level with them, but those of the curves that end there: they
-/// belong to two patches.
+/// Puts the control points next to boundaries in the plane level with them, but those of the curves that end there:
+/// they belong to two patches.
 fn level(surface: &mut Surface, matched: &Matched, network: &Network, plane: &Plane, p: usize) {
     for k in (0..4).filter(|&k| matched.side_in_plane(network, p, k)) {
         for n in 1..side_len(surface.rows, surface.cols, k) - 1 {
@@ -204,7 +204,8 @@ fn image(mate: &Surface, matched: &Matched, network: &Network, plane: &Plane, q:
     Surface { rows, cols, control, knots_u, knots_v }
 }
 
-/// Control point of `mate` whose image is `(i, j)` of a patch whose first corner is the image of corner `s` of the mate.
+/// Control point of `mate` whose image is `(i, j)` of a patch whose first corner is the image of corner `s` of the
+/// mate.
 fn counterpart(mate: &Surface, s: usize, i: usize, j: usize) -> usize {
     // The first parameter of the mate is `u` of the patch, or `v` where they swap; turned as the corners tell.
     let (a, b) = if s.is_multiple_of(2) { (j, i) } else { (i, j) };
