@@ -276,7 +276,10 @@ fn carried<'a>(chart: &'a Chart, patch: &PatchMesh, old: &Grid) -> Option<Net<'a
         .collect();
     // The sides lie evenly on those of the square; an inner node is walked to from the old node nearest to its goal, or
     // from a neighbour that is there already.
-    let is_inner = |k: usize| k % cols > 0 && k % cols + 1 < cols && k / cols > 0 && k / cols + 1 < rows;
+    let is_inner = |k: usize| {
+        let (i, j) = (k % cols, k / cols);
+        i > 0 && j > 0 && i + 1 < cols && j + 1 < rows
+    };
     let mut spots: Vec<Option<Spot>> = (0..cols * rows)
         .into_par_iter()
         .map(|k| {

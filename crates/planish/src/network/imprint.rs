@@ -241,10 +241,11 @@ pub(super) struct Chain {
     pub places: Vec<Place>,
 }
 
+/// Patches, and how many triangles belong to none of them, with the place of one.
+type CutOut = (Vec<PatchMesh>, Option<(usize, DVec3)>);
+
 /// Cuts `mesh` along `chains` and takes out the patches `which` of `network`.
 /// * `whole` - for each curve the chain that is all of it; only those of the sides of `which` are asked for
-///
-/// Returns the patches, and how many triangles belong to none of them, with the place of one.
 /// # Errors
 /// As [`imprint`], but for parts that belong to no patch.
 pub(super) fn cut_out(
@@ -254,7 +255,7 @@ pub(super) fn cut_out(
     chains: &[Chain],
     whole: &[usize],
     which: &[usize],
-) -> Result<(Vec<PatchMesh>, Option<(usize, DVec3)>), ImprintError> {
+) -> Result<CutOut, ImprintError> {
     let borrowed: Vec<&[Place]> = chains.iter().map(|c| &c.places[..]).collect();
     let cut = cut(mesh, adjacency, &borrowed).map_err(|e| of_curve(e, chains))?;
     let cut_adjacency = Adjacency::new(&cut.mesh);
