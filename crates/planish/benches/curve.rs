@@ -7,9 +7,9 @@ use planish::curve::{
     Canvas, Magnet, PaintMode, PaintParams, ScalarField, Section, Snake, SnakeParams, SurfaceCurve, Sweep, way,
 };
 use planish::geom::{Bvh, random};
-use planish::grid::{self, GridParams};
+use planish::grid::{self, Grid, GridParams};
 use planish::mesh::{self, Adjacency, FacePoint, TriMesh, shapes};
-use planish::network::{CurveKind, Editor, imprint};
+use planish::network::{CurveKind, Editor, LayoutParams, PatchMesh, changed_patches, imprint, layout, reimprint};
 use planish::{DVec3, Silent, surface};
 use std::io::Write;
 use std::time::Instant;
@@ -74,8 +74,13 @@ fn painting(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
     if !wanted(&format!("curve/paint/{name}")) {
         return;
     }
+    let spent = cpu();
     let (time, canvas) = least(|| Canvas::new(mesh));
-    tell(&format!("curve/paint/{name}"), &format!("{} triangles, set-up {time:.0} ms", mesh.triangles.len()));
+    let spent = (cpu() - spent) / RUNS as f64;
+    tell(
+        &format!("curve/paint/{name}"),
+        &format!("{} triangles, set-up {time:.0} ms, CPU {spent:.0} ms", mesh.triangles.len()),
+    );
     let pairs = picks(mesh, &canvas.adjacency);
     let field = ScalarField::maximum_curvature(mesh, &canvas.adjacency).smoothed(mesh, &canvas.adjacency, 4);
     let magnet = Magnet::of_scalar(&field);
@@ -286,27 +291,105 @@ fn one_patch(wanted: &dyn Fn(&str) -> bool) {
     let curve = editor.add_curve(&middle, CurveKind::Smooth, 1e-9).expect("a curve");
     assert!(editor.diagnose().is_finished());
     let params = SnakeParams { fairness: 0.1, curvature: 1.0, ..SnakeParams::default() };
+    let before = editor.network.clone();
+    let old = imprint(&mesh, &before).expect("patches");
+    let grid_params = GridParams::default();
+    let sizes = grid::choose_sizes(&before, &old, &grid_params);
+    let old_grids = grid::relax(&mesh, &old, &sizes, &grid_params, &Silent).expect("grids");
     let start = Instant::now();
     editor.drag_curve(curve, 0.5, DVec3::X * 0.03, 0.6, &params, &Silent).expect("a drag");
     let drag = milliseconds(start);
-    let (cutting, patches) = least(|| imprint(&mesh, &editor.network).expect("patches"));
-    let grid_params = GridParams::default();
-    let sizes = grid::choose_sizes(&editor.network, &patches, &grid_params);
-    let (relaxing, grids) =
-        least(|| grid::relax(&mesh, &patches[..1], &sizes[..1], &grid_params, &Silent).expect("a grid"));
-    let control = [sizes[0].0, sizes[0].1].map(|n| (n / 4).max(4));
-    let (fitting, _) =
-        least(|| surface::fit(&grids[0].points, grids[0].rows, grids[0].cols, control).expect("a surface"));
+    let which = changed_patches(&before, &editor.network).expect("the same network");
+    let near: Vec<&PatchMesh> = which.iter().map(|&p| &old[p]).collect();
+    let (whole, patches) = least(|| imprint(&mesh, &editor.network).expect("patches"));
+    let (cutting, _) = least(|| reimprint(&mesh, &adjacency, &editor.network, &near, &which).expect("patches"));
     tell(
         id,
         &format!(
-            "{} vertices, {} x {} nodes: drag {drag:.1} ms, cut {cutting:.0} ms (both patches), relax {relaxing:.0} ms, \
-             fit {fitting:.1} ms",
-            patches[0].mesh.points.len(),
-            grids[0].cols,
-            grids[0].rows
+            "{} vertices: drag {drag:.1} ms, cut {cutting:.0} ms (both patches; the whole mesh {whole:.0} ms)",
+            patches[0].mesh.points.len()
         ),
     );
+    compare(id, &mesh, &patches[..1], &old_grids[..1], &grid_params);
+}
+
+/// CPU time of this process, milliseconds.
+fn cpu() -> f64 {
+    let times = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields: Vec<&str> = times.rsplit(')').next().unwrap_or("").split_whitespace().collect();
+    // User and system time, in hundredths of a second.
+    [11, 12].iter().filter_map(|&k| fields.get(k)?.parse::<f64>().ok()).sum::<f64>() * 10.0
+}
+
+/// Grids from nothing and grids that follow, side by side: times and quality.
+fn compare(id: &str, mesh: &TriMesh, patches: &[PatchMesh], old: &[Grid], params: &GridParams) {
+    const AGAIN: usize = 5;
+    let sizes: Vec<(usize, usize)> = old.iter().map(|g| (g.cols, g.rows)).collect();
+    let measured = |make: &dyn Fn() -> Vec<Grid>| {
+        let (start, spent) = (Instant::now(), cpu());
+        let mut grids = make();
+        (1..AGAIN).for_each(|_| grids = make());
+        (milliseconds(start) / AGAIN as f64, (cpu() - spent) / AGAIN as f64, grids)
+    };
+    let cold = measured(&|| grid::relax(mesh, patches, &sizes, params, &Silent).expect("grids"));
+    let warm = measured(&|| grid::follow(mesh, patches, old, params, &Silent).expect("grids"));
+    for (name, (clock, cpu, grids)) in [("from nothing", cold), ("following", warm)] {
+        let found: Vec<grid::GridQuality> = grids.iter().zip(patches).map(|(g, p)| grid::measure(g, p)).collect();
+        let mean = |of: &dyn Fn(&grid::GridQuality) -> f64| found.iter().map(of).sum::<f64>() / found.len() as f64;
+        let fit = |g: &Grid| {
+            let surface = surface::fit(&g.points, g.rows, g.cols, [g.rows, g.cols].map(|n| (n / 4).max(4)));
+            surface::deviation_of(&surface.expect("a surface"), g).rms
+        };
+        let fits: Vec<f64> = grids.iter().map(fit).collect();
+        tell(
+            id,
+            &format!(
+                "{name}: {clock:.0} ms, CPU {cpu:.0} ms for {} nodes in {} patches; folds {}, spacing cv {:.4}, \
+                 angle 95 % {:.1} deg, miss rms {:.2e}, fit rms {:.3e}",
+                grids.iter().map(|g| g.points.len()).sum::<usize>(),
+                grids.len(),
+                found.iter().map(|q| q.folds).sum::<usize>(),
+                mean(&|q| q.spacing_cv),
+                mean(&|q| q.angle_p95_deg),
+                mean(&|q| q.miss_rms),
+                (fits.iter().map(|f| f * f).sum::<f64>() / fits.len() as f64).sqrt()
+            ),
+        );
+    }
+}
+
+/// Curves of an automatic network dragged by a twentieth of their length, one after the other from the same start; the
+/// patches beside them made again.
+fn follows(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
+    let id = format!("curve/follow/{name}");
+    if !wanted(&id) {
+        return;
+    }
+    let adjacency = Adjacency::new(mesh);
+    let before = layout(mesh, &LayoutParams::default(), &Silent).expect("a network");
+    let old = imprint(mesh, &before).expect("patches");
+    let params = GridParams::default();
+    let sizes = grid::choose_sizes(&before, &old, &params);
+    let (mut patches, mut old_grids) = (Vec::new(), Vec::new());
+    let step = (before.curves.len() / 12).max(1);
+    for c in (0..before.curves.len()).step_by(step).filter(|&c| before.curves[c].kind == CurveKind::Smooth) {
+        let mut editor = Editor::new(mesh, &adjacency, before.clone());
+        let at: Vec<DVec3> = before.curves[c].points.iter().map(|p| p.position(mesh)).collect();
+        let length: f64 = at.windows(2).map(|w| w[0].distance(w[1])).sum();
+        let aside = (at[at.len() - 1] - at[0]).any_orthonormal_vector() * (0.05 * length);
+        let forces = SnakeParams { fairness: 0.1, curvature: 1.0, ..SnakeParams::default() };
+        if editor.drag_curve(c as u32, 0.5, aside, 0.7, &forces, &Silent).is_err() || !editor.glance().is_finished() {
+            continue;
+        }
+        let which = changed_patches(&before, &editor.network).expect("the same network");
+        let near: Vec<&PatchMesh> = which.iter().map(|&p| &old[p]).collect();
+        let Ok(made) = reimprint(mesh, &adjacency, &editor.network, &near, &which) else { continue };
+        let sizes: Vec<(usize, usize)> = which.iter().map(|&p| sizes[p]).collect();
+        let some: Vec<PatchMesh> = which.iter().map(|&p| old[p].clone()).collect();
+        old_grids.extend(grid::relax(mesh, &some, &sizes, &params, &Silent).expect("grids"));
+        patches.extend(made);
+    }
+    compare(&id, mesh, &patches, &old_grids, &params);
 }
 
 fn drags(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
@@ -363,5 +446,6 @@ fn main() {
         painting(name, mesh, &wanted);
         snakes(name, mesh, &wanted);
         drags(name, mesh, &wanted);
+        follows(name, mesh, &wanted);
     }
 }

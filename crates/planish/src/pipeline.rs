@@ -13,10 +13,11 @@ pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
 pub use scan::{ScanError, ScanMeshed, ScanParams, fit_params_for, mesh_scan, sample_figures, scan_figures, voxel_for};
 pub use truth::{EdgesFound, edges_found, truth_figures};
 
-use crate::grid::{self, FeatureError, GridError, GridParams};
+use crate::grid::{self, FeatureError, Grid, GridError, GridParams};
 use crate::mesh::{self, CompareError, FeatureTags, MeshError, Repairs, TriMesh};
-use crate::model::Model;
-use crate::network::{self, ImprintError, LayoutError, LayoutParams, Network};
+use crate::model::{Model, Sketch};
+use crate::network::{self, ImprintError, LayoutError, LayoutParams, Network, PatchMesh};
+use crate::observe::Observer;
 use crate::relief::{self, ReliefError};
 use crate::surface::{self, FitError, FitParams, SeamQuality, StitchParams};
 use rayon::prelude::*;
@@ -231,10 +232,41 @@ pub fn rework(
     params: &PipelineParams,
     observer: &dyn PipelineObserver,
 ) -> Result<Assessed, PipelineError> {
+    rework_from(model, None, params, observer)
+}
+
+/// What a model was before an edit, as far as its grids can be made from it.
+#[derive(Clone, Debug)]
+pub struct Earlier {
+    network: Network,
+    grids: Vec<Grid>,
+    sketch: Sketch,
+}
+
+impl Earlier {
+    /// The state of a model with grids; nothing for one without.
+    pub fn of(model: &Model) -> Option<Earlier> {
+        let Model { network, grids, sketch, .. } = model;
+        (!grids.is_empty()).then(|| Earlier { network: network.clone(), grids: grids.clone(), sketch: sketch.clone() })
+    }
+}
+
+/// As [`rework`]; where an edit since `earlier` moved a few curves and nothing else, grids of the patches beside them
+/// follow ([`grid::follow`]) and all others are kept. `earlier` must have been made with the same grid parameters.
+///
+/// If a grid that followed is folded or misses its patch by more than is allowed, all are made from nothing.
+/// # Errors
+/// As [`fit`].
+pub fn rework_from(
+    model: &mut Model,
+    earlier: Option<&Earlier>,
+    params: &PipelineParams,
+    observer: &dyn PipelineObserver,
+) -> Result<Assessed, PipelineError> {
     let mut clock = Clock::new(observer, &WEIGHTS);
     let before =
         (std::mem::take(&mut model.grids), std::mem::take(&mut model.surfaces), std::mem::take(&mut model.reliefs));
-    let made = remade(model, params, &mut clock).map_err(|e| or_cancelled(e, observer));
+    let made = remade(model, earlier, params, &mut clock).map_err(|e| or_cancelled(e, observer));
     if made.is_err() {
         (model.grids, model.surfaces, model.reliefs) = before;
     }
@@ -242,13 +274,23 @@ pub fn rework(
     Ok(Assessed { stages: clock.records, quality, seams, warnings })
 }
 
-fn remade(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Result<quality::Measured, PipelineError> {
+fn remade(
+    model: &mut Model,
+    earlier: Option<&Earlier>,
+    params: &PipelineParams,
+    clock: &mut Clock,
+) -> Result<quality::Measured, PipelineError> {
     let (mesh, network) = (&model.mesh, &model.network);
     let patches = clock.stage("imprint", |_| network::imprint(mesh, network), |p| [("patches", p.len())])?;
     let drawn = (&model.sketch.features[..], &model.sketch.sections[..]);
     model.grids = clock.stage(
         "grids",
         |o| -> Result<_, PipelineError> {
+            if let Some(earlier) = earlier
+                && let Some(grids) = followed(model, earlier, &patches, &params.grid, o)?
+            {
+                return Ok(grids);
+            }
             match drawn.0 {
                 [] => Ok(grid::resample(mesh, network, &patches, &params.grid, o)?),
                 _ => Ok(grid::resample_with_features(mesh, network, &patches, drawn, &params.grid, o)?),
@@ -259,6 +301,35 @@ fn remade(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Resu
     surfaces(model, params, clock)?;
     let repairs = Repairs::default();
     clock.stage("measure", |o| quality::measure(model, &patches, &repairs, o), |m| [("seams", m.seams.len())])
+}
+
+/// Grids of an edited model from those that it had; nothing where they must be made from nothing.
+fn followed(
+    model: &Model,
+    earlier: &Earlier,
+    patches: &[PatchMesh],
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<Option<Vec<Grid>>, GridError> {
+    let drawn = |s: &Sketch| !s.features.is_empty() || !s.sections.is_empty();
+    let Some(which) = network::changed_patches(&earlier.network, &model.network) else { return Ok(None) };
+    if drawn(&earlier.sketch) || drawn(&model.sketch) || earlier.grids.len() != patches.len() {
+        return Ok(None);
+    }
+    let some: Vec<PatchMesh> = which.iter().map(|&p| patches[p].clone()).collect();
+    let old: Vec<Grid> = which.iter().map(|&p| earlier.grids[p].clone()).collect();
+    let made = grid::follow(&model.mesh, &some, &old, params, observer)?;
+    let allowed = params.miss * model.mesh.bounds().diagonal();
+    let is_good = |(grid, patch): (&Grid, &PatchMesh)| {
+        let found = grid::measure(grid, patch);
+        found.folds == 0 && found.miss_max * patch.mesh.bounds().diagonal() <= allowed
+    };
+    if !made.par_iter().zip(&some).all(is_good) {
+        return Ok(None);
+    }
+    let mut grids = earlier.grids.clone();
+    which.into_iter().zip(made).for_each(|(p, grid)| grids[p] = grid);
+    Ok(Some(grids))
 }
 
 /// What [`assess`] finds.

@@ -11,7 +11,7 @@ use crate::summary::Summary;
 use planish::edit::{self, ApplyError, Edit, Ground};
 use planish::model::{Drawing, HistoryEntry, Model};
 use planish::network::{Diagnosis, diagnose};
-use planish::pipeline::{self, PipelineParams, Warning};
+use planish::pipeline::{self, Earlier, PipelineParams, Warning};
 use planish_io::report::{Report, count};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -51,6 +51,8 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
     let (mut model, read) = session.step("read", || start(session, args))?;
     let params = params(session, args, &model)?;
+    // With other parameters the grids of the model are of no use.
+    let earlier = if args.stages.none_given() { Earlier::of(&model) } else { None };
     let mut report = Report::new("edit", files::model_facts(&args.input, &model, model.units));
     report.stages.push(read);
     let ((found, pictures), record) = session.step("edit", || replay(session, args, &script, &mut model))?;
@@ -61,7 +63,7 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
     let finished = found.is_finished() && !model.network.patches.is_empty();
     if finished && !args.no_fit && model.grids.is_empty() {
         let wrong = |e| pipeline_failure(&args.input, None, e);
-        let made = pipeline::rework(&mut model, &params, &session.bars).map_err(wrong)?;
+        let made = pipeline::rework_from(&mut model, earlier.as_ref(), &params, &session.bars).map_err(wrong)?;
         report.stages.extend(made.stages);
         report.quality = made.quality;
         report.warnings.extend(made.warnings);

@@ -1,6 +1,7 @@
 //! What each edit does to a drawing.
 
-use super::mirror::ON_PLANE;
+use super::keep;
+use super::mirror::{Images, ON_PLANE};
 use super::{ApplyError, Edit, Forces, LINE_KIND, Magnetism, Others, Pull, Scalar, SplineMove, Spot};
 use super::{carry_network, mirror_network};
 use crate::curve::{
@@ -46,6 +47,8 @@ struct Work<'a, 'm> {
     ground: &'a Ground<'m>,
     drawing: &'a mut Drawing,
     observer: &'a dyn Observer,
+    /// After a mirroring: the plane, and what became of the curves.
+    images: Option<(symmetry::Plane, Images)>,
 }
 
 /// Makes one edit. On an error the drawing is what it was. Patches are those of the curves afterwards.
@@ -61,52 +64,25 @@ pub fn apply(
 ) -> Result<(), ApplyError> {
     super::check::check(edit)?;
     let before = drawing.clone();
-    let made = Work { ground, drawing, observer }.make(edit, others);
+    let mut work = Work { ground, drawing, observer, images: None };
+    let made = work.make(edit, others);
+    let images = work.images.take();
     if observer.cancelled() || made.is_err() {
         *drawing = before;
         return made.and(Err(ApplyError::Cancelled));
     }
     let canvas = &ground.canvas;
-    if drawing.network.corners != before.network.corners || drawing.network.curves != before.network.curves {
+    let moved = drawing.network.corners != before.network.corners || drawing.network.curves != before.network.curves;
+    if moved || images.is_some() {
         let mut editor = Editor::new(canvas.mesh, &canvas.adjacency, std::mem::take(&mut drawing.network));
         editor.diagnose();
         drawing.network = editor.network;
-        keep_features(drawing, &before);
+        match &images {
+            Some((plane, images)) => keep::mirror(ground, drawing, &before, plane, images),
+            None => keep::keep(edit, drawing, &before),
+        }
     }
     Ok(())
-}
-
-/// Gives feature curves and sections the numbers that their patches have now; those whose patch is gone go with it.
-fn keep_features(drawing: &mut Drawing, before: &Drawing) {
-    let (old, new) = (&before.network, &drawing.network);
-    let middle = |network: &crate::network::Network, p: usize| -> Vec<Vec<FacePoint>> {
-        let mut sides: Vec<Vec<FacePoint>> = network.patches[p]
-            .sides
-            .iter()
-            .map(|s| {
-                let mut points = network.curves[s.curve as usize].points.clone();
-                if s.reversed {
-                    points.reverse();
-                }
-                points
-            })
-            .collect();
-        // From the least side on: the numbering of sides may have turned.
-        let least = (0..4).min_by(|&a, &b| order(&sides[a]).cmp(&order(&sides[b]))).unwrap_or(0);
-        sides.rotate_left(least);
-        sides
-    };
-    fn order(points: &[FacePoint]) -> Vec<(u32, [u64; 3])> {
-        points.iter().map(|p| (p.face, p.bary.map(f64::to_bits))).collect()
-    }
-    let shapes: Vec<_> = (0..new.patches.len()).map(|p| middle(new, p)).collect();
-    let renamed = |p: u32| -> Option<u32> {
-        let shape = old.patches.get(p as usize).map(|_| middle(old, p as usize))?;
-        shapes.iter().position(|s| *s == shape).map(|k| k as u32)
-    };
-    let sketch = &mut drawing.sketch;
-    sketch.features.retain_mut(|f| renamed(f.patch).map(|p| f.patch = p).is_some());
-    sketch.sections.retain_mut(|s| renamed(s.0).map(|p| s.0 = p).is_some());
 }
 
 impl Work<'_, '_> {
@@ -341,7 +317,9 @@ impl Work<'_, '_> {
                 if *swap {
                     plane.normal = -plane.normal;
                 }
-                self.drawing.network = mirror_network(self.ground, &self.drawing.network, &plane)?;
+                let (network, images) = mirror_network(self.ground, &self.drawing.network, &plane)?;
+                self.drawing.network = network;
+                self.images = Some((plane, images));
                 Ok(())
             }
             Edit::Carry { from, landmarks } => {

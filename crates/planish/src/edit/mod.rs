@@ -6,10 +6,11 @@
 
 mod apply;
 mod check;
+mod keep;
 mod mirror;
 
 pub use apply::{Ground, apply};
-pub use mirror::{carry_network, mirror_network};
+pub use mirror::{Images, carry_network, mirror_network};
 
 use crate::curve::symmetry::Plane;
 use crate::curve::{CurveError, PaintMode, Sweep};
@@ -321,7 +322,7 @@ pub enum Edit {
         #[serde(default)]
         plane: Option<Plane>,
     },
-    /// Replaces the curves behind the plane of symmetry by mirror images of those before it.
+    /// Replaces the curves, feature curves and sections behind the plane of symmetry by mirror images of those before it.
     Mirror {
         /// True for the other way round.
         #[serde(default)]
@@ -443,8 +444,8 @@ pub enum ApplyError {
     /// Mirroring without a plane.
     #[error("no plane of symmetry is set - hint: an edit \"symmetry\" sets or finds one")]
     NoPlane,
-    /// A curve crosses the plane of symmetry without a corner there.
-    #[error("curve {curve} crosses the plane of symmetry at ({:.6}, {:.6}, {:.6}) - hint: divide it there, or delete it", place[0], place[1], place[2])]
+    /// A curve crosses the plane of symmetry more than once.
+    #[error("curve {curve} crosses the plane of symmetry more than once, at ({:.6}, {:.6}, {:.6}) the last time - hint: divide it there, or delete it", place[0], place[1], place[2])]
     AcrossPlane {
         /// The curve.
         curve: usize,

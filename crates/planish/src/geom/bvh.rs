@@ -420,7 +420,7 @@ fn split(items: &mut [Item]) -> usize {
 
 /// Squared distance to a triangle and the weights of its closest place, by the region of the point (Ericson,
 /// *Real-Time Collision Detection*, 2005, §5.1.5). Triangles without area are taken as their edges.
-fn closest_in_triangle(&[a, b, c]: &[DVec3; 3], p: DVec3) -> (f64, [f64; 3]) {
+pub(crate) fn closest_in_triangle(&[a, b, c]: &[DVec3; 3], p: DVec3) -> (f64, [f64; 3]) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
     let measured = |bary: [f64; 3]| {

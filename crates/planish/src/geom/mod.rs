@@ -8,5 +8,6 @@ pub mod random;
 pub mod tolerance;
 
 pub use aabb::Aabb;
+pub(crate) use bvh::closest_in_triangle;
 pub use bvh::{Bvh, RayHit, SurfaceHit};
 pub use kd_tree::{KdTree, nearest_distances};

@@ -8,27 +8,39 @@ use super::chart::Chart;
 use super::fold::{place, turns_around, worst_corner};
 use super::locate::Spot;
 use super::net::{Net, cell_corners};
-use super::quality::surface;
-use crate::geom::Bvh;
+use super::quality::{halves, surface};
+use crate::geom::{Bvh, closest_in_triangle};
+use crate::mesh::NONE;
 use rayon::prelude::*;
 
 /// Sweeps over the missed vertices; each sees the points that the one before moved.
 const SWEEPS: usize = 3;
 
+/// Rings of cells around a node in which the surface is looked for before all of it is.
+const RINGS: [usize; 3] = [1, 3, 8];
+
+/// Nearer than this part of what is allowed is near enough, whatever the rounding.
+const CLEARLY: f64 = 1.0 - 1e-6;
+
 /// Least sine of the corners of cells around a moved point, unless they were worse before.
 const LEAST_SINE: f64 = 0.15;
 
-/// Moves points of `net` onto vertices of its chart that lie further than `allowed` from the grid's surface.
-pub fn catch(net: &mut Net, allowed: f64, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<(), Fault> {
+/// Moves points of `net` onto vertices of its chart that lie further than `allowed` from the grid's surface. True if
+/// any moved.
+pub fn catch(net: &mut Net, allowed: f64, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<bool, Fault> {
     let spots = vertex_spots(net.chart);
     let mut moved = vec![false; net.points.len()];
     for _ in 0..SWEEPS {
         if cancelled() {
             return Err(Fault::Cancelled);
         }
+        let suspects = suspects(net, allowed);
+        if suspects.is_empty() {
+            break;
+        }
         let bvh = Bvh::new(&surface(&net.points, net.cols, net.rows));
         let points = &net.chart.points;
-        let mut missed: Vec<(f64, usize, usize)> = (0..points.len())
+        let mut missed: Vec<(f64, usize, usize)> = suspects
             .into_par_iter()
             .map(|v| {
                 let hit = bvh.closest(points[v]);
@@ -53,7 +65,48 @@ pub fn catch(net: &mut Net, allowed: f64, cancelled: &(dyn Fn() -> bool + Sync))
             break;
         }
     }
-    Ok(())
+    Ok(moved.contains(&true))
+}
+
+/// Vertices of the chart that may lie further than `allowed` from the grid's surface: those that the cells around the
+/// node nearest in the chart do not come near enough to. All others do not, so looking at these alone changes nothing.
+fn suspects(net: &Net, allowed: f64) -> Vec<usize> {
+    let (cols, rows) = (net.cols, net.rows);
+    let points = &net.chart.points;
+    let mut near = vec![NONE; points.len()];
+    for (k, spot) in net.spots.iter().enumerate() {
+        for v in net.chart.triangles[spot.triangle as usize] {
+            if near[v as usize] == NONE {
+                near[v as usize] = k as u32;
+            }
+        }
+    }
+    for triangle in &net.chart.triangles {
+        if let Some(k) = triangle.iter().map(|&v| near[v as usize]).find(|&k| k != NONE) {
+            for &v in triangle {
+                if near[v as usize] == NONE {
+                    near[v as usize] = k;
+                }
+            }
+        }
+    }
+    let within = |v: usize, ring: usize| {
+        let (i, j) = (near[v] as usize % cols, near[v] as usize / cols);
+        let lines = j.saturating_sub(ring)..(j + ring).min(rows - 1);
+        lines.into_iter().any(|y| {
+            (i.saturating_sub(ring)..(i + ring).min(cols - 1)).any(|x| {
+                let corners = cell_corners(cols, y * (cols - 1) + x).map(|k| net.points[k]);
+                halves(corners).into_iter().any(|t| {
+                    let (square, _) = closest_in_triangle(&t.map(|k| corners[k]), points[v]);
+                    square.sqrt() <= allowed * CLEARLY
+                })
+            })
+        })
+    };
+    let at_node = |v: usize| points[v].distance(net.points[near[v] as usize]) <= allowed * CLEARLY;
+    let found = |v: usize| at_node(v) || RINGS.into_iter().any(|ring| within(v, ring));
+    let far = |&v: &usize| near[v] == NONE || !found(v);
+    (0..points.len()).into_par_iter().filter(far).collect()
 }
 
 /// A spot for every vertex of the chart.

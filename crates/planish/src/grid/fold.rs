@@ -81,13 +81,14 @@ fn cells_around(cols: usize, k: usize) -> [usize; 4] {
     [first, first + 1, first + cols - 1, first + cols]
 }
 
-/// Opens folded cells: moves their points, one after the other, to where the worst corner around is best.
-pub fn open_folds(net: &mut Net, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<(), Fault> {
+/// Opens folded cells: moves their points, one after the other, to where the worst corner around is best. True if there
+/// is none left for certain.
+pub fn open_folds(net: &mut Net, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<bool, Fault> {
     let (cols, rows) = (net.cols, net.rows);
     for sweep in 0..SWEEPS {
         let folded = folded_cells(net);
         if folded.is_empty() {
-            break;
+            return Ok(true);
         }
         // A ring more every third sweep: where the folded cells are hemmed in, their neighbours must give way.
         let ring = sweep / 3;
@@ -110,7 +111,7 @@ pub fn open_folds(net: &mut Net, cancelled: &(dyn Fn() -> bool + Sync)) -> Resul
             open_around(net, k);
         }
     }
-    Ok(())
+    Ok(false)
 }
 
 /// Least sine of the corners of the four cells around inner point `k`.

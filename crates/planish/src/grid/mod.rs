@@ -5,7 +5,8 @@
 //! 2. start grid                         - §5.4, [`chart`]: a convex map of the patch to the unit square
 //! 3. relax, subdivide, relax            - §5.5 and 5.6, [`springs`]
 //! 4. points moved onto missed detail      - beyond the paper, [`catch`]
-//! 5. number of points along every side  - §5.6, [`sizes`], and more where detail is missed, [`resample`]
+//! 5. small edits of a patch's curves      - beyond the paper, [`follow`]
+//! 6. number of points along every side  - §5.6, [`sizes`], and more where detail is missed, [`resample`]
 //!
 //! Departs from [K98]: the start is a convex map instead of crossings of shortest paths (those cross twice or run
 //! along a side on curved patches and fold the grid), and points move in that chart, where every step can be
@@ -19,6 +20,7 @@ mod feature_network;
 mod feature_slide;
 mod feature_strand;
 mod fold;
+mod follow;
 mod locate;
 mod net;
 mod quality;
@@ -31,6 +33,7 @@ mod walk;
 
 pub use feature_curve::{Family, FeatureCurve, FeatureError, FeatureGrid, Sections, relax_with_features};
 pub use feature_network::relax_network;
+pub use follow::follow;
 pub use quality::{GridQuality, measure};
 pub use resample::{resample, resample_with_features};
 pub use sizes::choose_sizes;
@@ -274,6 +277,17 @@ fn relax_patch(
     let cancelled = || observer.cancelled();
     let chart = chart::flatten(input, patch, stops, [cols, rows], &cancelled)?;
     let spots = springs::relax(&chart, cols, rows, params, caught, &cancelled)?;
+    Ok(laid(&chart, &spots, patch, (cols, rows), stops))
+}
+
+/// The grid with its nodes at `spots`, those of the sides at their exact places.
+fn laid(
+    chart: &chart::Chart,
+    spots: &[Spot],
+    patch: &PatchMesh,
+    (cols, rows): (usize, usize),
+    stops: &SideStops,
+) -> Grid {
     let mut grid = Grid {
         rows,
         cols,
@@ -294,5 +308,5 @@ fn relax_patch(
             grid.places[node] = chart.place(Spot { triangle, bary });
         }
     }
-    Ok(grid)
+    grid
 }

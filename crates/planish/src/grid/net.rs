@@ -120,7 +120,8 @@ impl<'a> Net<'a> {
         };
         let mut suspects: Vec<usize> = (0..cells).collect();
         loop {
-            let bad: Vec<usize> = suspects.into_iter().filter(|&c| turned(c, &uv, &points)).collect();
+            let bad: Vec<usize> =
+                (suspects.into_par_iter().with_min_len(PARALLEL_LENGTH)).filter(|&c| turned(c, &uv, &points)).collect();
             if bad.is_empty() {
                 break;
             }
@@ -173,7 +174,7 @@ fn is_twisted(points: &[DVec3], cols: usize, c: usize) -> bool {
 }
 
 /// Draws the corners of turned cells towards the mean of their neighbours, in the square.
-fn smooth_turned(uv: &mut [DVec2], cols: usize, rows: usize) {
+pub fn smooth_turned(uv: &mut [DVec2], cols: usize, rows: usize) {
     const SWEEPS: usize = 100;
     for _ in 0..SWEEPS {
         let bad: Vec<usize> = (0..(cols - 1) * (rows - 1)).filter(|&c| turns_over(uv, cols, c)).collect();

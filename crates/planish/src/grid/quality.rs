@@ -86,16 +86,16 @@ pub fn surface(points: &[DVec3], cols: usize, rows: usize) -> TriMesh {
     for j in 0..rows as u32 - 1 {
         for i in 0..stride - 1 {
             let a = j * stride + i;
-            let [p, q, r, s] = [a, a + 1, a + 1 + stride, a + stride];
-            let at = |k: u32| points[k as usize];
-            if at(p).distance_squared(at(r)) <= at(q).distance_squared(at(s)) {
-                triangles.extend([[p, q, r], [p, r, s]]);
-            } else {
-                triangles.extend([[p, q, s], [q, r, s]]);
-            }
+            let corners = [a, a + 1, a + 1 + stride, a + stride];
+            triangles.extend(halves(corners.map(|k| points[k as usize])).map(|t| t.map(|k| corners[k])));
         }
     }
     TriMesh::new(points.to_vec(), triangles)
+}
+
+/// The two triangles of a cell, as numbers of its corners.
+pub fn halves([p, q, r, s]: [DVec3; 4]) -> [[usize; 3]; 2] {
+    if p.distance_squared(r) <= q.distance_squared(s) { [[0, 1, 2], [0, 2, 3]] } else { [[0, 1, 3], [1, 2, 3]] }
 }
 
 /// Number of cells that turn over, see [`measure`].

@@ -21,8 +21,8 @@ const MEANT_CELLS: f64 = 32.0;
 const DAMPING: f64 = 0.003;
 /// Largest move of a round, in cells.
 const LARGEST_MOVE: f64 = 0.5;
-/// Steps of conjugate gradients in a round.
-const CG_STEPS: usize = 24;
+/// Steps of conjugate gradients in a round, for a net that is far from rest.
+pub const CG_STEPS: usize = 24;
 /// Solves of a round, and the factor by which the damping grows from one to the next if the energy rises (as of
 /// Levenberg and Marquardt).
 const ATTEMPTS: usize = 4;
@@ -30,29 +30,30 @@ const DAMPING_STEP: f64 = 10.0;
 /// A round that lowers the energy by less than this fraction ends the resolution.
 const SETTLED: f64 = 1e-3;
 
-/// Settles `net` in up to `rounds` rounds.
+/// Settles `net` in up to `rounds` rounds of `steps` steps of conjugate gradients.
 pub fn settle<'a>(
     mut net: Net<'a>,
-    rounds: usize,
+    (rounds, steps): (usize, usize),
     params: &GridParams,
     cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Net<'a>, Fault> {
-    let mut energy = energy_of(&net, params);
+    let mut energy = None;
     let mut damping = DAMPING;
     for _ in 0..rounds {
         let system = System::new(&net, params);
-        let before = energy;
+        let before = energy.unwrap_or_else(|| system.energy());
+        let mut least = before;
         for attempt in 0..ATTEMPTS {
-            let Some(moves) = system.solve(damping, cancelled) else { return Err(Fault::Cancelled) };
+            let Some(moves) = system.solve(damping, steps, cancelled) else { return Err(Fault::Cancelled) };
             let trial = net.moved(true, &|k, fraction| {
                 let m = moves[k].clamp_length_max(LARGEST_MOVE) * fraction;
                 let [u, v] = system.tangents[k];
                 net.chart.advance(net.spots[k], u * m.x + v * m.y)
             });
             let reached = energy_of(&trial, params);
-            if reached < energy {
+            if reached < least {
                 net = trial;
-                energy = reached;
+                least = reached;
                 if attempt == 0 {
                     damping = (damping / DAMPING_STEP).max(DAMPING);
                 }
@@ -60,9 +61,10 @@ pub fn settle<'a>(
             }
             damping *= DAMPING_STEP;
         }
-        if energy >= before * (1.0 - SETTLED) {
+        if least >= before * (1.0 - SETTLED) {
             break;
         }
+        energy = Some(least);
     }
     Ok(net)
 }
@@ -214,6 +216,18 @@ impl System {
         System { cols, rows, tangents, curves, edges, cells, bends }
     }
 
+    /// The energy of the net, as [`energy_of`] sums it up.
+    fn energy(&self) -> f64 {
+        let mut sum = 0.0;
+        let mut n = 0;
+        for &(_, _, count) in &self.curves {
+            sum += self.edges[n..n + count].iter().map(|e| e.1.powi(2)).sum::<f64>();
+            n += count;
+        }
+        let sum = self.bends.iter().fold(sum, |sum, b| sum + b.3.powi(2));
+        self.cells.iter().fold(sum, |sum, c| sum + c.1.powi(2))
+    }
+
     /// `Jᵀ r` for residuals of edges and cells.
     fn transpose(&self, edge: &[f64], cell: &[f64], bend: &[f64], out: &mut [DVec2]) {
         out.fill(DVec2::ZERO);
@@ -263,7 +277,7 @@ impl System {
     }
 
     /// Moves that lower the linearised energy: conjugate gradients, preconditioned by the 2 x 2 blocks.
-    fn solve(&self, damping: f64, cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Vec<DVec2>> {
+    fn solve(&self, damping: f64, steps: usize, cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Vec<DVec2>> {
         let count = self.cols * self.rows;
         let mut edge: Vec<f64> = self.edges.iter().map(|e| e.1).collect();
         let mut cell: Vec<f64> = self.cells.iter().map(|c| c.1).collect();
@@ -309,7 +323,7 @@ impl System {
         let mut p = z.clone();
         let mut rz = dot(&r, &z);
         let first = rz;
-        for _ in 0..CG_STEPS {
+        for _ in 0..steps {
             if rz <= 1e-6 * first || cancelled() {
                 break;
             }

@@ -10,7 +10,7 @@ use super::even::{even, unevenness};
 use super::fold::{folded_cells, open_folds};
 use super::locate::Spot;
 use super::net::Net;
-use super::settle::settle;
+use super::settle::{CG_STEPS, settle};
 use super::{Fault, GridParams};
 
 /// Cells along the longer direction from which a grid is not made coarser.
@@ -49,7 +49,8 @@ pub fn relax(
     let mut net = coarsest(chart, c, r, params, cancelled)?;
     for (k, &(c, r)) in levels.iter().rev().skip(1).enumerate() {
         net = net.resampled(c, r);
-        net = settle(net, LATER_ROUNDS[k.min(LATER_ROUNDS.len() - 1)], params, cancelled)?;
+        let rounds = LATER_ROUNDS[k.min(LATER_ROUNDS.len() - 1)];
+        net = settle(net, (rounds, CG_STEPS), params, cancelled)?;
     }
     open_folds(&mut net, cancelled)?;
     catch(&mut net, caught, cancelled)?;
@@ -68,7 +69,7 @@ fn coarsest<'a>(
     let mut best: Option<(f64, Net<'a>)> = None;
     for rounds in EVEN_ROUNDS {
         let mut net = even(Net::regular(chart, cols, rows), rounds, cancelled)?;
-        net = settle(net, FIRST_ROUNDS, params, cancelled)?;
+        net = settle(net, (FIRST_ROUNDS, CG_STEPS), params, cancelled)?;
         open_folds(&mut net, cancelled)?;
         let folded = folded_cells(&net).len() as f64 / (net.points.len() as f64);
         let score = unevenness(&net) + FOLD_COST * folded;

@@ -223,8 +223,41 @@ pub fn imprint(mesh: &TriMesh, network: &Network) -> Result<Vec<PatchMesh>, Impr
         }
         curves.push(curve.points.iter().map(|p| place_of(&adjacency, &mesh.triangles, p)).collect());
     }
-    let borrowed: Vec<&[Place]> = curves.iter().map(|c| &c[..]).collect();
-    let cut = cut(mesh, &adjacency, &borrowed)?;
+    let chains: Vec<Chain> = curves.into_iter().enumerate().map(|(curve, places)| Chain { curve, places }).collect();
+    let whole: Vec<usize> = (0..chains.len()).collect();
+    let all: Vec<usize> = (0..network.patches.len()).collect();
+    let (made, lost) = cut_out(mesh, &adjacency, network, &chains, &whole, &all)?;
+    match lost {
+        Some((faces, p)) => Err(ImprintError::Uncovered { faces, x: p.x, y: p.y, z: p.z }),
+        None => Ok(made),
+    }
+}
+
+/// Places in a row along a curve.
+pub(super) struct Chain {
+    /// The curve that it is (a part of).
+    pub curve: usize,
+    /// Its places.
+    pub places: Vec<Place>,
+}
+
+/// Patches, and how many triangles belong to none of them, with the place of one.
+type CutOut = (Vec<PatchMesh>, Option<(usize, DVec3)>);
+
+/// Cuts `mesh` along `chains` and takes out the patches `which` of `network`.
+/// * `whole` - for each curve the chain that is all of it; only those of the sides of `which` are asked for
+/// # Errors
+/// As [`imprint`], but for parts that belong to no patch.
+pub(super) fn cut_out(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    network: &Network,
+    chains: &[Chain],
+    whole: &[usize],
+    which: &[usize],
+) -> Result<CutOut, ImprintError> {
+    let borrowed: Vec<&[Place]> = chains.iter().map(|c| &c.places[..]).collect();
+    let cut = cut(mesh, adjacency, &borrowed).map_err(|e| of_curve(e, chains))?;
     let cut_adjacency = Adjacency::new(&cut.mesh);
     let mut barrier = vec![false; 3 * cut.mesh.triangles.len()];
     let mut left: Vec<Vec<u32>> = Vec::with_capacity(cut.chains.len());
@@ -236,7 +269,7 @@ pub fn imprint(mesh: &TriMesh, network: &Network) -> Result<Vec<PatchMesh>, Impr
             let backward = half_edge(&cut.mesh.triangles, &cut_adjacency, pair[1], pair[0]);
             if forward.is_none() && backward.is_none() {
                 let p = cut.mesh.points[pair[0] as usize];
-                return Err(ImprintError::Jump { curve: c, x: p.x, y: p.y, z: p.z });
+                return Err(ImprintError::Jump { curve: chains[c].curve, x: p.x, y: p.y, z: p.z });
             }
             for h in [forward, backward].into_iter().flatten() {
                 barrier[h as usize] = true;
@@ -250,34 +283,36 @@ pub fn imprint(mesh: &TriMesh, network: &Network) -> Result<Vec<PatchMesh>, Impr
     }
     let side_edges = |p: usize, k: usize| {
         let side = network.patches[p].sides[k];
-        if side.reversed { &right[side.curve as usize] } else { &left[side.curve as usize] }
+        let chain = whole[side.curve as usize];
+        if side.reversed { &right[chain] } else { &left[chain] }
     };
     let mut seeds = Vec::new();
-    for p in 0..network.patches.len() {
+    for (n, &p) in which.iter().enumerate() {
         for k in 0..4 {
             for &h in side_edges(p, k) {
                 if h == NONE {
                     return Err(ImprintError::NotADisk { patch: p, why: "a side has no surface on its left" });
                 }
-                seeds.push((h, p as u32));
+                seeds.push((h, n as u32));
             }
         }
     }
     let name = flood(&cut, &cut_adjacency, &barrier, &seeds)
-        .map_err(|(a, _)| ImprintError::NotADisk { patch: a as usize, why: "it runs into another patch" })?;
-    let mut members = vec![Vec::new(); network.patches.len()];
+        .map_err(|(a, _)| ImprintError::NotADisk { patch: which[a as usize], why: "it runs into another patch" })?;
+    let mut members = vec![Vec::new(); which.len()];
     let mut lost = Vec::new();
     for (f, &p) in name.iter().enumerate() {
         if p == NONE { lost.push(f) } else { members[p as usize].push(f as u32) }
     }
-    if let Some(&f) = lost.first() {
-        let p = cut.mesh.corners(f)[0];
-        return Err(ImprintError::Uncovered { faces: lost.len(), x: p.x, y: p.y, z: p.z });
+    let lost = lost.first().map(|&f| (lost.len(), cut.mesh.corners(f)[0]));
+    // A part that no patch covers is told before a patch that is not in order.
+    if lost.is_some() && which.len() == network.patches.len() {
+        return Ok((Vec::new(), lost));
     }
-    members
+    let made: Result<Vec<PatchMesh>, ImprintError> = members
         .par_iter()
-        .enumerate()
-        .map(|(p, faces)| {
+        .zip(which)
+        .map(|(faces, &p)| {
             let not = |why| ImprintError::NotADisk { patch: p, why };
             let first = *side_edges(p, 0).first().ok_or(not("a side has no length"))?;
             let disk = Disk::new(&cut.mesh.triangles, &cut_adjacency, faces, |h| barrier[h as usize], first)
@@ -292,9 +327,24 @@ pub fn imprint(mesh: &TriMesh, network: &Network) -> Result<Vec<PatchMesh>, Impr
                 at += n;
                 side
             });
-            Ok(patch_mesh(mesh, &adjacency, &cut, &disk, sides))
+            Ok(patch_mesh(mesh, adjacency, &cut, &disk, sides))
         })
-        .collect()
+        .collect();
+    Ok((made?, lost))
+}
+
+/// An error of chains with the numbers of their curves.
+fn of_curve(error: ImprintError, chains: &[Chain]) -> ImprintError {
+    let name = |c: usize| chains.get(c).map_or(c, |chain| chain.curve);
+    match error {
+        ImprintError::Jump { curve, x, y, z } => ImprintError::Jump { curve: name(curve), x, y, z },
+        ImprintError::Crossing { curves, x, y, z } => {
+            let mut curves: Vec<usize> = curves.into_iter().map(name).collect();
+            curves.dedup();
+            ImprintError::Crossing { curves, x, y, z }
+        }
+        other => other,
+    }
 }
 
 /// A patch as a mesh of its own.

@@ -6,11 +6,13 @@ mod edit;
 mod edit_split;
 pub(crate) mod imprint;
 mod layout;
+mod reimprint;
 
 pub use diagnose::{Diagnosis, Fault, Region, diagnose, glance};
 pub use edit::{EditError, Editor};
 pub use imprint::{ImprintError, imprint};
 pub use layout::{LayoutError, LayoutParams, layout, layout_tagged};
+pub use reimprint::{changed_patches, reimprint};
 
 use crate::mesh::{FacePoint, TriMesh};
 use serde::{Deserialize, Serialize};

@@ -1,11 +1,12 @@
 //! Fits of a symmetric network: surfaces behind a plane of symmetry as exact mirror images of those before it.
 //!
 //! 1. corners and patches are matched with their images; nothing is done unless every patch has one
-//! 2. before the plane, boundaries in it are put into it exactly, and where that is asked for the control points next to
-//!    them level with them: what their steps from the boundary have along its normal in the plane is taken away, and the
-//!    surface has one tangent plane there
-//! 3. every patch behind the plane gets the mirror image of its mate. What the shape itself lacks of symmetry goes to
-//!    the reliefs.
+//! 2. before the plane, boundaries in it are put into it exactly, and where that is asked for the control points next
+//!    to them level with them: what their steps from the boundary have along its normal in the plane is taken away, and
+//!    the surface has one tangent plane there
+//! 3. every patch behind the plane gets the mirror image of its mate, and a patch that crosses the plane becomes its
+//!    own: its control points behind the plane are images of those before it. What the shape itself lacks of symmetry
+//!    goes to the reliefs.
 
 use super::Surface;
 use super::basis::{is_uniform, uniform_knots};
@@ -22,8 +23,8 @@ const SAME: f64 = 5e-3;
 /// into the plane at a flat angle its surface would turn over there.
 const LEAST_AWAY: f64 = 0.2;
 
-/// Puts mirror images of the surfaces before `plane` (on the side of its normal) in the place of those behind it. False,
-/// and nothing changed, if the network is not symmetric.
+/// Puts mirror images of the surfaces before `plane` (on the side of its normal) in the place of those behind it.
+/// False, and nothing changed, if the network is not symmetric.
 /// * `leveled` - make them level across the plane, too: before seams are smoothed, for it disturbs smooth ones
 pub fn mirror_surfaces(
     mesh: &TriMesh,
@@ -36,13 +37,23 @@ pub fn mirror_surfaces(
     if surfaces.len() != network.patches.len() {
         return false;
     }
-    for p in (0..surfaces.len()).filter(|&p| matched.is_before(p)) {
+    // A patch that is its own image across its diagonal needs as many control points along u as along v.
+    let is_own = |p: usize| matched.mates[p].0 == p;
+    let turns = |p: usize| matched.mates[p].1.is_multiple_of(2);
+    if (0..surfaces.len()).any(|p| is_own(p) && turns(p) && surfaces[p].rows != surfaces[p].cols) {
+        return false;
+    }
+    for p in (0..surfaces.len()).filter(|&p| is_own(p) || matched.is_before(p)) {
+        if is_own(p) {
+            fold_over(&mut surfaces[p], matched.mates[p].1, plane);
+            continue;
+        }
         flatten(&mut surfaces[p], &matched, network, plane, p);
         if leveled {
             level(&mut surfaces[p], &matched, network, plane, p);
         }
     }
-    for q in (0..surfaces.len()).filter(|&q| !matched.is_before(q)) {
+    for q in (0..surfaces.len()).filter(|&q| !is_own(q) && !matched.is_before(q)) {
         surfaces[q] = image(&surfaces[matched.mates[q].0], &matched, network, plane, q);
     }
     true
@@ -92,8 +103,7 @@ impl Matched {
             })
         };
         let mates: Vec<(usize, usize)> = (0..count).map(mate_of).collect::<Option<_>>()?;
-        // A patch that is its own image crosses the plane.
-        if (0..count).any(|p| mates[p].0 == p || mates[mates[p].0].0 != p) {
+        if (0..count).any(|p| mates[mates[p].0].0 != p) {
             return None;
         }
         let heights: Vec<f64> =
@@ -153,8 +163,8 @@ fn flatten(surface: &mut Surface, matched: &Matched, network: &Network, plane: &
     }
 }
 
-/// Puts the control points next to boundaries in the plane level with them, but those of the curves that end there: they
-/// belong to two patches.
+/// Puts the control points next to boundaries in the plane level with them, but those of the curves that end there:
+/// they belong to two patches.
 fn level(surface: &mut Surface, matched: &Matched, network: &Network, plane: &Plane, p: usize) {
     for k in (0..4).filter(|&k| matched.side_in_plane(network, p, k)) {
         for n in 1..side_len(surface.rows, surface.cols, k) - 1 {
@@ -179,7 +189,7 @@ fn image(mate: &Surface, matched: &Matched, network: &Network, plane: &Plane, q:
     // Corner k of q is the image of corner s - k: u and v swap where s is even.
     let swap = s.is_multiple_of(2);
     let (cols, rows) = if swap { (mate.rows, mate.cols) } else { (mate.cols, mate.rows) };
-    let (turn_u, turn_v) = [(false, false), (true, false), (true, true), (false, true)][s];
+    let [turn_u, turn_v] = turned(s);
     let knots = |of: &[f64], turned: bool| -> Vec<f64> {
         match turned {
             true if is_uniform(of) => uniform_knots(of.len() - 4),
@@ -187,15 +197,45 @@ fn image(mate: &Surface, matched: &Matched, network: &Network, plane: &Plane, q:
             false => of.to_vec(),
         }
     };
-    // The first parameter of the mate is `u` of q, or `v` where they swap; turned as the corners tell.
-    let at = |i: usize, j: usize| {
-        let (a, b) = if swap { (j, i) } else { (i, j) };
-        let a = if turn_u { mate.cols - 1 - a } else { a };
-        let b = if turn_v { mate.rows - 1 - b } else { b };
-        control[b * mate.cols + a]
-    };
+    let control_at = |i: usize, j: usize| control[counterpart(mate, s, i, j)];
     let (knots_a, knots_b) = (knots(&mate.knots_u, turn_u), knots(&mate.knots_v, turn_v));
     let (knots_u, knots_v) = if swap { (knots_b, knots_a) } else { (knots_a, knots_b) };
-    let control = (0..rows).flat_map(|j| (0..cols).map(move |i| (i, j))).map(|(i, j)| at(i, j)).collect();
+    let control = (0..rows).flat_map(|j| (0..cols).map(move |i| (i, j))).map(|(i, j)| control_at(i, j)).collect();
     Surface { rows, cols, control, knots_u, knots_v }
+}
+
+/// Control point of `mate` whose image is `(i, j)` of a patch whose first corner is the image of corner `s` of the
+/// mate.
+fn counterpart(mate: &Surface, s: usize, i: usize, j: usize) -> usize {
+    // The first parameter of the mate is `u` of the patch, or `v` where they swap; turned as the corners tell.
+    let (a, b) = if s.is_multiple_of(2) { (j, i) } else { (i, j) };
+    let [turn_u, turn_v] = turned(s);
+    let a = if turn_u { mate.cols - 1 - a } else { a };
+    let b = if turn_v { mate.rows - 1 - b } else { b };
+    b * mate.cols + a
+}
+
+/// Whether the parameters of the mate run against those of the image.
+fn turned(s: usize) -> [bool; 2] {
+    [[false, false], [true, false], [true, true], [false, true]][s]
+}
+
+/// Makes the surface of a patch that crosses the plane its own image: control points behind the plane become images of
+/// their counterparts before it, and those that are their own counterparts go into the plane.
+fn fold_over(surface: &mut Surface, s: usize, plane: &Plane) {
+    let before = surface.control.clone();
+    // Of two counterparts the higher one counts; at the same height neighbours must agree which, so places decide.
+    let rank = |k: usize| (plane.height(before[k]), before[k].to_array());
+    for j in 0..surface.rows {
+        for i in 0..surface.cols {
+            let (k, other) = (j * surface.cols + i, counterpart(surface, s, i, j));
+            surface.control[k] = if k == other {
+                before[k] - plane.normal * plane.height(before[k])
+            } else if rank(k) >= rank(other) {
+                before[k]
+            } else {
+                plane.mirror(before[other])
+            };
+        }
+    }
 }

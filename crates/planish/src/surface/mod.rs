@@ -4,7 +4,7 @@
 //! 1. basis and evaluation - `basis`, `evaluate`      2. one grid - `fit`, eq. 4.4
 //! 3. a network without gaps and folds - `network_fit`, `resolution`, `fold`
 //! 4. smooth seams - `corner`, `seam_curve`, `stitch`, §8.1      5. how good it is - `quality`, eq. 6.1
-//! 6. exact mirror images where there is a plane of symmetry - `mirrored`
+//! 6. exact mirror images where there is a plane of symmetry - `mirrored`      7. after small edits - `retouch`
 
 pub mod basis;
 mod corner;
@@ -16,6 +16,7 @@ mod mirrored;
 mod network_fit;
 mod quality;
 mod resolution;
+mod retouch;
 mod seam_curve;
 mod sides;
 mod stitch;
@@ -29,6 +30,7 @@ pub use mirrored::mirror_surfaces;
 pub use network_fit::{FitParams, fit_network};
 pub use quality::{Deviation, SeamAngle, SeamQuality, deviation, deviation_of, measure_seams, seam_angles};
 pub use resolution::Resolution;
+pub use retouch::retouch;
 pub(crate) use sides::{check, node};
 pub use stitch::{StitchParams, stitch};
 

@@ -25,7 +25,7 @@ const ROUNDS: usize = 3;
 
 /// Weights of the smoothing that folded patches get, one after the other until they are open: from a tenth of what
 /// the nodes weigh to a surface that is all but the blend of its boundary.
-const SMOOTHING: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
+pub(super) const SMOOTHING: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
 
 /// How to fit the surfaces of a network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -183,7 +183,7 @@ pub(crate) fn patch_directions<'a>(
 }
 
 /// A curve through the first and the last node, as near as it can to the others.
-fn fit_curve(nodes: &[DVec3], direction: &Direction) -> Vec<DVec3> {
+pub(super) fn fit_curve(nodes: &[DVec3], direction: &Direction) -> Vec<DVec3> {
     let mut net = vec![DVec3::ZERO; direction.control()];
     net[0] = nodes[0];
     *net.last_mut().expect("at least 4 control points") = nodes[nodes.len() - 1];
