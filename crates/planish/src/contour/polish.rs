@@ -73,13 +73,13 @@ impl Lines {
 }
 
 /// Brings the vertices of `wishes` to their places, and merges triangles without area away.
-/// * `cells` - all cells with triangles, in the order of z, y, x
+/// * `cells` - makes the list of all cells with triangles, in the order of z, y, x
 /// * `kinds`, `edges` - the features; changed along with the mesh
 pub fn polish(
     mesh: &mut TriMesh,
     field: &Directed,
     base: [u32; 3],
-    cells: Vec<CellRange>,
+    cells: impl FnOnce() -> Vec<CellRange>,
     wishes: &[Wish],
     creases: Option<&dyn Creases>,
     kinds: &mut [FeatureKind],
@@ -104,7 +104,7 @@ pub fn polish(
     if seeds.is_empty() {
         return Polished::default();
     }
-    let mut local = Local::new(mesh, field, base, cells, &seeds);
+    let mut local = Local::new(mesh, field, base, cells(), &seeds);
     let mut targets: HashMap<u32, DVec3> = wishes.iter().copied().collect();
     let count = targets.len();
     let mut open: Vec<u32> = wishes.iter().map(|w| w.0).collect();
