@@ -19,7 +19,12 @@ fn random_grid(seed: u64, n: usize) -> ScalarGrid {
             if border { r + 0.05 } else { 2.0 * r - 1.0 }
         })
         .collect();
-    ScalarGrid { size: [n; 3], origin: DVec3::new(0.1, -0.2, 0.3), spacing: DVec3::new(1.0, 0.8, 1.3), values: Arc::new(values) }
+    ScalarGrid {
+        size: [n; 3],
+        origin: DVec3::new(0.1, -0.2, 0.3),
+        spacing: DVec3::new(1.0, 0.8, 1.3),
+        values: Arc::new(values),
+    }
 }
 
 /// Euler number of the part of a grid below zero, from those of cells, faces, edges and nodes.

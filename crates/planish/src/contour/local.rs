@@ -19,6 +19,8 @@ pub const GONE: [u32; 3] = [u32::MAX; 3];
 const NONE: u32 = u32::MAX;
 /// A triangle leans if its normal has a cosine below this with those of all hits among its corners.
 const LEAN: f64 = 0.5;
+/// Changed triangles within so many cells are compared with the same others.
+const CLOSE: f64 = 5.0;
 
 /// A mesh in the cells of its field, around some vertices.
 pub struct Local<'a> {
@@ -371,14 +373,23 @@ impl<'a> Local<'a> {
         };
         let mut sorted = changed.to_vec();
         sorted.sort_unstable();
+        let others = |low: DVec3, high: DVec3| -> Vec<u32> {
+            self.near(low, high).into_iter().filter(|t| sorted.binary_search(t).is_err()).collect()
+        };
+        // One look at the cells around all of them, unless they reach far.
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for &t in changed {
+            let (l, h) = bounds(t);
+            (low, high) = (low.min(l), high.max(h));
+        }
+        let near = (high - low).cmple(self.field.lattice.step * CLOSE).all().then(|| others(low, high));
         changed.iter().enumerate().all(|(n, &s)| {
             let own = bounds(s);
             changed[..n].iter().all(|&t| !meet(s, own, t))
-                && self
-                    .near(own.0, own.1)
-                    .into_iter()
-                    .filter(|t| sorted.binary_search(t).is_err())
-                    .all(|t| !meet(s, own, t))
+                && match &near {
+                    Some(near) => near.iter().all(|&t| !meet(s, own, t)),
+                    None => others(own.0, own.1).into_iter().all(|t| !meet(s, own, t)),
+                }
         })
     }
 

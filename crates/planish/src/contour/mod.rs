@@ -38,10 +38,10 @@ use face::FacePoints;
 use glam::DVec3;
 use octree::Octree;
 use patch::{INNER, Patcher, Scratch, Sheet};
-use survey::Survey;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use survey::Survey;
 
 /// How to extract.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -166,9 +166,7 @@ pub fn extract(
     let merged = |at: [usize; 3]| octree.as_ref().is_some_and(|o| o.is_merged(at));
     let surveys: Option<Vec<Survey>> = chunks
         .par_iter()
-        .map(|&layers| {
-            (!observer.cancelled()).then(|| survey::survey(field, &points, &limits, base, layers, merged))
-        })
+        .map(|&layers| (!observer.cancelled()).then(|| survey::survey(field, &points, &limits, base, layers, merged)))
         .collect();
     let surveys = surveys.ok_or(ContourError::Cancelled)?;
     observer.progress(0.3);

@@ -11,8 +11,8 @@ use super::caps::{self, Corner, FACE_POINT};
 use super::cell::{AMBIGUOUS, CROSSED, EDGE_FACES, EDGES, chain, joined_by_hits, joined_by_values};
 use super::face::FacePoints;
 use super::feature::{Shape, classify, solve};
-use super::topology::Trilinear;
 use super::local::CellRange;
+use super::topology::Trilinear;
 use super::walk::Cell;
 use crate::field::{Creases, Directed};
 use crate::geom::predicates::triangles_meet;
@@ -496,8 +496,8 @@ pub fn best_fan(points: &[DVec3], free: impl Fn(usize, usize) -> bool) -> Option
         let o = at(0);
         let cross = |a: DVec3, b: DVec3| (a - o).cross(b - o).dot(normal);
         // Seen along the normal: a fan within half a turn, every triangle the right way round.
-        let safe = n == 4
-            || (2..n).all(|k| cross(at(1), at(k)) > 0.0) && (2..n - 1).all(|k| cross(at(k), at(k + 1)) > 0.0);
+        let safe =
+            n == 4 || (2..n).all(|k| cross(at(1), at(k)) > 0.0) && (2..n - 1).all(|k| cross(at(k), at(k + 1)) > 0.0);
         if !safe {
             continue;
         }

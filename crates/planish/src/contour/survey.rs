@@ -78,7 +78,9 @@ pub fn survey(
         };
         let id = |k: usize| ids[if s + k < edges.len() { s + k } else { s + k - edges.len() }];
         found.cells.push((cell.at.map(|x| x as u32), before));
-        found.triangles.extend((1..edges.len() - 1).map(|k| [id(0), id(k), id(k + 1)]));
+        for k in 1..edges.len() - 1 {
+            found.triangles.push([id(0), id(k), id(k + 1)]);
+        }
     });
     found
 }
@@ -94,7 +96,8 @@ impl Survey {
         self.triangles.len()
     }
 
-    /// The triangles of smooth cells and those of `sheet` in the order of their cells.
+    /// The triangles of smooth cells and those of `sheet` in the order of their cells; a sheet that tells nothing of
+    /// smooth cells comes after them.
     /// * `name` - names of the vertices of the sheet
     pub fn merge(&self, sheet: &Sheet, name: impl Fn(u32) -> u32, triangles: &mut Vec<[u32; 3]>) {
         let mut done = 0;
@@ -104,6 +107,9 @@ impl Survey {
             triangles.extend(sheet.triangles[from as usize..to as usize].iter().map(|t| t.map(&name)));
         }
         triangles.extend_from_slice(&self.triangles[done..]);
+        if sheet.before.is_empty() {
+            triangles.extend(sheet.triangles.iter().map(|t| t.map(&name)));
+        }
     }
 
     /// All cells with the numbers of their triangles, in their order; the first has the number `first`.
@@ -121,6 +127,9 @@ impl Survey {
             let Some((place, count)) = next else { break };
             cells.push((place, at, at + count));
             at += count;
+        }
+        if sheet.before.is_empty() {
+            cells.extend(sheet.cells.iter().map(|&(place, from, to)| (place, at + from, at + to)));
         }
     }
 }

@@ -83,9 +83,13 @@ fn row_of_cells(
     let past = |bits: &[u64], w: usize, end: u64| bits[w] >> 1 | bits.get(w + 1).map_or(end, |b| b << 63);
     for w in 0..low.words {
         // Bits of the corners of 64 cells, in their order.
-        let corners: [u64; 8] =
-            std::array::from_fn(|c| if c & 1 == 0 { sides[c / 2][w] } else { past(sides[c / 2], w, 0) });
-        let (or, and) = corners.iter().fold((0, !0), |(or, and), c| (or | c, and & c));
+        let mut corners = [0; 8];
+        let (mut or, mut and) = (0, !0);
+        for (s, side) in sides.iter().enumerate() {
+            (corners[2 * s], corners[2 * s + 1]) = (side[w], past(side, w, 0));
+            or |= corners[2 * s] | corners[2 * s + 1];
+            and &= corners[2 * s] & corners[2 * s + 1];
+        }
         let mut rest = or & !and & directed::below(field.lattice.cells[0], w);
         if rest != 0 && field.sides.unknown {
             rest = known.iter().fold(rest, |rest, known| rest & known[w] & past(known, w, 1 << 63));
@@ -95,7 +99,10 @@ fn row_of_cells(
             let i = 64 * w + b as usize;
             rest &= rest - 1;
             cell.at[0] = i;
-            cell.config = (0..8).fold(0, |config, c| config | ((corners[c] >> b & 1) as u8) << c);
+            cell.config = 0;
+            for (c, bits) in corners.iter().enumerate() {
+                cell.config |= ((bits >> b & 1) as u8) << c;
+            }
             let crossed = CROSSED[cell.config as usize] as u32;
             if field.sides.unknown {
                 // Cells may have been left out, with their hits.

@@ -239,6 +239,9 @@ pub fn clear(t: f64) -> f64 {
     if t.is_nan() { 0.5 } else { t.clamp(CLEARANCE, 1.0 - CLEARANCE) }
 }
 
+/// The hits of a row for which a source gave none: on the edge along an axis from a node of the row.
+pub type Missing<'a> = Box<dyn FnMut(usize, usize) -> Hit + 'a>;
+
 impl Directed {
     /// Number of hits on all axes.
     pub fn hit_count(&self) -> usize {
@@ -265,6 +268,17 @@ impl Directed {
         axes: [Hits; 3],
         missing: &(dyn Fn(usize, [usize; 3]) -> Hit + Sync),
     ) -> Directed {
+        let row = |j: usize, k: usize| -> Missing { Box::new(move |axis, i| missing(axis, [i, j, k])) };
+        Directed::assemble_rows(lattice, sides, axes, &row)
+    }
+
+    /// [`Directed::assemble`] for sources that answer faster row by row: `missing(j, k)` is asked once for each row.
+    pub fn assemble_rows<'a>(
+        lattice: Lattice,
+        sides: Sides,
+        axes: [Hits; 3],
+        missing: &(dyn Fn(usize, usize) -> Missing<'a> + Sync),
+    ) -> Directed {
         let words = lattice.words();
         let bits = |row: usize| {
             let (mut inside, mut known) = (vec![0; words], vec![0; words]);
@@ -282,6 +296,7 @@ impl Directed {
                 let mut out: [Plane; 3] = Default::default();
                 for j in 0..ny {
                     let row = lattice.row(j, k);
+                    let mut missing = missing(j, k);
                     let (a, known_a) = &here[j];
                     let shifted = shift(a);
                     let known_shifted = shift(known_a);
@@ -290,7 +305,7 @@ impl Directed {
                         crossing[w] = (a[w] ^ shifted[w]) & known_a[w] & known_shifted[w];
                     }
                     mask_past(&mut crossing, lattice.cells[0]);
-                    out[0].take(&axes[0], row, &crossing, |i| missing(0, [i, j, k]));
+                    out[0].take(&axes[0], row, &crossing, |i| missing(0, i));
                     for (axis, other) in
                         [(1, (j + 1 < ny).then(|| &here[j + 1])), (2, above.as_ref().map(|above| &above[j]))]
                     {
@@ -301,7 +316,7 @@ impl Directed {
                             }
                             mask_past(&mut crossing, lattice.nodes(0));
                         }
-                        out[axis].take(&axes[axis], row, &crossing, |i| missing(axis, [i, j, k]));
+                        out[axis].take(&axes[axis], row, &crossing, |i| missing(axis, i));
                     }
                 }
                 out
@@ -335,7 +350,7 @@ struct Plane {
 }
 
 impl Plane {
-    fn take(&mut self, given: &Hits, row: usize, crossing: &[u64], missing: impl Fn(usize) -> Hit) {
+    fn take(&mut self, given: &Hits, row: usize, crossing: &[u64], mut missing: impl FnMut(usize) -> Hit) {
         let before = self.at.len();
         let (places, first) = given.row(row);
         let mut n = 0;

@@ -161,7 +161,7 @@ impl Levels {
     /// The value at a node.
     pub fn at(&self, [i, j, k]: [usize; 3]) -> f64 {
         // Below the first sample wraps around to far beyond the last.
-        let [i, j, k] = [i, j, k].map(|n| n.wrapping_sub(self.pad));
+        let (i, j, k) = (i.wrapping_sub(self.pad), j.wrapping_sub(self.pad), k.wrapping_sub(self.pad));
         if i >= self.size[0] || j >= self.size[1] || k >= self.size[2] {
             return self.far() as f64;
         }
@@ -171,9 +171,7 @@ impl Levels {
     /// As far outside as any number is from the level; asked for only where the surface meets the border.
     fn far(&self) -> f32 {
         let level = |&v: &f32| self.level(v).abs();
-        *self.far.get_or_init(|| {
-            self.values.par_iter().map(level).filter(|v| v.is_finite()).reduce(|| 1e-30, f32::max)
-        })
+        *self.far.get_or_init(|| self.values.par_iter().map(level).filter(|v| v.is_finite()).reduce(|| 1e-30, f32::max))
     }
 
     /// Bits of the nodes of row `(., j, k)` that are inside, and of those that are known.
@@ -186,9 +184,9 @@ impl Levels {
             return;
         }
         let row = &self.values[(k * ny + j) * nx..][..nx];
-        let sign = self.sign as f32;
+        let (sign, bound) = (self.sign as f32, self.bound);
         for (w, chunk) in row.chunks(64).enumerate() {
-            inside[w] = mask(chunk, |v| sign * v < self.bound);
+            inside[w] = mask(chunk, |v| sign * v < bound);
             if chunk.iter().fold(false, |any, v| any | v.is_nan()) {
                 known[w] = !mask(chunk, f32::is_nan);
             }
@@ -204,16 +202,17 @@ impl Levels {
 }
 
 /// One bit for each of up to 64 numbers.
+#[inline(always)]
 fn mask(row: &[f32], test: impl Fn(f32) -> bool) -> u64 {
+    let mut bytes = [0u8; 64];
+    for (b, &v) in bytes.iter_mut().zip(row) {
+        *b = test(v) as u8;
+    }
     let mut word = 0;
-    for (n, eight) in row.chunks(8).enumerate() {
-        let mut bytes = [0u8; 8];
-        match <&[f32; 8]>::try_from(eight) {
-            Ok(eight) => bytes = eight.map(|v| test(v) as u8),
-            Err(_) => bytes.iter_mut().zip(eight).for_each(|(b, &v)| *b = test(v) as u8),
-        }
+    for (n, eight) in bytes.chunks_exact(8).enumerate() {
         // The product gathers the lowest bits of eight bytes in its highest byte.
-        word |= (u64::from_le_bytes(bytes).wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * n);
+        let eight = eight.iter().rev().fold(0, |all, &b| all << 8 | b as u64);
+        word |= (eight.wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * n);
     }
     word
 }
@@ -279,6 +278,9 @@ impl Slabs<'_> {
 }
 
 fn hit(levels: &Levels, lattice: &Lattice, axis: usize, at: [usize; 3], rule: GradientRule) -> Hit {
+    if let Some(hit) = (rule == GradientRule::Trilinear).then(|| inner_hit(levels, lattice, axis, at)).flatten() {
+        return hit;
+    }
     let mut end = at;
     end[axis] += 1;
     let get = |p: [usize; 3]| levels.at(p);
@@ -307,4 +309,30 @@ fn hit(levels: &Levels, lattice: &Lattice, axis: usize, at: [usize; 3], rule: Gr
     let mut fallback = DVec3::ZERO;
     fallback[axis] = if f1 > f0 { 1.0 } else { -1.0 };
     Hit { t: directed::clear(t), normal: normal.try_normalize().unwrap_or(fallback) }
+}
+
+/// [`hit`] by the trilinear rule on an edge with known samples all around: the same numbers by fewer steps.
+fn inner_hit(levels: &Levels, lattice: &Lattice, axis: usize, at: [usize; 3]) -> Option<Hit> {
+    let size = levels.size;
+    for a in 0..3 {
+        if at[a] < 1 + levels.pad || at[a] + 2 + levels.pad + (a == axis) as usize > size[a] + 2 * levels.pad {
+            return None;
+        }
+    }
+    let step = [1, size[0], size[0] * size[1]];
+    let low = (at[2] - levels.pad) * step[2] + (at[1] - levels.pad) * step[1] + at[0] - levels.pad;
+    let high = low + step[axis];
+    let get = |n: usize| levels.level(levels.values[n]) as f64;
+    let (f0, f1) = (get(low), get(high));
+    let t = f0 / (f0 - f1);
+    let mut normal = DVec3::ZERO;
+    normal[axis] = (f1 - f0) / lattice.step[axis];
+    for a in [(axis + 1) % 3, (axis + 2) % 3] {
+        let central = |n: usize| (get(n + step[a]) - get(n - step[a])) / (2.0 * lattice.step[a]);
+        normal[a] = central(low) * (1.0 - t) + central(high) * t;
+    }
+    if normal.is_nan() {
+        return None;
+    }
+    Some(Hit { t: directed::clear(t), normal: normal.try_normalize()? })
 }
