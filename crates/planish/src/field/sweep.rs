@@ -308,7 +308,7 @@ impl<'a> Corner<'a> {
         let (center, way) = (aabb.center(), SLACK * aabb.diagonal());
         let mut moves: Vec<(f64, u32)> = Vec::new();
         let mut least = f64::INFINITY;
-        let mut take = |m: u32, limit: &mut f64| {
+        let take = |m: u32, limit: &mut f64| {
             let value = milling.swept(&milling.moves[m as usize], center).0;
             least = least.min(value);
             *limit = least + way;
