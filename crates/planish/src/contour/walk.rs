@@ -112,8 +112,8 @@ fn row_of_cells(
                     }
                 }
             }
+            cell.hit[..4].copy_from_slice(&next[..4]);
             for l in 0..4 {
-                cell.hit[l] = next[l];
                 next[l] += crossed >> l & 1;
             }
             // Edges 4 and 5, 6 and 7, 8 and 9, 10 and 11 lie in one list: at this node and at the next.

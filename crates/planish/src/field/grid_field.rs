@@ -336,3 +336,47 @@ fn inner_hit(levels: &Levels, lattice: &Lattice, axis: usize, at: [usize; 3]) ->
     }
     Some(Hit { t: directed::clear(t), normal: normal.try_normalize()? })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Silent;
+    use crate::geom::random;
+
+    #[test]
+    fn rows_of_2_to_130_numbers_have_the_sides_of_their_numbers_closed_or_not_and_above_as_below_of_the_negative() {
+        for nx in [2, 3, 61, 62, 63, 64, 65, 66, 127, 128, 130] {
+            let number = |v: usize| match random::unit(nx as u64, v as u64) {
+                r if r < 0.05 => f32::NAN,
+                r => (r - 0.5) as f32,
+            };
+            let values: Vec<f32> = (0..nx * 6).map(number).collect();
+            let grid = |values: Vec<f32>| ScalarGrid {
+                size: [nx, 3, 2],
+                origin: DVec3::ZERO,
+                spacing: DVec3::ONE,
+                values: Arc::new(values),
+            };
+            for close in [false, true] {
+                let below = GridParams { iso: 0.1, close, ..Default::default() };
+                let above = GridParams { iso: -0.1, body: Body::Above, ..below.clone() };
+                let field = sample_grid(&grid(values.clone()), &below, &Silent).unwrap();
+                let turned = sample_grid(&grid(values.iter().map(|v| -v).collect()), &above, &Silent).unwrap();
+                assert_eq!(field.sides.changes, turned.sides.changes);
+                assert!((0..3).all(|a| field.axes[a].hits == turned.axes[a].hits));
+                let pad = close as usize;
+                let words = field.lattice.words();
+                let (mut inside, mut known) = (vec![0; words], vec![0; words]);
+                for (row, numbers) in values.chunks(nx).enumerate() {
+                    let row = field.lattice.row(row % 3 + pad, row / 3 + pad);
+                    field.sides.bits(row, &mut inside, &mut known);
+                    for (i, v) in numbers.iter().enumerate() {
+                        let bit = |bits: &[u64]| bits[(i + pad) / 64] >> ((i + pad) % 64) & 1 == 1;
+                        assert_eq!(bit(&known), !v.is_nan(), "{nx} {close} {i}");
+                        assert_eq!(bit(&known) && bit(&inside), (*v as f64) < 0.1, "{nx} {close} {i}");
+                    }
+                }
+            }
+        }
+    }
+}
