@@ -21,9 +21,9 @@ const MOST: usize = nest::MOST;
 const ASIDE: f64 = 2.0;
 /// A sheet is fitted again to at least this many points of its own: twice the parameters of a height field.
 const FEWEST_OWN: usize = 12;
-/// Rounds of that, and what a round may cost more, in squared noise levels.
+/// Rounds of that, and the balls that are tried, over the one that is heard.
 const REFINED: usize = 3;
-const WORSE: f64 = 4.0;
+const WIDTHS: [f64; 3] = [1.0, 1.5, 2.2];
 /// Passes over all cells: the second chooses among what the first has found.
 const PASSES: usize = 2;
 /// The middle of the points of a cell is at most this many supports from its surface: at a corner of 90 degrees a tenth.
@@ -98,7 +98,7 @@ pub(super) fn cells(
             if old.as_ref().is_some_and(|f| f.plain) {
                 return old.clone();
             }
-            let new = find(&places[site], site as u32, tree, &candidates, &around);
+            let new = find(&places[site], site as u32, pass > 0, tree, &candidates, &around);
             match (old, new) {
                 (Some(o), Some(n)) => Some(if n.total < o.total { n } else { o.clone() }),
                 (o, n) => n.or_else(|| o.clone()),
@@ -173,13 +173,19 @@ impl Found {
     }
 }
 
-fn find(place: &Place, site: u32, tree: &KdTree, candidates: &[Candidate], around: &KdTree) -> Option<Found> {
+fn find(
+    place: &Place,
+    site: u32,
+    again: bool,
+    tree: &KdTree,
+    candidates: &[Candidate],
+    around: &KdTree,
+) -> Option<Found> {
     let &Place { center, support, noise } = place;
     let mut ball = Vec::new();
     tree.within(center, HEARD * support, |_, q, _| ball.push(q));
-    let all_points = ball;
-    let step = all_points.len().div_ceil(ENOUGH).max(1);
-    let ball: Vec<DVec3> = all_points.iter().copied().step_by(step).collect();
+    let step = ball.len().div_ceil(ENOUGH).max(1);
+    let ball: Vec<DVec3> = ball.into_iter().step_by(step).collect();
     let count = ball.len().max(1) as f64;
     let residuals = |q: &Quadric| -> Vec<f64> { ball.iter().map(|&x| q.distance(x).0 / noise).collect() };
     // Candidates, those of the site first, then by distance.
@@ -228,15 +234,29 @@ fn find(place: &Place, site: u32, tree: &KdTree, candidates: &[Candidate], aroun
         found.order.iter().map(|&k| (asked[k].quadric, asked[k].at, asked[k].error)).collect();
     let prices = found.total - found.cost;
     let mut spent = found.cost;
-    // Every point tells of the sheet that decides at it, and of no other; then once more.
-    let rounds = if sheets.len() > 1 { REFINED } else { 0 };
-    for _ in 0..rounds {
-        let better = refined(&sheets, found.concave, place, &all_points);
-        let next = ball.iter().map(|&q| (joined(&better, found.concave, q).1 / noise).powi(2).min(LIMIT * LIMIT)).sum();
-        if next > spent + WORSE {
-            break;
+    // Every point tells of the sheet that decides at it, and of no other. The wider the ball the less chance has a say, as
+    // long as the points around the site agree: Akaike's criterion, here with points of which some are not asked.
+    let spread = |sheets: &[(Quadric, DVec3, f64)]| -> (f64, f64) {
+        let (mut cost, mut luck) = (0.0, 0.0);
+        for &q in &ball {
+            let (k, d) = joined(sheets, found.concave, q);
+            cost += (d / noise).powi(2).min(LIMIT * LIMIT);
+            luck += 2.0 * (sheets[k].2 / noise).powi(2);
         }
-        (sheets, spent) = (better, next);
+        (cost, cost + luck)
+    };
+    // What the site has found before is refined already.
+    let known = again && found.order.iter().all(|&k| asked[k].owner == site);
+    let rounds = if sheets.len() > 1 && !known { REFINED } else { 0 };
+    let mut worth = spread(&sheets).1;
+    for _ in 0..rounds {
+        let tried = WIDTHS.into_iter().map(|width| {
+            let better = refined(&sheets, found.concave, place, width * HEARD * support, tree);
+            let (cost, worth) = spread(&better);
+            (better, cost, worth)
+        });
+        let Some(best) = tried.min_by(|a, b| a.2.total_cmp(&b.2)).filter(|b| b.2 < worth) else { break };
+        (sheets, spent, worth) = best;
     }
     let plain = sheets.len() == 1 && spent < PLAIN * count + count.sqrt();
     Some(Found { sheets, concave: found.concave, total: spent + prices, cost: spent / count, plain })
@@ -254,16 +274,21 @@ fn joined(sheets: &[(Quadric, DVec3, f64)], concave: u8, p: DVec3) -> (usize, f6
     best
 }
 
-/// Every sheet fitted again to the points at which it decides.
-fn refined(sheets: &[(Quadric, DVec3, f64)], concave: u8, place: &Place, ball: &[DVec3]) -> Vec<(Quadric, DVec3, f64)> {
-    let radius = HEARD * place.support;
+/// Every sheet fitted again to the points of a ball at which it decides.
+fn refined(
+    sheets: &[(Quadric, DVec3, f64)],
+    concave: u8,
+    place: &Place,
+    radius: f64,
+    tree: &KdTree,
+) -> Vec<(Quadric, DVec3, f64)> {
     let mut points: Vec<Vec<Weighted>> = vec![Vec::new(); sheets.len()];
-    for &q in ball {
+    tree.within(place.center, radius, |_, q, _| {
         let (k, d) = joined(sheets, concave, q);
         if d.abs() < LIMIT * place.noise {
             points[k].push(Weighted { y: (q - place.center) / radius, weight: 1.0 });
         }
-    }
+    });
     sheets
         .iter()
         .zip(&points)
