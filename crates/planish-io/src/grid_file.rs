@@ -210,7 +210,7 @@ fn nrrd(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
         other => return Err(unsupported(format!("the encoding \"{other}\""), encoding_line)),
     };
     agree(&body, needed, size, data)?;
-    checked(ScalarGrid { size, origin, spacing, values: kind.numbers(&body, big) }, line)
+    checked(ScalarGrid { size, origin, spacing, values: kind.numbers(&body, big).into() }, line)
 }
 
 /// Axis-parallel directions as spacings.
@@ -339,7 +339,7 @@ fn npy(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
         }
         values
     };
-    Ok(ScalarGrid { size, origin: DVec3::ZERO, spacing: DVec3::ONE, values })
+    Ok(ScalarGrid { size, origin: DVec3::ZERO, spacing: DVec3::ONE, values: values.into() })
 }
 
 #[cfg(test)]

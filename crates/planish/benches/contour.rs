@@ -26,6 +26,7 @@ use planish::mesh::{
 };
 use planish::{DVec3, Silent};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Times are the least of so many rounds: what others do on the machine only ever adds.
@@ -130,7 +131,8 @@ fn grid(figures: &mut Figures) {
         let p = DVec3::new(at(v % n), at(v / n % n), at(v / n / n));
         (p.length() - 1.0 + 0.02 * (9.0 * p.x).sin() * (8.0 * p.y).cos()) as f32
     });
-    let grid = ScalarGrid { size: [n; 3], origin: DVec3::ZERO, spacing: DVec3::ONE, values: values.collect() };
+    let grid =
+        ScalarGrid { size: [n; 3], origin: DVec3::ZERO, spacing: DVec3::ONE, values: Arc::new(values.collect()) };
     let params = GridParams { close: false, ..Default::default() };
     let (field, fill) = least(|| sample_grid(&grid, &params, &Silent).expect("a volume"));
     for plain in [true, false] {

@@ -27,6 +27,33 @@ pub const CROSSED: [u16; 256] = crossed();
 /// Faces whose corners alternate, for each pattern of inside corners.
 pub const AMBIGUOUS: [u8; 256] = ambiguous();
 
+/// For each pattern of inside corners the only loop, if there is one and no face is ambiguous: number of its edges, and
+/// these in their order; else none.
+pub const RING: [(u8, [u8; 6]); 256] = rings();
+
+const fn rings() -> [(u8, [u8; 6]); 256] {
+    let mut table = [(0, [0; 6]); 256];
+    let mut config = 1;
+    while config < 255 {
+        if AMBIGUOUS[config] == 0 {
+            let next = chain(config as u8, 0).next;
+            let first = CROSSED[config].trailing_zeros() as usize;
+            let (mut ring, mut count, mut e) = ([0; 6], 0, first);
+            while count == 0 || e != first {
+                // No face is passed twice.
+                ring[count] = e as u8;
+                count += 1;
+                e = next[e] as usize;
+            }
+            if count as u32 == CROSSED[config].count_ones() {
+                table[config] = (count as u8, ring);
+            }
+        }
+        config += 1;
+    }
+    table
+}
+
 const fn edge_faces() -> [u8; 12] {
     let mut bits = [0; 12];
     let mut f = 0;
@@ -85,27 +112,30 @@ pub struct Chain {
 
 /// The chain of a pattern of inside corners.
 /// * `joined` - bits of the ambiguous faces in which the inside corners are joined across the face
-pub fn chain(config: u8, joined: u8) -> Chain {
+pub const fn chain(config: u8, joined: u8) -> Chain {
     let mut chain = Chain { next: [u8::MAX; 12], face: [0; 12] };
-    let inside = |c: usize| config >> c & 1 != 0;
     let open = AMBIGUOUS[config as usize];
-    for f in 0..6 {
+    let mut f = 0;
+    while f < 6 {
         let (c, e) = (&FACES[f], &FACE_EDGES[f]);
-        let twice = open >> f & 1 != 0;
-        for m in 0..4 {
-            if inside(c[m]) || !inside(c[(m + 1) % 4]) {
-                continue;
+        let inside = [config >> c[0] & 1, config >> c[1] & 1, config >> c[2] & 1, config >> c[3] & 1];
+        let mut m = 0;
+        while m < 4 {
+            if inside[m] == 0 && inside[(m + 1) % 4] != 0 {
+                let mut leave = (m + 1) % 4;
+                if open >> f & 1 == 0 {
+                    while inside[leave] == 0 || inside[(leave + 1) % 4] != 0 {
+                        leave = (leave + 1) % 4;
+                    }
+                } else if joined >> f & 1 != 0 {
+                    leave = (m + 3) % 4;
+                }
+                chain.next[e[m]] = e[leave] as u8;
+                chain.face[e[m]] = f as u8;
             }
-            let leave = if !twice {
-                (1..4).map(|n| (m + n) % 4).find(|&n| inside(c[n]) && !inside(c[(n + 1) % 4])).unwrap_or(m)
-            } else if joined >> f & 1 != 0 {
-                (m + 3) % 4
-            } else {
-                (m + 1) % 4
-            };
-            chain.next[e[m]] = e[leave] as u8;
-            chain.face[e[m]] = f as u8;
+            m += 1;
         }
+        f += 1;
     }
     chain
 }

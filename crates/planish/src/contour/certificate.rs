@@ -8,6 +8,7 @@ use crate::field::{GridParams, ScalarGrid, sample_grid};
 use crate::geom::random;
 use crate::mesh::{diagnose, self_intersections};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// A grid of random numbers inside and positive ones on its border.
 fn random_grid(seed: u64, n: usize) -> ScalarGrid {
@@ -18,7 +19,12 @@ fn random_grid(seed: u64, n: usize) -> ScalarGrid {
             if border { r + 0.05 } else { 2.0 * r - 1.0 }
         })
         .collect();
-    ScalarGrid { size: [n; 3], origin: DVec3::new(0.1, -0.2, 0.3), spacing: DVec3::new(1.0, 0.8, 1.3), values }
+    ScalarGrid {
+        size: [n; 3],
+        origin: DVec3::new(0.1, -0.2, 0.3),
+        spacing: DVec3::new(1.0, 0.8, 1.3),
+        values: Arc::new(values),
+    }
 }
 
 /// Euler number of the part of a grid below zero, from those of cells, faces, edges and nodes.

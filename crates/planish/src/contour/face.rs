@@ -8,7 +8,7 @@ use super::Thresholds;
 use super::caps::FACE_POINT;
 use super::cell::{AMBIGUOUS, FACE_EDGES, chain};
 use super::patch::{Wish, edge_point, joined};
-use super::walk::{Cell, walk};
+use super::walk::Cell;
 use crate::field::{Creases, Directed};
 use crate::geom::predicates::segments_meet;
 use crate::mesh::FeatureKind;
@@ -49,17 +49,16 @@ const CROSSING: f64 = 0.02;
 /// A meeting farther outside the face than this, in cells, is no feature of it.
 const FAR: f64 = 0.75;
 
-/// Face points of the faces whose least node lies in the layers `from..to`.
-pub fn face_points(
+/// Face points of the three faces at the least node of each cell.
+pub fn face_points<'a>(
     field: &Directed,
     limits: &Thresholds,
     refine: Option<&dyn Creases>,
     base: [u32; 3],
-    from: usize,
-    to: usize,
+    cells: impl Iterator<Item = &'a Cell>,
 ) -> Part {
     let mut part = Part::default();
-    walk(field, from, to, |cell| {
+    for cell in cells {
         // The three faces at the least node; every face between two cells is one of these.
         let ambiguous = AMBIGUOUS[cell.config as usize];
         let low = ambiguous & 0b010101;
@@ -103,7 +102,7 @@ pub fn face_points(
                 }
             }
         }
-    });
+    }
     part
 }
 

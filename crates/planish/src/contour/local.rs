@@ -8,7 +8,7 @@ use crate::field::Directed;
 use crate::geom::predicates::triangles_meet;
 use crate::mesh::{DEGENERATE_AREA, TriMesh};
 use glam::DVec3;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 /// A cell with the numbers of its first triangle and of that after the last.
 pub type CellRange = ([u32; 3], u32, u32);
@@ -19,6 +19,8 @@ pub const GONE: [u32; 3] = [u32::MAX; 3];
 const NONE: u32 = u32::MAX;
 /// A triangle leans if its normal has a cosine below this with those of all hits among its corners.
 const LEAN: f64 = 0.5;
+/// Changed triangles within so many cells are compared with the same others.
+const CLOSE: f64 = 5.0;
 
 /// A mesh in the cells of its field, around some vertices.
 pub struct Local<'a> {
@@ -32,9 +34,25 @@ pub struct Local<'a> {
     /// Number of each vertex's star.
     which: Vec<u32>,
     stars: Vec<Vec<u32>>,
-    /// Triangles that may have left their cell, by the cells of their boxes.
-    strays: HashMap<[i64; 3], Vec<u32>>,
+    /// Triangles that may have left their cell, by the cells (z, y, x) of their boxes.
+    strays: BTreeMap<[i64; 3], Vec<u32>>,
     least: f64,
+}
+
+/// A triangle with its box.
+struct Placed {
+    names: [u32; 3],
+    p: [DVec3; 3],
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Placed {
+    /// True if two triangles meet in more than they share.
+    fn meets(&self, other: &Placed) -> bool {
+        !(other.low.cmpgt(self.high).any() || other.high.cmplt(self.low).any())
+            && triangles_meet(self.p, self.names, other.p, other.names)
+    }
 }
 
 impl<'a> Local<'a> {
@@ -71,7 +89,7 @@ impl<'a> Local<'a> {
             }
         }
         let least = 2.0 * DEGENERATE_AREA * mesh.bounds().diagonal().powi(2);
-        Local { mesh, field, base, cells, which, stars, strays: HashMap::new(), least }
+        Local { mesh, field, base, cells, which, stars, strays: BTreeMap::new(), least }
     }
 
     /// Triangles around a vertex near the seeds.
@@ -355,30 +373,28 @@ impl<'a> Local<'a> {
 
     /// True if the changed triangles, as they are now, meet nothing and not each other.
     fn is_embedded(&self, changed: &[u32]) -> bool {
-        let bounds = |t: u32| {
-            let [a, b, c] = self.mesh.corners(t as usize);
-            (a.min(b).min(c), a.max(b).max(c))
+        let placed = |t: u32| {
+            let names = self.mesh.triangles[t as usize];
+            let p = [self.position(names[0]), self.position(names[1]), self.position(names[2])];
+            Placed { names, p, low: p[0].min(p[1]).min(p[2]), high: p[0].max(p[1]).max(p[2]) }
         };
-        let meet = |s: u32, (low, high): (DVec3, DVec3), t: u32| {
-            let (l, h) = bounds(t);
-            !(l.cmpgt(high).any() || h.cmplt(low).any())
-                && triangles_meet(
-                    self.mesh.corners(s as usize),
-                    self.mesh.triangles[s as usize],
-                    self.mesh.corners(t as usize),
-                    self.mesh.triangles[t as usize],
-                )
-        };
+        let own: Vec<Placed> = changed.iter().map(|&t| placed(t)).collect();
         let mut sorted = changed.to_vec();
         sorted.sort_unstable();
-        changed.iter().enumerate().all(|(n, &s)| {
-            let own = bounds(s);
-            changed[..n].iter().all(|&t| !meet(s, own, t))
-                && self
-                    .near(own.0, own.1)
-                    .into_iter()
-                    .filter(|t| sorted.binary_search(t).is_err())
-                    .all(|t| !meet(s, own, t))
+        let others = |low: DVec3, high: DVec3| -> Vec<Placed> {
+            let near = self.near(low, high).into_iter().filter(|t| sorted.binary_search(t).is_err());
+            near.map(placed).filter(|t| !(t.low.cmpgt(high).any() || t.high.cmplt(low).any())).collect()
+        };
+        // One look at the cells around all of them, unless they reach far.
+        let low = own.iter().fold(DVec3::INFINITY, |low, t| low.min(t.low));
+        let high = own.iter().fold(DVec3::NEG_INFINITY, |high, t| high.max(t.high));
+        let near = (high - low).cmple(self.field.lattice.step * CLOSE).all().then(|| others(low, high));
+        own.iter().enumerate().all(|(n, s)| {
+            own[..n].iter().all(|t| !s.meets(t))
+                && match &near {
+                    Some(near) => near.iter().all(|t| !s.meets(t)),
+                    None => others(s.low, s.high).iter().all(|t| !s.meets(t)),
+                }
         })
     }
 
@@ -394,7 +410,7 @@ impl<'a> Local<'a> {
             for z in low[2]..=high[2] {
                 for y in low[1]..=high[1] {
                     for x in low[0]..=high[0] {
-                        let list = self.strays.entry([x, y, z]).or_default();
+                        let list = self.strays.entry([z, y, x]).or_default();
                         if !list.contains(&t) {
                             list.push(t);
                         }
@@ -420,11 +436,8 @@ impl<'a> Local<'a> {
                     }
                     found.extend(first..end);
                 }
-                for x in x0..=x1 {
-                    if let Some(list) = self.strays.get(&[x as i64, y as i64, z as i64]) {
-                        found.extend(list);
-                    }
-                }
+                let row = |x: u32| [z as i64, y as i64, x as i64];
+                found.extend(self.strays.range(row(x0)..=row(x1)).flat_map(|(_, list)| list));
             }
         }
         // Merged cells name their triangles in each of their parts.

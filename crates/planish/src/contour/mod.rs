@@ -1,9 +1,10 @@
 //! Directed fields to triangle meshes with exact edges and corners.
 //!
 //! [K01] Kobbelt, Botsch, Schwanecke, Seidel, *Feature Sensitive Surface Extraction from Volume Data*, §4.
-//! 1. loops of each cell ([`cell`](self))  - §4, one rule per face
-//! 2. feature test and vertex  - §4.2, §4.3, eq. 1      3. face points  - in place of the flips of §4, fig. 9
-//! 4. patches that are embedded by construction or by exact signs
+//! 1. one walk over all cells: a first bound of the feature test  - §4.2; smooth cells are done at once ([`survey`](self))
+//! 2. loops of each other cell ([`cell`](self))  - §4, one rule per face
+//! 3. feature test and vertex  - §4.2, §4.3, eq. 1      4. face points  - in place of the flips of §4, fig. 9
+//! 5. patches that are embedded by construction or by exact signs
 //!
 //! Departs from [K01]: the result is certified. Every vertex lies in its cell, cells meet in shared polylines, and a
 //! cell's patches are accepted only if they are embedded and disjoint; so the mesh is manifold, closed where the field
@@ -23,6 +24,7 @@ mod patch;
 mod polish;
 mod refine;
 mod sources;
+mod survey;
 mod topology;
 mod walk;
 
@@ -39,6 +41,7 @@ use patch::{INNER, Patcher, Scratch, Sheet};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use survey::Survey;
 
 /// How to extract.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -120,7 +123,7 @@ pub struct Thresholds {
 }
 
 /// Layers of cells that a task takes at once.
-const LAYERS: usize = 4;
+const LAYERS: usize = 8;
 /// Normals within one merged cell of the standard algorithm differ by less than this (cosine).
 const SMOOTH: f64 = 0.9;
 /// Normals that differ by less than so many times their noise are no evidence of a feature.
@@ -149,20 +152,7 @@ pub fn extract(
     let chunks: Vec<(usize, usize)> =
         (0..layers).step_by(LAYERS).map(|from| (from, (from + LAYERS).min(layers))).collect();
 
-    let parts: Option<Vec<face::Part>> = if params.plain {
-        Some(Vec::new())
-    } else {
-        chunks
-            .par_iter()
-            .map(|&(from, to)| {
-                (!observer.cancelled()).then(|| face::face_points(field, &limits, creases, base, from, to))
-            })
-            .collect()
-    };
-    let parts = parts.ok_or(ContourError::Cancelled)?;
-    observer.progress(0.3);
-    let (faces, mut wishes) = FacePoints::join(field, parts, hits as u32);
-
+    let mut points = hit_positions(field);
     let octree = params.adaptive.filter(|t| *t > 0.0).map(|tolerance| {
         let cells = chunks.par_iter().flat_map_iter(|&(from, to)| {
             let mut cells = Vec::new();
@@ -173,24 +163,44 @@ pub fn extract(
         let sharp = if params.plain { SMOOTH } else { limits.faint };
         Octree::new(field, base, cells.collect(), sharp, tolerance)
     });
-    let patcher = Patcher { field, limits: &limits, faces: &faces, refine: creases, base };
-    let sheets: Option<Vec<Sheet>> = chunks
+    let merged = |at: [usize; 3]| octree.as_ref().is_some_and(|o| o.is_merged(at));
+    let surveys: Option<Vec<Survey>> = chunks
         .par_iter()
-        .map(|&(from, to)| {
+        .map(|&layers| (!observer.cancelled()).then(|| survey::survey(field, &points, &limits, base, layers, merged)))
+        .collect();
+    let surveys = surveys.ok_or(ContourError::Cancelled)?;
+    observer.progress(0.3);
+    let parts: Option<Vec<face::Part>> = surveys
+        .par_iter()
+        .map(|survey| {
+            let cells = survey.others.iter().filter(|_| !params.plain).map(|(cell, _)| cell);
+            (!observer.cancelled()).then(|| face::face_points(field, &limits, creases, base, cells))
+        })
+        .collect();
+    let (faces, mut wishes) = FacePoints::join(field, parts.ok_or(ContourError::Cancelled)?, hits as u32);
+    observer.progress(0.6);
+    let patcher = Patcher { field, points: &points, limits: &limits, faces: &faces, refine: creases, base };
+    let sheets: Option<Vec<Sheet>> = surveys
+        .par_iter()
+        .map(|survey| {
             if observer.cancelled() {
                 return None;
             }
             let (mut sheet, mut scratch) = (Sheet::default(), Scratch::default());
-            walk::walk(field, from, to, |cell| {
-                if octree.as_ref().is_none_or(|o| !o.is_merged(cell.at)) {
-                    patcher.patch(cell, &mut scratch, &mut sheet);
-                }
-            });
+            for (cell, before) in survey.others.iter().filter(|(cell, _)| !merged(cell.at)) {
+                patcher.patch(cell, &mut scratch, &mut sheet);
+                sheet.before.push(*before);
+            }
             Some(sheet)
         })
         .collect();
     let mut sheets = sheets.ok_or(ContourError::Cancelled)?;
-    sheets.extend(octree.iter().map(Octree::patches));
+    let mut surveys = surveys;
+    if let Some(octree) = &octree {
+        // Larger cells come after all others.
+        sheets.push(octree.patches());
+        surveys.push(Survey::default());
+    }
     observer.progress(0.8);
 
     let outer = hits + faces.len();
@@ -198,44 +208,51 @@ pub fn extract(
     if (outer + inner) as u64 >= INNER as u64 {
         return Err(ContourError::TooLarge { vertices: outer + inner });
     }
-    if sheets.iter().all(|s| s.triangles.is_empty()) {
+    let count = surveys.iter().map(Survey::triangles).chain(sheets.iter().map(|s| s.triangles.len())).sum();
+    if count == 0 {
         return Err(ContourError::Nothing { cells: field.lattice.cells });
     }
-    let mut points = hit_positions(field);
+    points.reserve(faces.len() + inner);
     points.extend(faces.positions());
     let mut kinds = vec![FeatureKind::None; hits];
     kinds.extend(faces.kinds());
     let mut counts = ContourCounts::default();
-    let mut triangles = Vec::with_capacity(sheets.iter().map(|s| s.triangles.len()).sum());
+    let mut triangles = Vec::with_capacity(count);
     let mut edges = Vec::new();
-    for sheet in &sheets {
+    for (survey, sheet) in surveys.iter().zip(&sheets) {
         // Inner vertices get their numbers after all those before.
         let first = points.len() as u32;
         let name = |id: u32| if id >= INNER { id - INNER + first } else { id };
-        triangles.extend(sheet.triangles.iter().map(|t| t.map(name)));
+        survey.merge(sheet, name, &mut triangles);
         edges.extend(sheet.edges.iter().map(|e| e.map(name)));
         wishes.extend(sheet.wishes.iter().map(|(id, p)| (name(*id), *p)));
         points.extend(sheet.inner.iter().map(|i| i.p));
         kinds.extend(sheet.inner.iter().map(|i| i.kind));
-        counts.cells += sheet.cells.len();
+        counts.cells += survey.len() + sheet.cells.len();
         counts.fallbacks += sheet.fallbacks;
         counts.pushed += sheet.pushed;
     }
     let mut mesh = TriMesh::new(points, triangles);
-    let cells = sheets.iter().scan(0, |first, sheet| {
-        let own = *first;
-        *first += sheet.triangles.len() as u32;
-        Some(sheet.cells.iter().map(move |&(at, a, b)| (at, own + a, own + b)))
-    });
-    let mut cells: Vec<_> = cells.flatten().collect();
-    if octree.is_some() {
-        cells.par_sort_unstable_by_key(|c| [c.0[2], c.0[1], c.0[0]]);
-    }
+    let cells = || {
+        let (mut cells, mut first) = (Vec::new(), 0);
+        for (survey, sheet) in surveys.iter().zip(&sheets) {
+            survey.merged_cells(sheet, first, &mut cells);
+            first += (survey.triangles() + sheet.triangles.len()) as u32;
+        }
+        if octree.is_some() {
+            cells.par_sort_unstable_by_key(|c| [c.0[2], c.0[1], c.0[0]]);
+        }
+        cells
+    };
     let polished =
         polish::polish(&mut mesh, field, base, cells, &wishes, creases, &mut kinds, &mut edges, limits.sharp);
     (counts.moved, counts.kept) = (polished.moved, polished.kept);
+    // Every hit is a vertex, but at the rim of what is known, in larger cells, and where vertices were merged.
+    let complete = !field.sides.unknown && octree.is_none() && mesh.triangles.len() == count;
     let mut extracted = Extracted { mesh, tags: tags(kinds, edges), counts };
-    drop_unused(&mut extracted);
+    if !complete {
+        drop_unused(&mut extracted);
+    }
     extracted.tags.mark(&mut extracted.mesh);
     observer.progress(1.0);
     Ok(extracted)
@@ -257,23 +274,27 @@ fn tags(vertices: Vec<FeatureKind>, edges: Vec<[u32; 2]>) -> FeatureTags {
     FeatureTags { vertices, edges }
 }
 
+/// Rows whose hits a task places at once.
+const ROWS: usize = 4096;
+
 /// Positions of all hits, axis after axis.
 fn hit_positions(field: &Directed) -> Vec<DVec3> {
     let rows = field.lattice.rows();
-    (0..3)
-        .flat_map(|axis| {
-            let hits = &field.axes[axis];
-            let list: Vec<DVec3> = (0..rows)
-                .into_par_iter()
-                .with_min_len(256)
-                .flat_map_iter(|row| {
-                    let (a, b) = (hits.start[row] as usize, hits.start[row + 1] as usize);
-                    (a..b).map(move |n| field.position(axis, row, n))
-                })
-                .collect();
-            list
+    let tasks: Vec<(usize, usize)> = (0..3).flat_map(|axis| (0..rows).step_by(ROWS).map(move |r| (axis, r))).collect();
+    let parts: Vec<Vec<DVec3>> = tasks
+        .into_par_iter()
+        .map(|(axis, from)| {
+            let (start, to) = (&field.axes[axis].start, (from + ROWS).min(rows));
+            let mut points = Vec::with_capacity((start[to] - start[from]) as usize);
+            for row in from..to {
+                points.extend((start[row]..start[row + 1]).map(|n| field.position(axis, row, n as usize)));
+            }
+            points
         })
-        .collect()
+        .collect();
+    let mut points = Vec::with_capacity(field.hit_count());
+    parts.iter().for_each(|part| points.extend_from_slice(part));
+    points
 }
 
 /// Leaves out vertices that no triangle uses: hits at the rim of what is known.

@@ -11,6 +11,7 @@ use super::caps::{self, Corner, FACE_POINT};
 use super::cell::{AMBIGUOUS, CROSSED, EDGE_FACES, EDGES, chain, joined_by_hits, joined_by_values};
 use super::face::FacePoints;
 use super::feature::{Shape, classify, solve};
+use super::local::CellRange;
 use super::topology::Trilinear;
 use super::walk::Cell;
 use crate::field::{Creases, Directed};
@@ -45,7 +46,9 @@ pub struct Sheet {
     /// Inner vertices that were clamped.
     pub wishes: Vec<Wish>,
     /// Cells with triangles, and the numbers of their first triangle and of that after the last.
-    pub cells: Vec<([u32; 3], u32, u32)>,
+    pub cells: Vec<CellRange>,
+    /// For each cell the triangles of smooth cells before it.
+    pub before: Vec<u32>,
     /// Cells whose feature had to be given up.
     pub fallbacks: usize,
     /// Cells whose patches were pushed in from the boundary.
@@ -55,6 +58,8 @@ pub struct Sheet {
 /// Everything that is the same for all cells.
 pub struct Patcher<'a> {
     pub field: &'a Directed,
+    /// Positions of the hits, by their names.
+    pub points: &'a [DVec3],
     pub limits: &'a Thresholds,
     pub faces: &'a FacePoints,
     pub refine: Option<&'a dyn Creases>,
@@ -176,7 +181,8 @@ impl Patcher<'_> {
         let axis = e / 4;
         let n = cell.hit[e];
         let hit = &self.field.axes[axis].hits[n as usize];
-        (self.base[axis] + n, edge_point(self.field, cell, e, hit.t), hit.normal)
+        let id = self.base[axis] + n;
+        (id, self.points[id as usize], hit.normal)
     }
 
     fn with_face_points(&self, cell: &Cell, l: &[Corner]) -> Vec<Corner> {
@@ -365,12 +371,9 @@ fn boundary_euler(config: u8, region: &[usize; 8], loops: usize) -> i32 {
 
 /// Values of a scalar grid at the corners of a cell.
 pub fn values(field: &Directed, cell: &Cell) -> Option<[f64; 8]> {
-    let values = field.values.as_ref()?;
-    let l = &field.lattice;
-    Some(std::array::from_fn(|c| {
-        let (i, j, k) = (cell.at[0] + (c & 1), cell.at[1] + (c >> 1 & 1), cell.at[2] + (c >> 2 & 1));
-        values[l.row(j, k) * l.nodes(0) + i] as f64
-    }))
+    let levels = field.values.as_ref()?;
+    let corner = |c: usize| [cell.at[0] + (c & 1), cell.at[1] + (c >> 1 & 1), cell.at[2] + (c >> 2 & 1)];
+    Some(std::array::from_fn(|c| levels.at(corner(c))))
 }
 
 /// Bits of the ambiguous faces in which the inside corners are joined.
@@ -466,34 +469,43 @@ pub fn flat(l: &[Corner], out: &mut Vec<[u32; 3]>) -> bool {
         out.push([l[0].id, l[1].id, l[2].id]);
         return true;
     }
-    let mut normal = DVec3::ZERO;
-    for k in 1..n - 1 {
-        normal += (l[k].p - l[0].p).cross(l[k + 1].p - l[0].p);
-    }
-    let mut best: Option<(f64, usize)> = None;
-    for s in 0..if n == 4 { 2 } else { n } {
-        let at = |k: usize| &l[(s + k) % n];
-        let diagonal_free = (2..n - 1).all(|k| at(0).faces & at(k).faces == 0);
-        if !diagonal_free {
-            continue;
-        }
-        let o = at(0).p;
-        let cross = |a: DVec3, b: DVec3| (a - o).cross(b - o).dot(normal);
-        // Seen along the normal: a fan within half a turn, every triangle the right way round.
-        let safe = n == 4
-            || (2..n).all(|k| cross(at(1).p, at(k).p) > 0.0) && (2..n - 1).all(|k| cross(at(k).p, at(k + 1).p) > 0.0);
-        if !safe {
-            continue;
-        }
-        // The least area is the flattest.
-        let area: f64 = (1..n - 1).map(|k| (at(k).p - o).cross(at(k + 1).p - o).length()).sum();
-        if best.is_none_or(|b| area < b.0) {
-            best = Some((area, s));
-        }
-    }
-    let Some((_, s)) = best else { return false };
+    let points: Vec<DVec3> = l.iter().map(|c| c.p).collect();
+    let free = |s: usize, k: usize| l[s].faces & l[k].faces == 0;
+    let Some(s) = best_fan(&points, free) else { return false };
     for k in 1..n - 1 {
         out.push([l[s].id, l[(s + k) % n].id, l[(s + k + 1) % n].id]);
     }
     true
+}
+
+/// The vertex of a loop whose fan to all others is the flattest, if there is a safe one.
+/// * `free` - no face holds both of two vertices
+#[inline(always)]
+pub fn best_fan(points: &[DVec3], free: impl Fn(usize, usize) -> bool) -> Option<usize> {
+    let n = points.len();
+    let mut normal = DVec3::ZERO;
+    for k in 1..n - 1 {
+        normal += (points[k] - points[0]).cross(points[k + 1] - points[0]);
+    }
+    let mut best: Option<(f64, usize)> = None;
+    for s in 0..if n == 4 { 2 } else { n } {
+        let at = |k: usize| points[(s + k) % n];
+        if !(2..n - 1).all(|k| free(s, (s + k) % n)) {
+            continue;
+        }
+        let o = at(0);
+        let cross = |a: DVec3, b: DVec3| (a - o).cross(b - o).dot(normal);
+        // Seen along the normal: a fan within half a turn, every triangle the right way round.
+        let safe =
+            n == 4 || (2..n).all(|k| cross(at(1), at(k)) > 0.0) && (2..n - 1).all(|k| cross(at(k), at(k + 1)) > 0.0);
+        if !safe {
+            continue;
+        }
+        // The least area is the flattest.
+        let area: f64 = (1..n - 1).map(|k| (at(k) - o).cross(at(k + 1) - o).length()).sum();
+        if best.is_none_or(|b| area < b.0) {
+            best = Some((area, s));
+        }
+    }
+    best.map(|b| b.1)
 }

@@ -73,13 +73,13 @@ impl Lines {
 }
 
 /// Brings the vertices of `wishes` to their places, and merges triangles without area away.
-/// * `cells` - all cells with triangles, in the order of z, y, x
+/// * `cells` - makes the list of all cells with triangles, in the order of z, y, x
 /// * `kinds`, `edges` - the features; changed along with the mesh
 pub fn polish(
     mesh: &mut TriMesh,
     field: &Directed,
     base: [u32; 3],
-    cells: Vec<CellRange>,
+    cells: impl FnOnce() -> Vec<CellRange>,
     wishes: &[Wish],
     creases: Option<&dyn Creases>,
     kinds: &mut [FeatureKind],
@@ -104,7 +104,7 @@ pub fn polish(
     if seeds.is_empty() {
         return Polished::default();
     }
-    let mut local = Local::new(mesh, field, base, cells, &seeds);
+    let mut local = Local::new(mesh, field, base, cells(), &seeds);
     let mut targets: HashMap<u32, DVec3> = wishes.iter().copied().collect();
     let count = targets.len();
     let mut open: Vec<u32> = wishes.iter().map(|w| w.0).collect();
@@ -197,8 +197,8 @@ fn calls(
 
 /// Neighbours on a line move together.
 fn together(local: &mut Local, lines: &Lines, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32>) {
-    let mut seen: Vec<u32> = Vec::new();
-    let mut arrived: Vec<u32> = Vec::new();
+    let mut seen: BTreeSet<u32> = BTreeSet::new();
+    let mut arrived: BTreeSet<u32> = BTreeSet::new();
     for &first in open.iter() {
         if seen.contains(&first) {
             continue;
@@ -444,11 +444,25 @@ fn join_ends(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], sharp:
     }
 }
 
+/// Triangles that a task looks at.
+const CHUNK: usize = 1 << 14;
+
 /// Triangles of next to no area.
 fn thin(mesh: &TriMesh) -> Vec<u32> {
     use rayon::prelude::*;
     let least = 2.0 * DEGENERATE_AREA * mesh.bounds().diagonal().powi(2);
-    (0..mesh.triangles.len() as u32).into_par_iter().filter(|&t| !(mesh.area(t as usize) > least)).collect()
+    let thin = |t: &[u32; 3]| {
+        let [a, b, c] = *t;
+        let (a, b, c) = (mesh.points[a as usize], mesh.points[b as usize], mesh.points[c as usize]);
+        !((b - a).cross(c - a).length() / 2.0 > least)
+    };
+    let parts: Vec<Vec<u32>> = mesh
+        .triangles
+        .par_chunks(CHUNK)
+        .enumerate()
+        .map(|(n, part)| (0..part.len()).filter(|&t| thin(&part[t])).map(|t| (n * CHUNK + t) as u32).collect())
+        .collect();
+    parts.concat()
 }
 
 /// Merges the ends of the shortest edge of each triangle without area.

@@ -6,6 +6,7 @@
 use super::feature::{Shape, classify, solve};
 use crate::field::sample::root;
 use crate::field::{Creases, Field};
+use crate::geom::Aabb;
 use glam::DVec3;
 
 /// Corrects features by asking the field.
@@ -42,13 +43,16 @@ impl<'a> FieldCreases<'a> {
         let q = p + way * share;
         let span = SPAN * share * way.length();
         let at = |t: f64| q + across * (span * (2.0 * t - 1.0));
-        let (f0, f1) = (self.field.value(at(0.0)), self.field.value(at(1.0)));
+        let ends = [at(0.0), at(1.0)];
+        let near = self.field.within(&Aabb { min: ends[0].min(ends[1]), max: ends[0].max(ends[1]) });
+        let field = near.as_deref().unwrap_or(self.field);
+        let (f0, f1) = (field.value(ends[0]), field.value(ends[1]));
         // Inside below the tangent, outside above.
         if !(f0 < 0.0 && f1 >= 0.0) {
             return None;
         }
-        let found = at(root(|t| self.field.value(at(t)), f0, f1));
-        let normal = self.field.gradient(found);
+        let found = at(root(|t| field.value(at(t)), f0, f1));
+        let normal = field.gradient(found);
         (normal.dot(n) > SAME).then_some((found, normal))
     }
 }

@@ -8,6 +8,7 @@ use super::cell::CROSSED;
 use crate::field::{Directed, directed};
 
 /// A cell that the surface passes.
+#[derive(Clone)]
 pub struct Cell {
     /// Its least node.
     pub at: [usize; 3],
@@ -18,22 +19,30 @@ pub struct Cell {
 }
 
 /// Bits of the rows of one plane.
-pub struct Plane {
+struct Plane {
     inside: Vec<u64>,
     known: Vec<u64>,
     words: usize,
 }
 
 impl Plane {
-    /// The plane of nodes `(., ., k)`.
-    pub fn of(field: &Directed, k: usize) -> Plane {
+    fn new(field: &Directed) -> Plane {
         let (words, ny) = (field.lattice.words(), field.lattice.nodes(1));
-        let mut plane = Plane { inside: vec![0; words * ny], known: vec![0; words * ny], words };
-        for j in 0..ny {
-            let (a, b) = (j * words, (j + 1) * words);
-            field.sides.bits(field.lattice.row(j, k), &mut plane.inside[a..b], &mut plane.known[a..b]);
-        }
-        plane
+        Plane { inside: vec![0; words * ny], known: vec![0; words * ny], words }
+    }
+
+    /// Becomes the plane of nodes `(., ., k)`.
+    fn read(&mut self, field: &Directed, k: usize) {
+        let rows = self.inside.chunks_exact_mut(self.words).zip(self.known.chunks_exact_mut(self.words));
+        rows.enumerate().for_each(|(j, (inside, known))| field.sides.bits(field.lattice.row(j, k), inside, known));
+    }
+
+    fn inside(&self, j: usize) -> &[u64] {
+        &self.inside[j * self.words..(j + 1) * self.words]
+    }
+
+    fn known(&self, j: usize) -> &[u64] {
+        &self.known[j * self.words..(j + 1) * self.words]
     }
 }
 
@@ -41,103 +50,78 @@ impl Plane {
 /// corner of unknown side are left out.
 pub fn walk(field: &Directed, from: usize, to: usize, mut visit: impl FnMut(&Cell)) {
     let lattice = &field.lattice;
-    let words = lattice.words();
-    let mut low = Plane::of(field, from);
-    let mut active = vec![0u64; words];
+    let (mut low, mut high) = (Plane::new(field), Plane::new(field));
+    low.read(field, from);
     for k in from..to {
-        let high = Plane::of(field, k + 1);
+        high.read(field, k + 1);
         for j in 0..lattice.cells[1] {
-            let row = |p: &Plane, j: usize, w: usize| p.inside.get(j * p.words + w).copied().unwrap_or(0);
-            let get = |p: &Plane, j: usize, w: usize, past: u64| {
-                if w < words { row(p, j, w) } else { past }
-            };
-            let mut any_active = 0;
-            for w in 0..words {
-                let mut or = 0;
-                let mut and = !0u64;
-                for (p, j) in [(&low, j), (&low, j + 1), (&high, j), (&high, j + 1)] {
-                    let a = row(p, j, w);
-                    let b = a >> 1 | get(p, j, w + 1, 0) << 63;
-                    or |= a | b;
-                    and &= a & b;
-                }
-                active[w] = or & !and;
-                any_active |= active[w];
+            let rows = [(j, k), (j + 1, k), (j, k + 1), (j + 1, k + 1)].map(|(j, k)| lattice.row(j, k));
+            // A row begins outside: where no side changes all is outside.
+            if rows.iter().any(|&r| field.sides.start[r] != field.sides.start[r + 1]) {
+                row_of_cells(field, [j, k], rows, &low, &high, &mut visit);
             }
-            if any_active == 0 {
-                continue;
-            }
-            if field.sides.unknown {
-                for (p, j) in [(&low, j), (&low, j + 1), (&high, j), (&high, j + 1)] {
-                    let known = &p.known[j * words..(j + 1) * words];
-                    for w in 0..words {
-                        active[w] &= known[w] & (known[w] >> 1 | known.get(w + 1).map_or(1 << 63, |n| n << 63));
-                    }
-                }
-            }
-            directed::mask_past(&mut active, lattice.cells[0]);
-            row_of_cells(field, [j, k], &low, &high, &active, &mut visit);
         }
-        low = high;
+        std::mem::swap(&mut low, &mut high);
     }
 }
 
 fn row_of_cells(
     field: &Directed,
     [j, k]: [usize; 2],
+    rows: [usize; 4],
     low: &Plane,
     high: &Plane,
-    active: &[u64],
     visit: &mut impl FnMut(&Cell),
 ) {
-    let lattice = &field.lattice;
-    let row = |dj: usize, dk: usize| lattice.row(j + dj, k + dk);
-    let lists: [(&[u32], usize); 8] = [
-        field.axes[0].row(row(0, 0)),
-        field.axes[0].row(row(1, 0)),
-        field.axes[0].row(row(0, 1)),
-        field.axes[0].row(row(1, 1)),
-        field.axes[1].row(row(0, 0)),
-        field.axes[1].row(row(0, 1)),
-        field.axes[2].row(row(0, 0)),
-        field.axes[2].row(row(1, 0)),
-    ];
-    let words = low.words;
-    let sides = [
-        &low.inside[j * words..(j + 1) * words],
-        &low.inside[(j + 1) * words..(j + 2) * words],
-        &high.inside[j * words..(j + 1) * words],
-        &high.inside[(j + 1) * words..(j + 2) * words],
-    ];
-    let mut cursor = [0usize; 8];
+    let sides = [low.inside(j), low.inside(j + 1), high.inside(j), high.inside(j + 1)];
+    let known = [low.known(j), low.known(j + 1), high.known(j), high.known(j + 1)];
+    // Next hit on the edges along x of the four rows, and along y and z between them.
+    let lists = [(0, 0), (0, 1), (0, 2), (0, 3), (1, 0), (1, 2), (2, 0), (2, 1)];
+    let lists = lists.map(|(axis, row): (usize, usize)| (&field.axes[axis], rows[row]));
+    let mut next = lists.map(|(hits, row)| hits.start[row]);
     let mut cell = Cell { at: [0, j, k], config: 0, hit: [u32::MAX; 12] };
-    for (w, &word) in active.iter().enumerate() {
-        let mut rest = word;
+    let past = |bits: &[u64], w: usize, end: u64| bits[w] >> 1 | bits.get(w + 1).map_or(end, |b| b << 63);
+    for w in 0..low.words {
+        // Bits of the corners of 64 cells, in their order.
+        let mut corners = [0; 8];
+        let (mut or, mut and) = (0, !0);
+        for (s, side) in sides.iter().enumerate() {
+            (corners[2 * s], corners[2 * s + 1]) = (side[w], past(side, w, 0));
+            or |= corners[2 * s] | corners[2 * s + 1];
+            and &= corners[2 * s] & corners[2 * s + 1];
+        }
+        let mut rest = or & !and & directed::below(field.lattice.cells[0], w);
+        if rest != 0 && field.sides.unknown {
+            rest = known.iter().fold(rest, |rest, known| rest & known[w] & past(known, w, 1 << 63));
+        }
         while rest != 0 {
-            let i = 64 * w + rest.trailing_zeros() as usize;
+            let b = rest.trailing_zeros();
+            let i = 64 * w + b as usize;
             rest &= rest - 1;
-            let bit = |side: &[u64], i: usize| (side[i / 64] >> (i % 64) & 1) as u8;
-            let mut config = 0;
-            for (s, side) in sides.iter().enumerate() {
-                config |= bit(side, i) << (2 * s) | bit(side, i + 1) << (2 * s + 1);
-            }
             cell.at[0] = i;
-            cell.config = config;
-            let crossed = CROSSED[config as usize];
-            for (l, (places, first)) in lists.iter().enumerate() {
-                let mut c = cursor[l];
-                while c < places.len() && (places[c] as usize) < i {
-                    c += 1;
+            cell.config = 0;
+            for (c, bits) in corners.iter().enumerate() {
+                cell.config |= ((bits >> b & 1) as u8) << c;
+            }
+            let crossed = CROSSED[cell.config as usize] as u32;
+            if field.sides.unknown {
+                // Cells may have been left out, with their hits.
+                for ((hits, row), next) in lists.iter().zip(&mut next) {
+                    while *next < hits.start[row + 1] && (hits.at[*next as usize] as usize) < i {
+                        *next += 1;
+                    }
                 }
-                cursor[l] = c;
-                if l < 4 {
-                    cell.hit[l] = (first + c) as u32;
-                } else {
-                    // y edges 4, 5 and 6, 7; z edges 8, 9 and 10, 11: at this node and at the next.
-                    let e = 2 * l - 4;
-                    cell.hit[e] = (first + c) as u32;
-                    cell.hit[e + 1] = (first + c) as u32 + (crossed >> e & 1) as u32;
-                }
+            }
+            cell.hit[..4].copy_from_slice(&next[..4]);
+            for l in 0..4 {
+                next[l] += crossed >> l & 1;
+            }
+            // Edges 4 and 5, 6 and 7, 8 and 9, 10 and 11 lie in one list: at this node and at the next.
+            for l in 4..8 {
+                let e = 2 * l - 4;
+                cell.hit[e] = next[l];
+                next[l] += crossed >> e & 1;
+                cell.hit[e + 1] = next[l];
             }
             visit(&cell);
         }

@@ -5,6 +5,7 @@
 //! row is the line of nodes `(., j, k)` along x and owns the edges that leave its nodes along +x, +y and +z. Sides
 //! are kept as the nodes where they change. Memory grows with the surface (plus one word per row and table).
 
+use super::grid_field::Levels;
 use super::{Lattice, Side};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -55,8 +56,8 @@ pub struct Directed {
     pub sides: Sides,
     /// Angle by which the normals are off, degrees ([`super::Field::noise_deg`]).
     pub noise_deg: f64,
-    /// Values at the nodes where the source is a scalar grid, x fastest: what its interpolant does inside cells.
-    pub values: Option<std::sync::Arc<Vec<f32>>>,
+    /// Values at the nodes where the source is a scalar grid: what its interpolant does inside cells.
+    pub values: Option<Levels>,
     /// Hits that had to be guessed because no source gave one between two sides.
     pub mended: usize,
     /// What is too thin for the lattice, where the source can tell.
@@ -106,6 +107,40 @@ impl Sides {
         sides
     }
 
+    /// Rows of parts, one part after the other.
+    pub fn joined(parts: Vec<Sides>) -> Sides {
+        let mut all = Sides { start: vec![0], ..Sides::default() };
+        for part in parts {
+            let first = all.changes.len() as u32;
+            all.start.extend(part.start[1..].iter().map(|s| first + s));
+            all.changes.extend(part.changes);
+            all.unknown |= part.unknown;
+        }
+        all
+    }
+
+    /// Adds a row from its bits.
+    pub fn push(&mut self, inside: &[u64], known: &[u64], nodes: usize) {
+        let mut last = 0;
+        for (w, (&inside, &known)) in inside.iter().zip(known).enumerate() {
+            // Bits of a node that differs from the one before.
+            let before = |bits: u64, last: bool| bits << 1 | last as u64;
+            let unlike = (inside ^ before(inside, last == 1)) & known | (known ^ before(known, last != 2));
+            let mut rest = unlike & below(nodes, w);
+            while rest != 0 {
+                let b = rest.trailing_zeros();
+                rest &= rest - 1;
+                let now = if known >> b & 1 == 0 { 2 } else { (inside >> b & 1) as u32 };
+                if now != last {
+                    self.changes.push((64 * w as u32 + b) << 2 | now);
+                    last = now;
+                }
+            }
+            self.unknown |= !known & below(nodes, w) != 0;
+        }
+        self.start.push(self.changes.len() as u32);
+    }
+
     /// Bits of row `row`: inside, and known.
     /// * `inside`, `known` - [`Lattice::words`] words each; bits past the last node are not defined
     pub fn bits(&self, row: usize, inside: &mut [u64], known: &mut [u64]) {
@@ -143,27 +178,9 @@ fn fill(words: &mut [u64], from: usize, to: usize, value: bool) {
 
 /// Changes of one row from its bits.
 pub fn changes_of(inside: &[u64], known: &[u64], nodes: usize) -> Vec<u32> {
-    let mut changes = Vec::new();
-    let mut last = 0;
-    for w in 0..inside.len() {
-        // Words in which nothing changes are most.
-        let uniform = match last {
-            0 => inside[w] == 0 && known[w] == !0,
-            1 => inside[w] == !0 && known[w] == !0,
-            _ => known[w] == 0,
-        };
-        if uniform {
-            continue;
-        }
-        for b in 0..64.min(nodes - 64 * w) {
-            let now = if known[w] >> b & 1 == 0 { 2 } else { (inside[w] >> b & 1) as u32 };
-            if now != last {
-                changes.push(((64 * w + b) as u32) << 2 | now);
-                last = now;
-            }
-        }
-    }
-    changes
+    let mut sides = Sides::default();
+    sides.push(inside, known, nodes);
+    sides.changes
 }
 
 impl Hits {
@@ -178,6 +195,19 @@ impl Hits {
             start[r + 1] += start[r];
         }
         Hits { start, at: placed.iter().map(|p| p.at).collect(), hits: placed.iter().map(|p| p.hit).collect() }
+    }
+
+    /// Rows of parts, one part after the other.
+    pub fn joined(parts: Vec<Hits>) -> Hits {
+        let count = parts.iter().map(Hits::len).sum();
+        let mut all = Hits { start: vec![0], at: Vec::with_capacity(count), hits: Vec::with_capacity(count) };
+        for part in parts {
+            let first = all.at.len() as u32;
+            all.start.extend(part.start[1..].iter().map(|s| first + s));
+            all.at.extend(part.at);
+            all.hits.extend(part.hits);
+        }
+        all
     }
 
     /// The places and number of the first hit of a row.
@@ -209,6 +239,9 @@ pub fn clear(t: f64) -> f64 {
     if t.is_nan() { 0.5 } else { t.clamp(CLEARANCE, 1.0 - CLEARANCE) }
 }
 
+/// The hits of a row for which a source gave none: on the edge along an axis from a node of the row.
+pub type Missing<'a> = Box<dyn FnMut(usize, usize) -> Hit + 'a>;
+
 impl Directed {
     /// Number of hits on all axes.
     pub fn hit_count(&self) -> usize {
@@ -235,6 +268,17 @@ impl Directed {
         axes: [Hits; 3],
         missing: &(dyn Fn(usize, [usize; 3]) -> Hit + Sync),
     ) -> Directed {
+        let row = |j: usize, k: usize| -> Missing { Box::new(move |axis, i| missing(axis, [i, j, k])) };
+        Directed::assemble_rows(lattice, sides, axes, &row)
+    }
+
+    /// [`Directed::assemble`] for sources that answer faster row by row: `missing(j, k)` is asked once for each row.
+    pub fn assemble_rows<'a>(
+        lattice: Lattice,
+        sides: Sides,
+        axes: [Hits; 3],
+        missing: &(dyn Fn(usize, usize) -> Missing<'a> + Sync),
+    ) -> Directed {
         let words = lattice.words();
         let bits = |row: usize| {
             let (mut inside, mut known) = (vec![0; words], vec![0; words]);
@@ -252,6 +296,7 @@ impl Directed {
                 let mut out: [Plane; 3] = Default::default();
                 for j in 0..ny {
                     let row = lattice.row(j, k);
+                    let mut missing = missing(j, k);
                     let (a, known_a) = &here[j];
                     let shifted = shift(a);
                     let known_shifted = shift(known_a);
@@ -260,7 +305,7 @@ impl Directed {
                         crossing[w] = (a[w] ^ shifted[w]) & known_a[w] & known_shifted[w];
                     }
                     mask_past(&mut crossing, lattice.cells[0]);
-                    out[0].take(&axes[0], row, &crossing, |i| missing(0, [i, j, k]));
+                    out[0].take(&axes[0], row, &crossing, |i| missing(0, i));
                     for (axis, other) in
                         [(1, (j + 1 < ny).then(|| &here[j + 1])), (2, above.as_ref().map(|above| &above[j]))]
                     {
@@ -271,7 +316,7 @@ impl Directed {
                             }
                             mask_past(&mut crossing, lattice.nodes(0));
                         }
-                        out[axis].take(&axes[axis], row, &crossing, |i| missing(axis, [i, j, k]));
+                        out[axis].take(&axes[axis], row, &crossing, |i| missing(axis, i));
                     }
                 }
                 out
@@ -305,7 +350,7 @@ struct Plane {
 }
 
 impl Plane {
-    fn take(&mut self, given: &Hits, row: usize, crossing: &[u64], missing: impl Fn(usize) -> Hit) {
+    fn take(&mut self, given: &Hits, row: usize, crossing: &[u64], mut missing: impl FnMut(usize) -> Hit) {
         let before = self.at.len();
         let (places, first) = given.row(row);
         let mut n = 0;
@@ -338,9 +383,14 @@ pub fn shift(words: &[u64]) -> Vec<u64> {
 
 /// Clears bits from `count` on.
 pub fn mask_past(words: &mut [u64], count: usize) {
-    for (w, word) in words.iter_mut().enumerate() {
-        if 64 * (w + 1) > count {
-            *word &= if 64 * w >= count { 0 } else { (1u64 << (count - 64 * w)) - 1 };
-        }
+    words.iter_mut().enumerate().for_each(|(w, word)| *word &= below(count, w));
+}
+
+/// Bits of word `w` of a row that stand for places below `count`.
+pub fn below(count: usize, w: usize) -> u64 {
+    match count.saturating_sub(64 * w) {
+        0 => 0,
+        n if n >= 64 => !0,
+        n => (1 << n) - 1,
     }
 }

@@ -32,7 +32,7 @@ mod winding;
 
 pub use creases::MeshCreases;
 pub use directed::{Directed, Thin};
-pub use grid_field::{Body, GradientRule, GridParams, ScalarGrid, sample_grid};
+pub use grid_field::{Body, GradientRule, GridParams, Levels, ScalarGrid, sample_grid};
 pub use lattice::{Lattice, LatticeError, Spacing};
 pub use mesh_field::MeshField;
 pub use part::{MeshBody, Part};

@@ -4,7 +4,7 @@
 //! convex, and the distance from it is the least over the move of the distance from the tool. That is a convex function
 //! of the place on the move: closed forms where the move is level or upright or the tool is ball-ended, a search
 //! otherwise. Moves sit in a tree of boxes; in a small box of space only those are looked at that can be the nearest one
-//! somewhere in it.
+//! somewhere in it, and of these, from the nearest on, only as many as their distances from its middle leave a chance.
 
 use super::Field;
 use crate::geom::Aabb;
@@ -49,20 +49,32 @@ impl Tool {
         }
     }
 
-    /// Distance and gradient in the half plane `(from the axis, above the tip)`; the shaft has no upper end.
-    fn distance(&self, p: DVec2) -> (f64, DVec2) {
-        // A half strip, shrunk by the rim and grown by it again.
+    /// A half strip in the half plane `(from the axis, above the tip)`: the tool shrunk by its rim. How far a point lies
+    /// beyond its two sides; the shaft has no upper end.
+    fn beyond(&self, p: DVec2) -> DVec2 {
         let rim = self.rim();
-        let q = DVec2::new(p.x - (self.radius() - rim), rim - p.y);
+        DVec2::new(p.x - (self.radius() - rim), rim - p.y)
+    }
+
+    /// Distance in the half plane.
+    fn distance(&self, p: DVec2) -> f64 {
+        let q = self.beyond(p);
+        let l = q.max(DVec2::ZERO).length();
+        if l > 0.0 { l - self.rim() } else { q.max_element() - self.rim() }
+    }
+
+    /// Gradient of the distance.
+    fn gradient(&self, p: DVec2) -> DVec2 {
+        let q = self.beyond(p);
         let out = q.max(DVec2::ZERO);
         let l = out.length();
         if l > 0.0 {
             let g = out / l;
-            (l - rim, DVec2::new(g.x, -g.y))
+            DVec2::new(g.x, -g.y)
         } else if q.x > q.y {
-            (q.x - rim, DVec2::X)
+            DVec2::X
         } else {
-            (q.y - rim, DVec2::NEG_Y)
+            DVec2::NEG_Y
         }
     }
 }
@@ -131,16 +143,13 @@ impl Milling {
         self.build(right, first + middle);
     }
 
-    /// Distance from one swept volume, and its gradient.
-    fn swept(&self, m: &Move, p: DVec3) -> (f64, DVec3) {
+    /// Distance from one swept volume, and the place of the move that it is taken from.
+    fn swept(&self, m: &Move, p: DVec3) -> (f64, f64) {
         let tool = self.tools[m.tool];
         let d = m.to - m.from;
         let at = |s: f64| {
             let q = p - m.from - d * s;
-            let rho = q.truncate().length();
-            let (value, g) = tool.distance(DVec2::new(rho, q.z));
-            let out = if rho > 0.0 { q.truncate() / rho } else { DVec2::X };
-            (value, DVec3::new(out.x * g.x, out.y * g.x, g.y))
+            (tool.distance(DVec2::new(q.truncate().length(), q.z)), s)
         };
         let plan = d.truncate().length_squared();
         // The place of the move that is nearest in plan.
@@ -186,6 +195,15 @@ impl Milling {
         [at(0.0), at(1.0), fy].into_iter().fold(fx, |best, f| if f.0 < best.0 { f } else { best })
     }
 
+    /// Gradient of the distance from the tool at a place of a move.
+    fn slope(&self, m: &Move, s: f64, p: DVec3) -> DVec3 {
+        let q = p - m.from - (m.to - m.from) * s;
+        let rho = q.truncate().length();
+        let g = self.tools[m.tool].gradient(DVec2::new(rho, q.z));
+        let out = if rho > 0.0 { q.truncate() / rho } else { DVec2::X };
+        DVec3::new(out.x * g.x, out.y * g.x, g.y)
+    }
+
     /// No move under a node is nearer to `p` than this.
     fn reach(&self, at: u32, p: DVec3) -> f64 {
         let n = &self.nodes[at as usize];
@@ -212,53 +230,65 @@ impl Milling {
                 (node.first..node.first + node.count).for_each(|m| visit(m, limit));
                 continue;
             }
-            let [a, b] = [at + 1, node.second].map(|n| (n, self.reach(n, p)));
+            let (a, b) = ((at + 1, self.reach(at + 1, p)), (node.second, self.reach(node.second, p)));
             // The nearer one on top.
             (stack[top], stack[top + 1]) = if a.1 <= b.1 { (b, a) } else { (a, b) };
             top += 2;
         }
     }
 
-    /// Distance from everything that the tools sweep, and its gradient.
-    fn cut(&self, p: DVec3) -> (f64, DVec3) {
+    /// The nearest of everything that the tools sweep.
+    fn cut(&self, p: DVec3) -> Nearest {
         let mut nearest = Nearest::default();
         let mut limit = f64::INFINITY;
         self.visit(p, &mut limit, |m, limit| {
             nearest.take(m, self.swept(&self.moves[m as usize], p));
             *limit = nearest.value;
         });
-        (nearest.value, nearest.gradient)
+        nearest
     }
 
-    /// The body at `p`, where the swept volumes have this distance and gradient.
-    fn body(&self, p: DVec3, (cut, g): (f64, DVec3)) -> (f64, DVec3) {
+    /// Distance and gradient of the stock.
+    fn stock(&self, p: DVec3) -> (f64, DVec3) {
         let half = self.stock.size() / 2.0;
-        let (stock, h) = super::Solid::Cuboid { size: half * 2.0, round: 0.0 }.evaluate(p - self.stock.center());
-        if -cut > stock { (-cut, -g) } else { (stock, h) }
+        super::Solid::Cuboid { size: half * 2.0, round: 0.0 }.evaluate(p - self.stock.center())
     }
 
-    fn evaluate(&self, p: DVec3) -> (f64, DVec3) {
-        self.body(p, self.cut(p))
+    /// The value at `p`, where the swept volumes have this distance.
+    fn value_of(&self, p: DVec3, cut: f64) -> f64 {
+        let stock = self.stock(p).0;
+        if -cut > stock { -cut } else { stock }
+    }
+
+    /// The gradient at `p`, where this is the nearest of the swept volumes.
+    fn gradient_of(&self, p: DVec3, cut: &Nearest) -> DVec3 {
+        let (stock, h) = self.stock(p);
+        if -cut.value > stock {
+            -self.moves.get(cut.at as usize).map_or(DVec3::Z, |m| self.slope(m, cut.place, p))
+        } else {
+            h
+        }
     }
 }
 
 /// The nearest of some moves; of those at the same distance the first.
 struct Nearest {
     value: f64,
-    gradient: DVec3,
+    /// Place of the move that the distance is taken from.
+    place: f64,
     at: u32,
 }
 
 impl Default for Nearest {
     fn default() -> Nearest {
-        Nearest { value: f64::INFINITY, gradient: DVec3::Z, at: u32::MAX }
+        Nearest { value: f64::INFINITY, place: 0.0, at: u32::MAX }
     }
 }
 
 impl Nearest {
-    fn take(&mut self, at: u32, (value, gradient): (f64, DVec3)) {
+    fn take(&mut self, at: u32, (value, place): (f64, f64)) {
         if value < self.value || (value == self.value && at < self.at) {
-            *self = Nearest { value, gradient, at };
+            *self = Nearest { value, place, at };
         }
     }
 }
@@ -266,37 +296,61 @@ impl Nearest {
 /// A milled body in a small box: the moves that decide there.
 struct Corner<'a> {
     milling: &'a Milling,
-    moves: Vec<u32>,
+    /// Middle of the box.
+    center: DVec3,
+    /// Moves with their distances from the middle, the nearest first.
+    moves: Vec<(f64, u32)>,
 }
 
 impl<'a> Corner<'a> {
     /// The moves that can be the nearest one at any place of a box: distances change by no more than the way.
-    fn new(milling: &'a Milling, aabb: &Aabb, among: Option<&[u32]>) -> Corner<'a> {
+    fn new(milling: &'a Milling, aabb: &Aabb, among: Option<&Corner>) -> Corner<'a> {
         let (center, way) = (aabb.center(), SLACK * aabb.diagonal());
-        let mut found: Vec<(u32, f64)> = Vec::new();
+        let mut moves: Vec<(f64, u32)> = Vec::new();
         let mut least = f64::INFINITY;
-        let mut take = |m: u32, limit: &mut f64| {
+        let take = |m: u32, limit: &mut f64| {
             let value = milling.swept(&milling.moves[m as usize], center).0;
             least = least.min(value);
             *limit = least + way;
             if value <= *limit {
-                found.push((m, value));
+                moves.push((value, m));
             }
         };
         let mut limit = f64::INFINITY;
         match among {
-            Some(moves) => moves.iter().for_each(|&m| take(m, &mut limit)),
+            Some(corner) => corner.visit(center, &mut limit, take),
             None => milling.visit(center, &mut limit, take),
         }
-        Corner { milling, moves: found.into_iter().filter(|x| x.1 <= limit).map(|x| x.0).collect() }
+        moves.retain(|m| m.0 <= limit);
+        moves.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        Corner { milling, center, moves }
     }
 
-    fn evaluate(&self, p: DVec3) -> (f64, DVec3) {
+    /// Visits the moves that may be nearer to `p` than `limit`, which `visit` may lower: as far as `p` is from the middle,
+    /// a distance can have fallen since there.
+    fn visit(&self, p: DVec3, limit: &mut f64, mut visit: impl FnMut(u32, &mut f64)) {
+        let way = SLACK * p.distance(self.center) + TINY * self.milling.stock.diagonal();
+        for &(value, m) in &self.moves {
+            if value - way > *limit {
+                break;
+            }
+            visit(m, limit);
+        }
+    }
+
+    fn cut(&self, p: DVec3) -> Nearest {
         let mut nearest = Nearest::default();
-        self.moves.iter().for_each(|&m| nearest.take(m, self.milling.swept(&self.milling.moves[m as usize], p)));
-        self.milling.body(p, (nearest.value, nearest.gradient))
+        let mut limit = f64::INFINITY;
+        self.visit(p, &mut limit, |m, limit| {
+            nearest.take(m, self.milling.swept(&self.milling.moves[m as usize], p));
+            *limit = nearest.value;
+        });
+        nearest
     }
 }
+
+/// Rounding of distances, as a fraction of the stock's diagonal.
+const TINY: f64 = 1e-12;
 
 /// Twice the way from the middle of a box to its corners, a little more for rounding.
 const SLACK: f64 = 1.000_001;
@@ -315,11 +369,14 @@ impl Field for Corner<'_> {
     }
 
     fn value(&self, p: DVec3) -> f64 {
-        self.evaluate(p).0
+        // What is asked first is the middle.
+        let middle = self.moves.first().filter(|_| p == self.center);
+        let cut = middle.map_or_else(|| self.cut(p).value, |m| m.0);
+        self.milling.value_of(p, cut)
     }
 
     fn gradient(&self, p: DVec3) -> DVec3 {
-        self.evaluate(p).1
+        self.milling.gradient_of(p, &self.cut(p))
     }
 
     fn crosses(&self, aabb: &Aabb) -> bool {
@@ -327,7 +384,7 @@ impl Field for Corner<'_> {
     }
 
     fn within(&self, aabb: &Aabb) -> Option<Box<dyn Field + '_>> {
-        Some(Box::new(Corner::new(self.milling, aabb, Some(&self.moves))))
+        Some(Box::new(Corner::new(self.milling, aabb, Some(self))))
     }
 }
 
@@ -337,11 +394,11 @@ impl Field for Milling {
     }
 
     fn value(&self, p: DVec3) -> f64 {
-        self.evaluate(p).0
+        self.value_of(p, self.cut(p).value)
     }
 
     fn gradient(&self, p: DVec3) -> DVec3 {
-        self.evaluate(p).1
+        self.gradient_of(p, &self.cut(p))
     }
 
     fn crosses(&self, aabb: &Aabb) -> bool {
@@ -375,10 +432,10 @@ mod tests {
                     let least = (0..=2000)
                         .map(|s| {
                             let q = p - to * s as f64 / 2000.0;
-                            tool.distance(DVec2::new(q.truncate().length(), q.z)).0
+                            tool.distance(DVec2::new(q.truncate().length(), q.z))
                         })
                         .fold(f64::INFINITY, f64::min);
-                    let found = milling.cut(p).0;
+                    let found = milling.cut(p).value;
                     assert!(found <= least + 1e-9 && found > least - 4e-4, "{tool:?} {to} {p}: {found} {least}");
                 }
             }
