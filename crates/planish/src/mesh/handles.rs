@@ -34,7 +34,14 @@ pub(super) fn close(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &mut 
     let mut seeds: Option<Vec<u32>> = None;
     for _ in 0..ROUNDS {
         let adjacency = Adjacency::of(triangles, source.len());
-        let mut search = Search::new(mesh, triangles, source, &adjacency);
+        let mut search = Search {
+            mesh,
+            triangles,
+            source,
+            adjacency: &adjacency,
+            local: vec![NONE; triangles.len()],
+            reached: vec![(f64::INFINITY, NONE); source.len()],
+        };
         if seeds.is_none() && search.genus(&(0..triangles.len() as u32).collect::<Vec<_>>()) == 0 {
             break;
         }
@@ -42,23 +49,24 @@ pub(super) fn close(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &mut 
         let mut busy = vec![false; source.len()];
         let mut loops = Vec::new();
         for &seed in &suspects {
+            // A loop nearby is cut already: look again in the next round.
+            if busy[seed as usize] {
+                continue;
+            }
             let Some(found) = search.tight_loop(seed, REACH * size, size) else { continue };
             // Two loops around one handle would cut a piece off.
             let piece = search.piece(found[0], REACH * size);
             let vertices = || piece.iter().flat_map(|&t| triangles[t as usize]);
             if !vertices().any(|v| busy[v as usize]) {
                 vertices().for_each(|v| busy[v as usize] = true);
-                loops.push(found);
+                loops.extend(cap(&found, &search).map(|cap| (found, cap)));
             }
         }
-        let before = closed;
-        for l in loops {
-            if let Some(cap) = cap(&l, &search) {
-                cut(&l, &cap, triangles, source, &adjacency);
-                closed += 1;
-            }
+        for (around, cap) in &loops {
+            cut(around, cap, triangles, source, &adjacency);
         }
-        if closed == before {
+        closed += loops.len();
+        if loops.is_empty() {
             break;
         }
         seeds = Some(suspects);
@@ -69,8 +77,8 @@ pub(super) fn close(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &mut 
 /// Pieces of a surface around vertices.
 struct Search<'a> {
     mesh: &'a TriMesh,
-    triangles: Vec<[u32; 3]>,
-    source: Vec<u32>,
+    triangles: &'a [[u32; 3]],
+    source: &'a [u32],
     adjacency: &'a Adjacency,
     /// Place of a triangle in the piece that is looked at.
     local: Vec<u32>,
@@ -78,24 +86,13 @@ struct Search<'a> {
     reached: Vec<(f64, u32)>,
 }
 
-impl<'a> Search<'a> {
-    fn new(mesh: &'a TriMesh, triangles: &[[u32; 3]], source: &[u32], adjacency: &'a Adjacency) -> Search<'a> {
-        Search {
-            mesh,
-            triangles: triangles.to_vec(),
-            source: source.to_vec(),
-            adjacency,
-            local: vec![NONE; triangles.len()],
-            reached: vec![(f64::INFINITY, NONE); source.len()],
-        }
-    }
-
+impl Search<'_> {
     fn at(&self, v: u32) -> DVec3 {
         self.mesh.points[self.source[v as usize] as usize]
     }
 
     fn origin(&self, h: u32) -> u32 {
-        super::soup::origin(&self.triangles, h)
+        super::soup::origin(self.triangles, h)
     }
 
     /// The triangles around `seed` that lie within a ball and hang together.
@@ -133,7 +130,7 @@ impl<'a> Search<'a> {
         piece.iter().for_each(|&t| self.local[t as usize] = NONE);
     }
 
-    /// Is `h` at the rim of the piece that was entered?
+    /// Is there nothing of the piece that was entered on the other side of `h`?
     fn rim(&self, h: u32) -> bool {
         let g = self.adjacency.opposite[h as usize];
         g == NONE || self.local[g as usize / 3] == NONE
@@ -290,10 +287,8 @@ impl<'a> Search<'a> {
             for h in self.adjacency.fan(v).collect::<Vec<_>>() {
                 // Edges that begin here, and on a boundary the one that ends here and has no other side.
                 for (e, w) in [(h, self.end(h)), (previous(h), self.origin(previous(h)))] {
-                    let outward = e == h;
-                    let known = self.local[e as usize / 3] != NONE;
-                    let lone = self.adjacency.opposite[e as usize] == NONE;
-                    if !known && (lone || self.rim_outside(e)) || !outward && !lone {
+                    let outside = self.local[e as usize / 3] == NONE && self.rim(e);
+                    if outside || e != h && self.adjacency.opposite[e as usize] != NONE {
                         continue;
                     }
                     let far = so_far + self.at(v).distance(self.at(w));
@@ -308,12 +303,6 @@ impl<'a> Search<'a> {
             }
         }
         visited
-    }
-
-    /// Is the triangle on the other side of `h` outside the piece, too?
-    fn rim_outside(&self, h: u32) -> bool {
-        let g = self.adjacency.opposite[h as usize];
-        g == NONE || self.local[g as usize / 3] == NONE
     }
 
     /// Vertices from `v` back to the root.
