@@ -222,7 +222,8 @@ impl Search<'_> {
         let (rim, roots) = self.rim_loops(&piece);
         let in_tree = |s: &Self, h: u32| {
             let g = s.adjacency.opposite[h as usize];
-            [h, g].into_iter().any(|e| e != NONE && s.reached[s.end(e) as usize].1 == e)
+            let led = |e: u32, v: u32| s.reached[v as usize].1 == e;
+            [h, g].into_iter().any(|e| e != NONE && (led(e, s.origin(e)) || led(e, s.end(e))))
         };
         let mut edges: Vec<(Reverse<u64>, u32)> = Vec::new();
         for h in piece.iter().flat_map(|&t| 3 * t..3 * t + 3) {
@@ -430,6 +431,25 @@ mod tests {
         assert_eq!((done.closed_handles, facts.genus, facts.components), (1, Some(0), 2));
         assert!(facts.watertight && facts.manifold);
         assert!(mended.points.iter().all(|p| mesh.points.contains(p)));
+    }
+
+    #[test]
+    fn a_handle_beside_a_hole_is_closed_and_nothing_comes_off() {
+        let whole = with_a_handle();
+        // The tube follows the faces of its sphere.
+        let tube = shapes::sphere(1.0, 4).triangles.len() - 2;
+        let at = whole.corners(tube)[0];
+        for far in [0.1, 0.2, 0.3] {
+            let mut mesh = whole.clone();
+            let hole = (0..tube)
+                .filter(|&t| mesh.corners(t).iter().all(|p| p.distance(at) > far))
+                .min_by(|&a, &b| mesh.corners(a)[0].distance(at).total_cmp(&mesh.corners(b)[0].distance(at)))
+                .expect("a face of the sphere");
+            mesh.triangles.swap_remove(hole);
+            let (mended, done) = repair(&mesh).unwrap();
+            let facts = diagnose(&mended);
+            assert_eq!((done.closed_handles, facts.genus, facts.components, facts.boundary_loops), (1, Some(0), 2, 1));
+        }
     }
 
     #[test]
