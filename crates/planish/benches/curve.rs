@@ -9,7 +9,9 @@ use planish::curve::{
 use planish::geom::{Bvh, random};
 use planish::grid::{self, Grid, GridParams};
 use planish::mesh::{self, Adjacency, FacePoint, TriMesh, shapes};
-use planish::network::{CurveKind, Editor, LayoutParams, PatchMesh, changed_patches, imprint, layout, reimprint};
+use planish::network::{
+    CurveKind, Editor, Holds, LayoutParams, PatchMesh, changed_patches, imprint, layout, reimprint,
+};
 use planish::{DVec3, Silent, surface};
 use std::io::Write;
 use std::time::Instant;
@@ -20,6 +22,11 @@ const PAIRS: usize = 60;
 const RUNS: usize = 5;
 /// Distance of the picks over the diagonal, with some tolerance.
 const APART: [f64; 2] = [0.24, 0.26];
+
+/// A section of this width around the middle of a curve.
+fn section(width: f64) -> Holds<'static> {
+    Holds { section: Some((0.5, width)), ..Holds::default() }
+}
 
 fn tell(id: &str, what: &str) {
     writeln!(std::io::stdout().lock(), "{id:<40} {what}").expect("a terminal");
@@ -297,7 +304,7 @@ fn one_patch(wanted: &dyn Fn(&str) -> bool) {
     let sizes = grid::choose_sizes(&before, &old, &grid_params);
     let old_grids = grid::relax(&mesh, &old, &sizes, &grid_params, &Silent).expect("grids");
     let start = Instant::now();
-    editor.drag_curve(curve, 0.5, DVec3::X * 0.03, 0.6, &params, &Silent).expect("a drag");
+    editor.drag_curve(curve, 0.5, DVec3::X * 0.03, &section(0.6), &params, &Silent).expect("a drag");
     let drag = milliseconds(start);
     let which = changed_patches(&before, &editor.network).expect("the same network");
     let near: Vec<&PatchMesh> = which.iter().map(|&p| &old[p]).collect();
@@ -378,7 +385,9 @@ fn follows(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
         let length: f64 = at.windows(2).map(|w| w[0].distance(w[1])).sum();
         let aside = (at[at.len() - 1] - at[0]).any_orthonormal_vector() * (0.05 * length);
         let forces = SnakeParams { fairness: 0.1, curvature: 1.0, ..SnakeParams::default() };
-        if editor.drag_curve(c as u32, 0.5, aside, 0.7, &forces, &Silent).is_err() || !editor.glance().is_finished() {
+        if editor.drag_curve(c as u32, 0.5, aside, &section(0.7), &forces, &Silent).is_err()
+            || !editor.glance().is_finished()
+        {
             continue;
         }
         let which = changed_patches(&before, &editor.network).expect("the same network");

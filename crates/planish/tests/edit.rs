@@ -8,7 +8,7 @@ use planish::geom::Bvh;
 use planish::grid::{self, Family, FeatureCurve, FeatureError, GridParams, Sections, relax_with_features};
 use planish::mesh::{Adjacency, FacePoint, TriMesh, shapes};
 use planish::model::{Drawing, HistoryEntry, Model};
-use planish::network::{CurveKind, EditError, Editor, Fault, LayoutParams, Network, imprint, layout};
+use planish::network::{CurveKind, EditError, Editor, Fault, Holds, LayoutParams, Network, imprint, layout};
 use planish::pipeline::{self, PipelineParams};
 use planish::{DVec3, Silent};
 
@@ -169,7 +169,8 @@ fn dragging_a_corner_or_a_curve_of_a_layout_leaves_a_finished_network_and_the_re
     assert!(editor.diagnose().is_finished());
     let before = editor.network.clone();
     let middle = before.curves[5].points[before.curves[5].points.len() / 2].position(&mesh);
-    editor.drag_curve(5, 0.5, middle.any_orthonormal_vector() * 0.05, 0.5, &params, &Silent).unwrap();
+    let holds = Holds { section: Some((0.5, 0.5)), ..Holds::default() };
+    editor.drag_curve(5, 0.5, middle.any_orthonormal_vector() * 0.05, &holds, &params, &Silent).unwrap();
     let (old, new) = (&before.curves[5].points, &editor.network.curves[5].points);
     assert!(old != new && old[0] == new[0] && old[old.len() - 1] == new[new.len() - 1]);
     // Outside the half in the middle nothing changed.

@@ -9,7 +9,7 @@ use planish::grid::{self, Grid, GridParams};
 use planish::mesh::{Adjacency, TriMesh, shapes};
 use planish::model::{Drawing, Model};
 use planish::network::{
-    CurveKind, Editor, LayoutParams, Network, PatchMesh, changed_patches, imprint, layout, reimprint,
+    CurveKind, Editor, Holds, LayoutParams, Network, PatchMesh, changed_patches, imprint, layout, reimprint,
 };
 use planish::pipeline::{self, Earlier, PipelineParams};
 use planish::surface::{self, FitParams};
@@ -34,7 +34,8 @@ fn edited(share: f64) -> (TriMesh, Adjacency, Network, Network, u32) {
     let aside = (b - a).cross(points[points.len() / 2].position(&mesh)).normalize() * (share * length(curve));
     let mut editor = Editor::new(&mesh, &adjacency, before.clone());
     let params = SnakeParams { fairness: 0.1, curvature: 1.0, ..SnakeParams::default() };
-    editor.drag_curve(curve as u32, 0.5, aside, 0.7, &params, &Silent).unwrap();
+    let holds = Holds { section: Some((0.5, 0.7)), ..Holds::default() };
+    editor.drag_curve(curve as u32, 0.5, aside, &holds, &params, &Silent).unwrap();
     let after = editor.network.clone();
     (mesh, adjacency, before, after, curve as u32)
 }

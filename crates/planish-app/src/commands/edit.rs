@@ -8,11 +8,11 @@ use crate::files;
 use crate::pictures::{self, View};
 use crate::products::Staged;
 use crate::summary::Summary;
-use planish::edit::{self, ApplyError, Edit, Ground};
+use planish::edit::{self, ApplyError, Edit, Ground, Made};
 use planish::model::{Drawing, HistoryEntry, Model};
 use planish::network::{Diagnosis, diagnose};
 use planish::pipeline::{self, Earlier, PipelineParams, Warning};
-use planish_io::report::{Report, count};
+use planish_io::report::{EditRow, RelaxedRow, Report, count, number};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -55,8 +55,10 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
     let earlier = if args.stages.none_given() { Earlier::of(&model) } else { None };
     let mut report = Report::new("edit", files::model_facts(&args.input, &model, model.units));
     report.stages.push(read);
-    let ((found, pictures), record) = session.step("edit", || replay(session, args, &script, &mut model))?;
+    let (Replayed { found, pictures, rows }, record) =
+        session.step("edit", || replay(session, args, &script, &mut model))?;
     report.stages.push(record);
+    report.edits = rows;
     for fault in &found.faults {
         report.warnings.push(Warning::new("network_unfinished", fault.to_string(), ""));
     }
@@ -87,7 +89,9 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
         session.tell_warnings(&report);
         let mut table = if model.surfaces.is_empty() { Summary::default() } else { summary(&report, demanded) };
         let network = &model.network;
-        table.row("edits", count(script.steps.len() as u64));
+        for row in &report.edits {
+            table.row(format!("step {}", row.step), told_row(row));
+        }
         table.row(
             "network",
             format!(
@@ -156,20 +160,28 @@ fn params(session: &Session, args: &EditArgs, model: &Model) -> Result<PipelineP
 /// Pictures with the files that they go to.
 type Pictures = Vec<(PathBuf, Vec<u8>)>;
 
-/// Applies the edits; returns what is left to do on the network, and the pictures if they are asked for.
-fn replay(
-    session: &Session,
-    args: &EditArgs,
-    script: &Script,
-    model: &mut Model,
-) -> Result<(Diagnosis, Pictures), Failure> {
+/// What came of a script.
+struct Replayed {
+    /// What is left to do on the network.
+    found: Diagnosis,
+    /// The pictures, if they are asked for.
+    pictures: Pictures,
+    /// What every edit did.
+    rows: Vec<EditRow>,
+}
+
+/// Applies the edits.
+fn replay(session: &Session, args: &EditArgs, script: &Script, model: &mut Model) -> Result<Replayed, Failure> {
     // The mesh stays as it is, so that all edits share what is made ready of it.
     let mesh = std::mem::take(&mut model.mesh);
     let ground = Ground::new(&mesh);
     let others = |name: &str| other(&args.script, name);
     let mut pictures = Pictures::new();
+    let mut rows = Vec::with_capacity(script.steps.len());
     let mut step = |k: usize, edit: &Edit, line: usize| -> Result<(), Failure> {
-        one(model, edit, &ground, &others, session).map_err(|e| told(&args.script, k, line, edit, e))?;
+        let wrong = |e| told(&args.script, k, line, edit, e);
+        let made = one(model, edit, &ground, &others, session).map_err(wrong)?;
+        rows.push(row(k, edit, line, made));
         if let Some(folder) = &args.pictures {
             let file = folder.join(format!("{:02}-{}.png", k + 1, edit.name()));
             pictures.push((file, pictures::drawing(&mesh, &model.drawing(), &script.view)?));
@@ -181,7 +193,82 @@ fn replay(
     drop(ground);
     model.mesh = mesh;
     outcome?;
-    Ok((found, pictures))
+    Ok(Replayed { found, pictures, rows })
+}
+
+/// What an edit did, for the report.
+fn row(k: usize, edit: &Edit, line: usize, made: Made) -> EditRow {
+    let relaxed = made.relaxed.iter().map(|r| RelaxedRow {
+        curve: r.curve,
+        sweeps: r.relaxed.sweeps,
+        settled: r.relaxed.settled,
+        last_move: r.relaxed.last_move,
+        energy: r.relaxed.energy.map(|e| e.total()),
+        terms: r.relaxed.energy.map(|e| [e.fairness, e.curvature, e.arc_length]),
+    });
+    EditRow {
+        step: k + 1,
+        line,
+        edit: edit.name(),
+        changed: made.changed,
+        corners: made.corners,
+        curves: made.curves,
+        features: made.features,
+        relaxed: relaxed.collect(),
+        faults: made.faults.map(|f| f.len()),
+    }
+}
+
+/// What an edit did, in words.
+fn told_row(row: &EditRow) -> String {
+    let mut parts = Vec::new();
+    for (what, list) in [("corner", &row.corners), ("curve", &row.curves), ("feature curve", &row.features)] {
+        if !list.is_empty() {
+            let s = if list.len() > 1 { "s" } else { "" };
+            parts.push(format!("{what}{s} {}", ranges(list)));
+        }
+    }
+    match &row.relaxed[..] {
+        [] => {}
+        [one] => parts.push(format!(
+            "{} after {} sweeps, energy {} to {}",
+            if one.settled { "at rest" } else { "not at rest" },
+            one.sweeps,
+            number(one.energy[0]),
+            number(one.energy[1])
+        )),
+        all => {
+            let settled = all.iter().filter(|r| r.settled).count();
+            parts.push(format!("{settled} of {} curves at rest", all.len()));
+        }
+    }
+    match row.faults {
+        Some(0) => parts.push("all patches".into()),
+        Some(n) => parts.push(format!("{n} to put right")),
+        None => {}
+    }
+    let name = &row.edit;
+    if !row.changed {
+        return format!("{name}: nothing to change");
+    }
+    if parts.is_empty() { name.clone() } else { format!("{name}: {}", parts.join(", ")) }
+}
+
+/// Numbers with their runs drawn together: `3, 5 to 9`.
+fn ranges(list: &[u32]) -> String {
+    let mut runs: Vec<[u32; 2]> = Vec::new();
+    for &k in list {
+        match runs.last_mut() {
+            Some(run) if run[1] + 1 == k => run[1] = k,
+            _ => runs.push([k, k]),
+        }
+    }
+    let word = |&[a, b]: &[u32; 2]| match b - a {
+        0 => a.to_string(),
+        1 => format!("{a}, {b}"),
+        _ => format!("{a} to {b}"),
+    };
+    runs.iter().map(word).collect::<Vec<_>>().join(", ")
 }
 
 enum Wrong {
@@ -195,8 +282,15 @@ impl From<ApplyError> for Wrong {
     }
 }
 
-fn one(model: &mut Model, edit: &Edit, ground: &Ground, others: &edit::Others, session: &Session) -> Result<(), Wrong> {
-    match edit {
+fn one(
+    model: &mut Model,
+    edit: &Edit,
+    ground: &Ground,
+    others: &edit::Others,
+    session: &Session,
+) -> Result<Made, Wrong> {
+    let before: Drawing = model.drawing();
+    let moved = match edit {
         Edit::Undo { count } => (0..*count).try_for_each(|_| match model.undo() {
             true => Ok(()),
             false => Err(Wrong::Nothing("there is nothing left to take back")),
@@ -206,12 +300,13 @@ fn one(model: &mut Model, edit: &Edit, ground: &Ground, others: &edit::Others, s
             false => Err(Wrong::Nothing("there is nothing left to make again")),
         }),
         edit => {
-            let mut drawing: Drawing = model.drawing();
-            edit::apply(&mut drawing, edit, ground, others, &session.bars)?;
+            let mut drawing = before;
+            let made = edit::apply(&mut drawing, edit, ground, others, &session.bars)?;
             model.record(HistoryEntry { command: edit.name(), parameters: edit.parameters() }, drawing);
-            Ok(())
+            return Ok(made);
         }
-    }
+    };
+    moved.map(|()| Made::between(&before, &model.drawing()))
 }
 
 fn told(script: &Path, k: usize, line: usize, edit: &Edit, wrong: Wrong) -> Failure {

@@ -5,7 +5,7 @@ use crate::args::{Info, ScanArgs};
 use crate::failure::{Failure, Status};
 use crate::files::{self, Content};
 use crate::summary::Summary;
-use planish::mesh::{Diagnosis, diagnose};
+use planish::mesh::{Adjacency, Diagnosis, diagnose};
 use planish::model::Model;
 use planish::pipeline::{Figure, Warning};
 use planish_io::report::{Report, count, number};
@@ -35,6 +35,7 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
         report.quality.insert("patches.count".into(), Figure::Count(model.network.patches.len() as u64));
         let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
         report.quality.insert("surface.control_points".into(), Figure::Count(control as u64));
+        report.warnings.extend(network_faults(model));
     }
     commit_report(own_report, &report)?;
     if !session.common.quiet {
@@ -46,7 +47,7 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
         }
         let verdict = match report.warnings.len() {
             0 => "nothing".to_owned(),
-            n => format!("{n} things, told above; `planish run` repairs what it can"),
+            n => format!("{n} things, told above; `planish run` repairs what it can of the mesh"),
         };
         table.row("wrong", verdict);
         table.print();
@@ -170,14 +171,36 @@ fn mesh_rows(table: &mut Summary, report: &Report, facts: &Diagnosis) {
     }
 }
 
+/// What is left to do on a network before all of the mesh is patches.
+fn network_faults(model: &Model) -> Vec<Warning> {
+    if model.network.curves.is_empty() {
+        return Vec::new();
+    }
+    let found = planish::network::diagnose(&model.mesh, &Adjacency::new(&model.mesh), &model.network);
+    found.faults.iter().map(|f| Warning::new("network_unfinished", f.to_string(), "")).collect()
+}
+
 fn model_rows(table: &mut Summary, model: &Model) {
     let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
     let points: usize = model.grids.iter().map(|g| g.points.len()).sum();
     let texels: usize = model.reliefs.iter().map(|r| r.vectors.len()).sum();
-    table.row("patches", count(model.network.patches.len() as u64));
+    let (network, sketch) = (&model.network, &model.sketch);
+    let [corners, curves] = [network.corners.len(), network.curves.len()].map(|n| count(n as u64));
+    table.row("network", format!("{corners} corners, {curves} curves"));
+    table.row("patches", count(network.patches.len() as u64));
+    if !sketch.features.is_empty() {
+        table.row("feature curves", count(sketch.features.len() as u64));
+    }
+    if let Some(plane) = sketch.symmetry {
+        let [p, n] = [plane.point, plane.normal].map(|v| v.to_array().map(|x| format!("{x:.4}")).join(", "));
+        table.row("symmetry", format!("plane through ({p}) with normal ({n})"));
+    }
     table.row("grid points", count(points as u64));
     table.row("control points", count(control as u64));
     table.row("relief", format!("{} texels", count(texels as u64)));
     let commands: Vec<&str> = model.history.iter().map(|h| h.command.as_str()).collect();
     table.row("history", commands.join(", "));
+    if !model.undo.is_empty() || !model.redo.is_empty() {
+        table.row("edits", format!("{} to take back, {} to make again", model.undo.len(), model.redo.len()));
+    }
 }

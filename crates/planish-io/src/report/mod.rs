@@ -31,6 +31,49 @@ pub struct Report {
     /// Seams, worst first; absent where no seam was measured.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub seams: Vec<SeamRow>,
+    /// What every edit of a script did; absent for other commands.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub edits: Vec<EditRow>,
+}
+
+/// What one edit of a script did. Numbers are those after it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct EditRow {
+    /// Its number in the script, from 1.
+    pub step: usize,
+    /// Its line in the script, from 1.
+    pub line: usize,
+    /// Its name.
+    pub edit: String,
+    /// False if the drawing is what it was.
+    pub changed: bool,
+    /// Corners that are new or have moved.
+    pub corners: Vec<u32>,
+    /// Curves that are new or have another course.
+    pub curves: Vec<u32>,
+    /// Feature curves that are new.
+    pub features: Vec<u32>,
+    /// How curves relaxed.
+    pub relaxed: Vec<RelaxedRow>,
+    /// How many things are to be put right before all of the mesh is patches; null where no curve changed.
+    pub faults: Option<usize>,
+}
+
+/// How a curve relaxed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RelaxedRow {
+    /// The curve.
+    pub curve: u32,
+    /// Sweeps made.
+    pub sweeps: usize,
+    /// True if it came to rest.
+    pub settled: bool,
+    /// Largest move of the last sweep over the distance of its points.
+    pub last_move: f64,
+    /// Energy before and after, input units squared.
+    pub energy: [f64; 2],
+    /// The same by its terms: fairness, curvature, arc length.
+    pub terms: [[f64; 3]; 2],
 }
 
 /// What went into a command.
@@ -78,6 +121,7 @@ impl Report {
             quality: Quality::new(),
             warnings: Vec::new(),
             seams: Vec::new(),
+            edits: Vec::new(),
         }
     }
 

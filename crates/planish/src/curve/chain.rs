@@ -134,6 +134,15 @@ pub(crate) fn without_repeats(mesh: &TriMesh, chain: &mut Vec<FacePoint>) {
     }
 }
 
+/// Takes away what a chain goes there and back around the place `joint`: a way that is drawn to something comes to a
+/// pick and leaves it by the same places. At most half of either side goes.
+pub(crate) fn without_spur(mesh: &TriMesh, chain: &mut Vec<FacePoint>, joint: usize) {
+    let most = joint.min(chain.len() - 1 - joint) / 2;
+    let place = |p: &FacePoint| p.position(mesh);
+    let spur = (1..=most).take_while(|&k| place(&chain[joint - k]) == place(&chain[joint + k])).count();
+    chain.drain(joint - spur..joint + spur);
+}
+
 /// `count` places at equal arc length along a chain whose neighbours share a face; the ends are kept.
 pub(crate) fn sample(mesh: &TriMesh, adjacency: &Adjacency, chain: &[FacePoint], count: usize) -> Vec<FacePoint> {
     let at: Vec<DVec3> = chain.iter().map(|p| p.position(mesh)).collect();

@@ -27,7 +27,7 @@ pub mod symmetry;
 pub use attract::{attract, slide_to};
 pub use canvas::{Canvas, Magnet};
 pub use chain::SurfaceCurve;
-pub(crate) use chain::{between, without_repeats};
+pub(crate) use chain::{between, without_repeats, without_spur};
 pub use curvature::{VertexCurvature, vertex_curvature};
 pub use paint::{PaintMode, PaintParams, Snap, SnapTargets, Stroke, snap, way};
 pub use scalar::ScalarField;
@@ -58,7 +58,7 @@ pub enum CurveError {
         faces: usize,
     },
     /// A curve needs more points.
-    #[error("{found} points make no curve here; give at least {needed}")]
+    #[error("too few points for a curve ({found}); give at least {needed}")]
     TooFewPoints {
         /// Points given.
         found: usize,

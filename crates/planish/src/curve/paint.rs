@@ -6,7 +6,7 @@
 //! also be a geodesic, or be drawn to lines or to a scalar.
 
 use super::canvas::{Canvas, Magnet};
-use super::chain::{SurfaceCurve, sample, without_repeats};
+use super::chain::{SurfaceCurve, sample, without_repeats, without_spur};
 use super::strip::{nearest_corner, no_way, straighten};
 use super::{CurveError, attract};
 use crate::mesh::{FacePoint, path};
@@ -141,10 +141,16 @@ impl Stroke {
     pub fn curve(&self, canvas: &Canvas) -> SurfaceCurve {
         let mut points: Vec<FacePoint> = self.picks.first().copied().into_iter().collect();
         for piece in &self.pieces {
+            let joint = points.len() - 1;
             points.extend_from_slice(&piece[1..]);
+            without_spur(canvas.mesh, &mut points, joint);
         }
         if self.closed {
             points.pop();
+            let (end, place) = (points.len(), |p: &FacePoint| p.position(canvas.mesh));
+            let spur = (1..end / 4).take_while(|&k| place(&points[end - k]) == place(&points[k])).count();
+            points.truncate(end - spur);
+            points.drain(..spur);
         }
         without_repeats(canvas.mesh, &mut points);
         SurfaceCurve { points, closed: self.closed }

@@ -560,6 +560,12 @@ impl<'m> Snake<'m> {
                 moves.iter_mut().for_each(|m| *m *= longest / reach);
             }
             if pulled {
+                if whole {
+                    // A free loop slides along itself under no force: it would never come to rest.
+                    let along = |i: usize| (self.at[(i + 1) % n] - self.at[(i + n - 1) % n]).normalize_or_zero();
+                    let slide = (0..n).map(|i| moves[i].dot(along(i))).sum::<f64>() / n as f64;
+                    moves.iter_mut().enumerate().for_each(|(i, m)| *m -= along(i) * slide);
+                }
                 // The pull has no energy of its own to compare.
                 return (self.apply(&moves), true);
             }

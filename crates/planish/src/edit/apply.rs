@@ -2,22 +2,25 @@
 
 use super::keep;
 use super::mirror::{Images, ON_PLANE};
-use super::{ApplyError, Edit, Forces, LINE_KIND, Magnetism, Others, Pull, Scalar, SplineMove, Spot};
+use super::stroke::Brush;
+use super::{ApplyError, Edit, Forces, LINE_KIND, Made, Name, Others, Pull, RelaxedCurve, Scalar, SplineMove, Spot};
 use super::{carry_network, mirror_network};
 use crate::curve::{
-    Canvas, CurveError, Magnet, PaintMode, PaintParams, ScalarField, SnakeParams, SplineEdit, Stroke, SurfaceCurve,
-    carry::LandmarkMap, section, symmetry,
+    Canvas, CurveError, ScalarField, SnakeParams, SplineEdit, SurfaceCurve, carry::LandmarkMap, section, symmetry,
 };
 use crate::geom::Bvh;
-use crate::grid::{FeatureCurve, Sections};
+use crate::grid::{Family, FeatureCurve, Sections, check_features, family_of};
 use crate::mesh::{FacePoint, TriMesh, sharp_edges};
 use crate::model::Drawing;
-use crate::network::{CurveKind, Editor, LayoutParams, imprint};
+use crate::network::{CurveKind, EditError, Editor, Holds, LayoutParams, PatchMesh, imprint};
 use crate::observe::Observer;
 use glam::DVec3;
+use std::sync::OnceLock;
 
 /// A position further off the mesh than this share of its diagonal is a mistake: of units, or of axes.
 const FAR: f64 = 0.25;
+/// Picks go to edges sharper than this, degrees.
+const SHARP_DEG: f64 = 40.0;
 
 /// A mesh made ready for edits.
 pub struct Ground<'m> {
@@ -25,33 +28,42 @@ pub struct Ground<'m> {
     pub canvas: Canvas<'m>,
     /// Nearest places and rays.
     pub bvh: Bvh,
+    /// Sharp half-edges, once they are asked for.
+    sharp: OnceLock<Vec<bool>>,
 }
 
 impl<'m> Ground<'m> {
     /// Makes a mesh ready, once for many edits.
     pub fn new(mesh: &'m TriMesh) -> Ground<'m> {
         let (canvas, bvh) = rayon::join(|| Canvas::new(mesh), || Bvh::new(mesh));
-        Ground { canvas, bvh }
+        Ground { canvas, bvh, sharp: OnceLock::new() }
+    }
+
+    /// For each half-edge whether it is sharp: lines that picks go to.
+    pub(super) fn sharp(&self) -> &[bool] {
+        self.sharp.get_or_init(|| sharp_edges(self.canvas.mesh, &self.canvas.adjacency, SHARP_DEG))
     }
 }
 
 impl Forces {
     fn params(&self) -> SnakeParams {
-        let Forces { fairness, curvature, sweeps, sweep } = *self;
-        SnakeParams { fairness, curvature, sweeps, sweep, ..SnakeParams::default() }
+        let Forces { fairness, curvature, arc_length, sweeps, settle, sweep } = *self;
+        SnakeParams { fairness, curvature, arc_length, sweeps, settle, sweep, attraction: 0.0 }
     }
 }
 
 /// An edit at work.
-struct Work<'a, 'm> {
-    ground: &'a Ground<'m>,
-    drawing: &'a mut Drawing,
+pub(super) struct Work<'a, 'm> {
+    pub(super) ground: &'a Ground<'m>,
+    pub(super) drawing: &'a mut Drawing,
     observer: &'a dyn Observer,
+    relaxed: Vec<RelaxedCurve>,
     /// After a mirroring: the plane, and what became of the curves.
     images: Option<(symmetry::Plane, Images)>,
 }
 
-/// Makes one edit. On an error the drawing is what it was. Patches are those of the curves afterwards.
+/// Makes one edit, and tells what it did. On an error the drawing is what it was. Patches are those of the curves
+/// afterwards.
 /// * `others` - models that [`Edit::Carry`] names
 /// # Errors
 /// See [`ApplyError`].
@@ -61,28 +73,29 @@ pub fn apply(
     ground: &Ground,
     others: &Others,
     observer: &dyn Observer,
-) -> Result<(), ApplyError> {
+) -> Result<Made, ApplyError> {
     super::check::check(edit)?;
     let before = drawing.clone();
-    let mut work = Work { ground, drawing, observer, images: None };
+    let mut work = Work { ground, drawing, observer, relaxed: Vec::new(), images: None };
     let made = work.make(edit, others);
-    let images = work.images.take();
+    let (images, relaxed) = (work.images.take(), std::mem::take(&mut work.relaxed));
     if observer.cancelled() || made.is_err() {
         *drawing = before;
-        return made.and(Err(ApplyError::Cancelled));
+        return Err(made.err().unwrap_or(ApplyError::Cancelled));
     }
     let canvas = &ground.canvas;
     let moved = drawing.network.corners != before.network.corners || drawing.network.curves != before.network.curves;
+    let mut faults = None;
     if moved || images.is_some() {
         let mut editor = Editor::new(canvas.mesh, &canvas.adjacency, std::mem::take(&mut drawing.network));
-        editor.diagnose();
+        faults = Some(editor.diagnose().faults);
         drawing.network = editor.network;
         match &images {
             Some((plane, images)) => keep::mirror(ground, drawing, &before, plane, images),
             None => keep::keep(edit, drawing, &before),
         }
     }
-    Ok(())
+    Ok(Made { relaxed, faults, ..Made::between(&before, drawing) })
 }
 
 impl Work<'_, '_> {
@@ -90,14 +103,10 @@ impl Work<'_, '_> {
         self.ground.canvas.mesh
     }
 
-    fn place(&self, spot: &Spot) -> Result<FacePoint, ApplyError> {
+    pub(super) fn place(&self, spot: &Spot) -> Result<FacePoint, ApplyError> {
         let faces = self.mesh().triangles.len();
         match *spot {
-            Spot::Position(p) => {
-                let found = self.ground.bvh.closest(DVec3::from_array(p));
-                let away = found.distance / self.mesh().bounds().diagonal().max(f64::MIN_POSITIVE);
-                if away > FAR { Err(ApplyError::OffMesh { place: p, away }) } else { Ok(found.place) }
-            }
+            Spot::Position(p) => self.nearest(p),
             Spot::Place(p) if (p.face as usize) < faces => Ok(p),
             Spot::Place(p) => Err(CurveError::NoSuchFace { face: p.face, faces }.into()),
             Spot::Corner { corner } => {
@@ -108,8 +117,77 @@ impl Work<'_, '_> {
         }
     }
 
+    fn nearest(&self, p: [f64; 3]) -> Result<FacePoint, ApplyError> {
+        let found = self.ground.bvh.closest(DVec3::from_array(p));
+        let away = found.distance / self.mesh().bounds().diagonal().max(f64::MIN_POSITIVE);
+        if away > FAR { Err(ApplyError::OffMesh { place: p, away }) } else { Ok(found.place) }
+    }
+
+    /// A vector of a move, no longer than the diagonal.
+    fn shift(&self, by: &[f64; 3]) -> Result<DVec3, ApplyError> {
+        let by = DVec3::from_array(*by);
+        let share = by.length() / self.mesh().bounds().diagonal().max(f64::MIN_POSITIVE);
+        if share > 1.0 { Err(ApplyError::TooFar { share }) } else { Ok(by) }
+    }
+
+    /// Number of the one nearest to a place among lists of places.
+    fn named<'p>(
+        &self,
+        name: &Name,
+        what: &'static str,
+        lists: impl ExactSizeIterator<Item = &'p [FacePoint]>,
+    ) -> Result<u32, ApplyError> {
+        let near = match *name {
+            Name::Number(k) => return Ok(k),
+            Name::Near { near } => near,
+        };
+        self.nearest(near)?;
+        let (mesh, p) = (self.mesh(), DVec3::from_array(near));
+        let away = |list: &[FacePoint]| {
+            let at: Vec<DVec3> = list.iter().map(|q| q.position(mesh)).collect();
+            let pieces = at.windows(2).map(|w| {
+                let d = w[1] - w[0];
+                let share = (p - w[0]).dot(d) / d.length_squared().max(f64::MIN_POSITIVE);
+                (w[0] + d * share.clamp(0.0, 1.0)).distance(p)
+            });
+            pieces.chain(at.first().map(|q| q.distance(p))).fold(f64::INFINITY, f64::min)
+        };
+        let found = lists.enumerate().map(|(k, list)| (away(list), k as u32));
+        let found = found.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        found.map(|x| x.1).ok_or(ApplyError::NoneYet { what })
+    }
+
+    fn corner(&self, name: &Name) -> Result<u32, ApplyError> {
+        let corners = &self.drawing.network.corners;
+        let found = self.named(name, "corner", corners.iter().map(|c| std::slice::from_ref(&c.place)))?;
+        match corners.len() {
+            count if found as usize >= count => Err(ApplyError::NoSuchCorner { corner: found, count }),
+            _ => Ok(found),
+        }
+    }
+
+    fn curve(&self, name: &Name) -> Result<u32, ApplyError> {
+        let curves = &self.drawing.network.curves;
+        let found = self.named(name, "curve", curves.iter().map(|c| &c.points[..]))?;
+        match curves.len() {
+            count if found as usize >= count => {
+                Err(EditError::NoSuchPart { what: "curve", index: found, count }.into())
+            }
+            _ => Ok(found),
+        }
+    }
+
+    fn feature(&self, name: &Name) -> Result<u32, ApplyError> {
+        let features = &self.drawing.sketch.features;
+        let found = self.named(name, "feature curve", features.iter().map(|f| &f.points[..]))?;
+        match features.len() {
+            count if found as usize >= count => Err(ApplyError::NoSuchFeature { feature: found, count }),
+            _ => Ok(found),
+        }
+    }
+
     /// Lets `change` work on the network.
-    fn edit<T, E>(
+    pub(super) fn edit<T, E>(
         &mut self,
         change: impl FnOnce(&mut Editor, f64, &dyn Observer) -> Result<T, E>,
     ) -> Result<T, ApplyError>
@@ -125,10 +203,10 @@ impl Work<'_, '_> {
     }
 
     fn add(&mut self, curve: &SurfaceCurve, kind: CurveKind, snap: f64) -> Result<(), ApplyError> {
-        self.edit(|e, diagonal, _| e.add_curve(curve, kind, snap.max(0.0) * diagonal)).map(drop)
+        self.edit(|e, diagonal, _| e.draw_curve(curve, kind, snap * diagonal)).map(drop)
     }
 
-    fn field(&self, scalar: &Scalar) -> Result<ScalarField, ApplyError> {
+    pub(super) fn field(&self, scalar: &Scalar) -> Result<ScalarField, ApplyError> {
         let (mesh, adjacency) = (self.mesh(), &self.ground.canvas.adjacency);
         let attribute = |name: &str| {
             mesh.attributes.iter().find(|a| a.name == name).ok_or_else(|| ApplyError::NoSuchAttribute {
@@ -155,39 +233,10 @@ impl Work<'_, '_> {
         Ok(field.smoothed(self.mesh(), &self.ground.canvas.adjacency, pull.blending))
     }
 
-    fn stroke(
-        &self,
-        picks: &[Spot],
-        mode: PaintMode,
-        closed: bool,
-        magnet: Option<&Magnetism>,
-    ) -> Result<SurfaceCurve, ApplyError> {
-        let canvas = &self.ground.canvas;
-        let magnet = match (mode, magnet) {
-            (PaintMode::Magnetic, Some(Magnetism::Sharp(angle))) => {
-                Some(Magnet::of_lines(canvas.mesh, &sharp_edges(canvas.mesh, &canvas.adjacency, *angle)))
-            }
-            (PaintMode::Magnetic, Some(Magnetism::Scalar(scalar))) => Some(Magnet::of_scalar(&self.field(scalar)?)),
-            (PaintMode::Magnetic, _) => Some(Magnet::of_scalar(&self.field(&Scalar::MaximumCurvature)?)),
-            _ => None,
-        };
-        let params = PaintParams { mode, ..PaintParams::default() };
-        let mut stroke = Stroke::new();
-        for pick in picks {
-            stroke.add(canvas, self.place(pick)?, &params, magnet.as_ref())?;
-        }
-        if closed {
-            stroke.close(canvas, &params, magnet.as_ref())?;
-        }
-        let curve = stroke.curve(canvas);
-        curve.check(canvas.mesh)?;
-        Ok(curve)
-    }
-
-    /// The finished patch that a place lies in.
-    fn patch_at(&self, place: &FacePoint) -> Result<u32, ApplyError> {
+    /// The finished patch that a place lies in, and its number.
+    fn patch_at(&self, place: &FacePoint) -> Result<(u32, PatchMesh), ApplyError> {
         let nowhere = || ApplyError::NoPatch { place: place.position(self.mesh()).to_array() };
-        let cut = imprint(self.mesh(), &self.drawing.network).map_err(|_| nowhere())?;
+        let mut cut = imprint(self.mesh(), &self.drawing.network).map_err(|_| nowhere())?;
         let p = place.position(self.mesh());
         // The patch with the part of the face that is nearest to the place.
         let near = cut.iter().enumerate().flat_map(|(k, patch)| {
@@ -197,7 +246,16 @@ impl Work<'_, '_> {
                 (middle.distance(p), k as u32)
             })
         });
-        near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|x| x.1).ok_or_else(nowhere)
+        let found = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|x| x.1);
+        let found = found.ok_or_else(nowhere)?;
+        Ok((found, cut.swap_remove(found as usize)))
+    }
+
+    /// Looks whether the feature curves and sections of a patch suit it.
+    fn check_features(&self, number: u32, patch: &PatchMesh) -> Result<(), ApplyError> {
+        let sketch = &self.drawing.sketch;
+        let sections = sketch.sections.iter().find(|s| s.0 == number).map(|s| &s.1);
+        Ok(check_features(self.mesh(), (number, patch), &sketch.features, sections)?)
     }
 
     fn make(&mut self, edit: &Edit, others: &Others) -> Result<(), ApplyError> {
@@ -205,8 +263,13 @@ impl Work<'_, '_> {
         let (mesh, adjacency) = (canvas.mesh, &canvas.adjacency);
         match edit {
             Edit::Paint { picks, mode, closed, magnet, snap } => {
-                let curve = self.stroke(picks, *mode, *closed, magnet.as_ref())?;
+                let brush = Brush { mode: *mode, magnet: magnet.as_ref(), snap: *snap };
+                let curve = self.stroke(picks, *closed, &brush)?;
                 self.add(&curve, CurveKind::Smooth, *snap)
+            }
+            Edit::Extend { curve, picks, mode, closed, magnet, snap } => {
+                let curve = self.curve(curve)?;
+                self.extend(curve, picks, *closed, &Brush { mode: *mode, magnet: magnet.as_ref(), snap: *snap })
             }
             Edit::Cut { through, normal, snap } => {
                 let place = self.place(through)?;
@@ -215,8 +278,11 @@ impl Work<'_, '_> {
                 self.add(&curve, CurveKind::Smooth, *snap)
             }
             Edit::Project { points, direction, snap } => {
-                let points: Vec<DVec3> = points.iter().map(|p| DVec3::from_array(*p)).collect();
                 let direction = DVec3::from_array(*direction);
+                if direction == DVec3::ZERO {
+                    points.iter().try_for_each(|p| self.nearest(*p).map(drop))?;
+                }
+                let points: Vec<DVec3> = points.iter().map(|p| DVec3::from_array(*p)).collect();
                 let curve = section::project(mesh, adjacency, &self.ground.bvh, &points, direction, canvas.edge)?;
                 self.add(&curve, CurveKind::Smooth, *snap)
             }
@@ -233,38 +299,60 @@ impl Work<'_, '_> {
                 let place = self.place(at)?;
                 self.edit(|e, diagonal, _| e.add_corner(place, snap * diagonal)).map(drop)
             }
-            Edit::SplitCurve { curve, at } => self.edit(|e, _, _| e.split_curve(*curve, *at)).map(drop),
-            Edit::Join { corner } => self.edit(|e, _, _| e.join(*corner)).map(drop),
+            Edit::SplitCurve { curve, at } => {
+                let curve = self.curve(curve)?;
+                self.edit(|e, _, _| e.split_curve(curve, *at)).map(drop)
+            }
+            Edit::Join { corner } => {
+                let corner = self.corner(corner)?;
+                self.edit(|e, _, _| e.join(corner)).map(drop)
+            }
             Edit::DeleteCurves { curves } => {
-                let mut curves = curves.clone();
+                let mut curves = curves.iter().map(|c| self.curve(c)).collect::<Result<Vec<_>, _>>()?;
                 curves.sort_unstable();
                 curves.dedup();
                 self.edit(|e, _, _| curves.iter().rev().try_for_each(|&c| e.delete_curve(c)))
             }
-            Edit::DeleteCorner { corner } => self.edit(|e, _, _| e.delete_corner(*corner)),
+            Edit::DeleteCorner { corner } => {
+                let corner = self.corner(corner)?;
+                self.edit(|e, _, _| e.delete_corner(corner))
+            }
             Edit::Clear {} => {
                 self.drawing.network = Default::default();
                 Ok(())
             }
             Edit::DragCorner { corner, to, reach, forces } => {
-                let to = self.place(to)?;
-                self.edit(|e, _, o| e.drag_corner(*corner, to, *reach, &forces.params(), o))
+                let (corner, to) = (self.corner(corner)?, self.place(to)?);
+                let relaxed = self.edit(|e, _, o| e.drag_corner(corner, to, *reach, &forces.params(), o))?;
+                self.relaxed.extend(relaxed.into_iter().map(|(curve, relaxed)| RelaxedCurve { curve, relaxed }));
+                Ok(())
             }
-            Edit::DragCurve { curve, at, by, width, forces } => {
-                let by = DVec3::from_array(*by);
-                self.edit(|e, _, o| e.drag_curve(*curve, *at, by, *width, &forces.params(), o))
+            Edit::DragCurve { curve, at, by, width, forces, pins, stiffness } => {
+                let (curve, by) = (self.curve(curve)?, self.shift(by)?);
+                let holds = Holds { section: Some((*at, *width)), field: None, pins, stiffness };
+                let relaxed = self.edit(|e, _, o| e.drag_curve(curve, *at, by, &holds, &forces.params(), o))?;
+                self.relaxed.push(RelaxedCurve { curve, relaxed });
+                Ok(())
             }
-            Edit::Relax { curve, section, forces, pull } => {
+            Edit::Relax { curve, section, forces, pull, pins, stiffness } => {
                 let field = pull.as_ref().map(|p| self.pull(p)).transpose()?;
                 let attraction = pull.as_ref().map_or(0.0, |p| p.weight);
                 let params = SnakeParams { attraction, ..forces.params() };
                 let section = section.map(|s| (s[0], s[1]));
-                match curve {
-                    Some(curve) => self.edit(|e, _, o| e.relax_curve(*curve, section, field.as_ref(), &params, o)),
-                    None => self.relax_all(section, field.as_ref(), &params),
-                }
+                let holds = Holds { section, field: field.as_ref(), pins, stiffness };
+                let Some(curve) = curve else { return self.relax_all(&holds, &params) };
+                let curve = self.curve(curve)?;
+                let relaxed = self.edit(|e, _, o| e.relax_curve(curve, &holds, &params, o))?;
+                self.relaxed.push(RelaxedCurve { curve, relaxed });
+                Ok(())
             }
-            Edit::Spline { curve, control, moves } => self.spline(*curve, *control, moves),
+            Edit::Spline { curve, control, moves } => {
+                let curve = self.curve(curve)?;
+                moves.iter().try_for_each(|m| match m {
+                    SplineMove::Control { by, .. } | SplineMove::Edit { by, .. } => self.shift(by).map(drop),
+                })?;
+                self.spline(curve, *control, moves)
+            }
             Edit::SplitRegion { at, from } => {
                 let place = self.place(at)?;
                 let from = *from;
@@ -279,30 +367,32 @@ impl Work<'_, '_> {
                     LayoutParams { patches: *patches, sharp_angle_deg: *sharp_angle_deg, ..LayoutParams::default() };
                 self.edit(|e, _, o| e.complete(&params, o))
             }
-            Edit::Feature { picks, family, mode } => {
-                let curve = self.stroke(picks, *mode, false, None)?;
+            Edit::Feature { picks, family, mode, magnet } => {
+                let curve = self.stroke(picks, false, &Brush { mode: *mode, magnet: magnet.as_ref(), snap: 0.0 })?;
                 let middle = curve.points[curve.points.len() / 2];
-                let patch = self.patch_at(&middle)?;
-                let feature = FeatureCurve { patch, family: *family, points: curve.points };
-                self.drawing.sketch.features.push(feature);
-                Ok(())
+                let (patch, cut) = self.patch_at(&middle)?;
+                let family = family.unwrap_or_else(|| family_of(mesh, &cut, &curve.points));
+                let feature = FeatureCurve { patch, family, points: curve.points };
+                let sketch = &mut self.drawing.sketch;
+                sketch.features.push(feature);
+                forget_cells(&mut sketch.sections, patch, family);
+                self.check_features(patch, &cut)
             }
             Edit::DeleteFeature { feature } => {
-                let features = &mut self.drawing.sketch.features;
-                if *feature as usize >= features.len() {
-                    return Err(ApplyError::NoSuchFeature { feature: *feature, count: features.len() });
-                }
-                features.remove(*feature as usize);
+                let feature = self.feature(feature)?;
+                let sketch = &mut self.drawing.sketch;
+                let gone = sketch.features.remove(feature as usize);
+                forget_cells(&mut sketch.sections, gone.patch, gone.family);
                 Ok(())
             }
             Edit::Sections { at, u, v } => {
-                let patch = self.patch_at(&self.place(at)?)?;
+                let (patch, cut) = self.patch_at(&self.place(at)?)?;
                 let sections = &mut self.drawing.sketch.sections;
                 sections.retain(|s| s.0 != patch);
                 if !u.is_empty() || !v.is_empty() {
                     sections.push((patch, Sections { u: u.clone(), v: v.clone() }));
                 }
-                Ok(())
+                self.check_features(patch, &cut)
             }
             Edit::Symmetry { plane } => {
                 let plane = match plane {
@@ -334,15 +424,11 @@ impl Work<'_, '_> {
     }
 
     /// Relaxes one curve after the other; one that would run into another stays as it is.
-    fn relax_all(
-        &mut self,
-        section: Option<(f64, f64)>,
-        field: Option<&ScalarField>,
-        params: &SnakeParams,
-    ) -> Result<(), ApplyError> {
+    fn relax_all(&mut self, holds: &Holds, params: &SnakeParams) -> Result<(), ApplyError> {
         let mesh = self.ground.canvas.mesh;
         let plane = self.drawing.sketch.symmetry;
         let near = ON_PLANE * mesh.bounds().diagonal();
+        let mut all = Vec::new();
         self.edit(|e, _, observer| -> Result<(), ApplyError> {
             let count = e.network.curves.len();
             let mut faults = e.glance().faults.len();
@@ -354,28 +440,35 @@ impl Work<'_, '_> {
                 if curve.kind != CurveKind::Smooth || plane.is_some_and(in_plane) {
                     continue;
                 }
-                let before = curve.points.clone();
-                e.relax_curve(c as u32, section, field, params, observer)?;
+                let (before, corner) = (curve.points.clone(), curve.corners[0]);
+                let start = e.network.corners[corner as usize].clone();
+                let relaxed = match e.relax_curve(c as u32, holds, params, observer) {
+                    Ok(relaxed) => relaxed,
+                    // It shrinks to nothing: it stays as well.
+                    Err(EditError::Shrunk { .. }) => continue,
+                    Err(e) => return Err(e.into()),
+                };
                 let after = e.glance().faults.len();
                 if after > faults {
                     e.network.curves[c].points = before;
+                    e.network.corners[corner as usize] = start;
                 } else {
                     faults = after;
+                    all.push(RelaxedCurve { curve: c as u32, relaxed });
                 }
             }
             Ok(())
-        })
+        })?;
+        self.relaxed = all;
+        Ok(())
     }
 
     fn spline(&mut self, curve: u32, control: usize, moves: &[SplineMove]) -> Result<(), ApplyError> {
         let canvas = &self.ground.canvas;
         let (mesh, adjacency) = (canvas.mesh, &canvas.adjacency);
         self.edit(|e, _, _| -> Result<(), ApplyError> {
-            let count = e.network.curves.len();
-            let found = e.network.curves.get(curve as usize);
-            let found = found.ok_or(CurveError::NoSuchPart { what: "curve", index: curve as usize, count })?;
-            let open = SurfaceCurve::open(found.points.clone());
-            let even = open.spaced(mesh, adjacency, canvas.edge)?;
+            let course = e.course(curve);
+            let even = course.spaced(mesh, adjacency, canvas.edge)?;
             // A short curve still has as many places as its spline has vertices.
             let even = even.resampled(mesh, adjacency, even.points.len().max(2 * control))?;
             let mut spline = SplineEdit::fit(mesh, &even, control)?;
@@ -393,4 +486,16 @@ impl Work<'_, '_> {
             Ok(e.replace_curve(curve, &spline.carry(mesh, adjacency, &even))?)
         })
     }
+}
+
+/// Takes back the cells that are given across curves of a family: with one curve more or less they are of other
+/// sections.
+fn forget_cells(sections: &mut Vec<(u32, Sections)>, patch: u32, family: Family) {
+    for (_, cells) in sections.iter_mut().filter(|s| s.0 == patch) {
+        match family {
+            Family::V => cells.u.clear(),
+            Family::U => cells.v.clear(),
+        }
+    }
+    sections.retain(|(_, cells)| !cells.u.is_empty() || !cells.v.is_empty());
 }

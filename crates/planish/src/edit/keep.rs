@@ -6,13 +6,16 @@ use super::{Edit, Ground};
 use crate::curve::SurfaceCurve;
 use crate::curve::symmetry::Plane;
 use crate::grid::{Family, FeatureCurve, Sections};
-use crate::mesh::FacePoint;
+use crate::mesh::{FacePoint, TriMesh};
 use crate::model::Drawing;
 use crate::network::{Network, Patch};
 use std::collections::BTreeMap;
 
 /// Sides that a patch before the plane or across it keeps at least: across it up to two sides lie behind it.
 const ACROSS: usize = 2;
+
+/// Fewest cells of a section over the plane: two on each side of it.
+const FEWEST_ACROSS: usize = 4;
 
 /// How a patch lies on another, by their curves: its side `k` on side `first + k`, or mirrored on `first - k`.
 #[derive(Clone, Copy)]
@@ -141,9 +144,68 @@ pub(super) fn mirror(ground: &Ground, drawing: &mut Drawing, before: &Drawing, p
         }
     }
     for (p, s) in &before.sketch.sections {
-        let (first, second) = maps(*p);
-        let second = second.filter(|o| first.is_some_and(|f| f.patch != o.patch));
-        sections.extend(first.into_iter().chain(second).map(|o| (o.patch, o.sections(s))));
+        let (Some(first), second) = maps(*p) else { continue };
+        let mut here = first.sections(s);
+        match second.filter(|o| first.patch != o.patch) {
+            Some(second) => sections.push((second.patch, second.sections(s))),
+            None => across(&mut here, mesh, new, (first.patch, *p), before, plane, images),
+        }
+        sections.push((first.patch, here));
     }
     (drawing.sketch.features, drawing.sketch.sections) = (features, sections);
+}
+
+/// Cells of a patch that is its own image, made their own image along the direction that crosses the plane: those up to
+/// the last curve before the plane count, and the section over the plane takes what is left of the sum.
+/// * `names` - the numbers of the patch now and before
+fn across(
+    cells: &mut Sections,
+    mesh: &TriMesh,
+    network: &Network,
+    names: (u32, u32),
+    before: &Drawing,
+    plane: &Plane,
+    images: &Images,
+) {
+    let patch = &network.patches[names.0 as usize];
+    let image = |c: u32| images.image.get(c as usize).copied();
+    let Some(own) = Onto::find(patch, &image, &network.patches, true, 4).filter(|o| o.patch == names.0) else {
+        return;
+    };
+    let (list, end) = match own.first {
+        0 => (&mut cells.u, 3),
+        2 => (&mut cells.v, 0),
+        // The plane runs from corner to corner.
+        _ => return,
+    };
+    let near = ON_PLANE * mesh.bounds().diagonal();
+    let height = |p: &FacePoint| plane.height(p.position(mesh));
+    let side = &network.curves[patch.sides[end].curve as usize].points;
+    if height(&side[side.len() / 2]) < 0.0 {
+        list.reverse();
+    }
+    // Curves along the plane, by where they lie: those that cross it are of the other family.
+    let tops = before.sketch.features.iter().filter(|f| f.patch == names.1).map(|f| {
+        let heights = f.points.iter().map(height);
+        heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)))
+    });
+    let (mut front, mut inside) = (0, false);
+    for (low, high) in tops {
+        front += (low > near) as usize;
+        inside |= low >= -near && high <= near;
+    }
+    if list.len() < front + 1 {
+        return;
+    }
+    let sum: usize = list.iter().sum();
+    let last = list[front];
+    list.truncate(front);
+    let ahead: usize = list.iter().sum();
+    let back: Vec<usize> = list.iter().rev().copied().collect();
+    match inside {
+        true => list.extend([last, last]),
+        false if sum >= 2 * ahead + FEWEST_ACROSS => list.push(sum - 2 * ahead),
+        false => list.push(last),
+    }
+    list.extend(back);
 }

@@ -6,141 +6,34 @@
 
 mod apply;
 mod check;
+mod error;
 mod keep;
 mod mirror;
+mod outcome;
+mod place;
+mod pull;
+mod stroke;
 
 pub use apply::{Ground, apply};
+pub use error::ApplyError;
 pub use mirror::{Images, carry_network, mirror_network};
+pub use outcome::{Made, RelaxedCurve};
+pub use place::{Name, Spot};
+pub use pull::{Forces, Magnetism, Pull, Scalar, SplineMove};
 
+use crate::curve::PaintMode;
 use crate::curve::symmetry::Plane;
-use crate::curve::{CurveError, PaintMode, Sweep};
 use crate::grid::Family;
-use crate::mesh::FacePoint;
 use crate::model::Drawing;
-use crate::network::{CurveKind, EditError};
-use schemars::JsonSchema;
+use crate::network::{CurveKind, Stretch};
 use serde::{Deserialize, Serialize};
-
-/// A place as a script names it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum Spot {
-    /// A world position; the nearest place of the mesh is meant.
-    Position([f64; 3]),
-    /// A place by its face.
-    Place(FacePoint),
-    /// A corner of the network.
-    Corner {
-        /// Its number.
-        corner: u32,
-    },
-}
-
-/// A scalar by its name.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Scalar {
-    /// Luminance of the colour of the vertices.
-    Luminance,
-    /// A channel of an attribute of the vertices, counted from 0.
-    Channel {
-        /// Name of the attribute.
-        attribute: String,
-        /// Channel.
-        channel: usize,
-    },
-    /// Mean curvature.
-    MeanCurvature,
-    /// Gaussian curvature.
-    GaussianCurvature,
-    /// The greater principal curvature by size.
-    MaximumCurvature,
-    /// One number per vertex.
-    Values(Vec<f64>),
-}
-
-/// What a curve is drawn to.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Pull {
-    /// The scalar; curves go to high values.
-    pub scalar: Scalar,
-    /// True to go to low values.
-    #[serde(default)]
-    pub low: bool,
-    /// Rounds of blending with the neighbours before, which reach about the root of them in edges.
-    #[serde(default = "usual_blending")]
-    pub blending: usize,
-    /// Weight against the forces of the curve.
-    #[serde(default = "usual_weight")]
-    pub weight: f64,
-}
-
-fn usual_blending() -> usize {
-    20
-}
-
-fn usual_weight() -> f64 {
-    10.0
-}
-
-/// What a magnetic stroke is drawn to.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Magnetism {
-    /// Edges sharper than this many degrees.
-    Sharp(f64),
-    /// Ridges and valleys: high curvature by size.
-    Creases,
-    /// High values of a scalar.
-    Scalar(Scalar),
-}
-
-/// How curves relax.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Forces {
-    /// Weight of shortness.
-    pub fairness: f64,
-    /// Weight of stiffness.
-    pub curvature: f64,
-    /// Sweeps at most.
-    pub sweeps: usize,
-    /// How points are moved.
-    pub sweep: Sweep,
-}
-
-impl Default for Forces {
-    fn default() -> Forces {
-        Forces { fairness: 0.1, curvature: 1.0, sweeps: 200, sweep: Sweep::CoarseToFine }
-    }
-}
-
-/// A move of a space curve.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum SplineMove {
-    /// A control vertex, counted from 0, by a vector.
-    Control {
-        /// The control vertex.
-        vertex: usize,
-        /// World units.
-        by: [f64; 3],
-    },
-    /// The edit point at a share of the curve, by a vector.
-    Edit {
-        /// 0 to 1.
-        at: f64,
-        /// World units.
-        by: [f64; 3],
-    },
-}
 
 /// One edit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "edit", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Edit {
-    /// Paints a curve through picks. Its ends go to corners and curves within `snap` of the diagonal.
+    /// Paints a curve through picks. Picks go to corners, curves and sharp edges within `snap` of the diagonal; where
+    /// the curve meets others, corners divide both.
     Paint {
         /// The picks, in order.
         picks: Vec<Spot>,
@@ -148,6 +41,26 @@ pub enum Edit {
         #[serde(default)]
         mode: PaintMode,
         /// True for a closed curve.
+        #[serde(default)]
+        closed: bool,
+        /// What a magnetic stroke is drawn to.
+        #[serde(default)]
+        magnet: Option<Magnetism>,
+        /// Share of the diagonal.
+        #[serde(default = "usual_snap")]
+        snap: f64,
+    },
+    /// Leads a curve on from its free end through more picks, as [`Edit::Paint`] would.
+    Extend {
+        /// The curve; the end that it was painted towards is meant if both are free.
+        curve: Name,
+        /// The picks, in order.
+        #[serde(default)]
+        picks: Vec<Spot>,
+        /// How the way between picks is found.
+        #[serde(default)]
+        mode: PaintMode,
+        /// True to lead it on to its own other end.
         #[serde(default)]
         closed: bool,
         /// What a magnetic stroke is drawn to.
@@ -199,31 +112,31 @@ pub enum Edit {
     /// Divides a curve at a share of its length.
     SplitCurve {
         /// The curve.
-        curve: u32,
+        curve: Name,
         /// 0 to 1.
         at: f64,
     },
     /// Joins the two curves at a corner.
     Join {
         /// The corner.
-        corner: u32,
+        corner: Name,
     },
     /// Deletes curves.
     DeleteCurves {
         /// The curves, numbered as before the edit.
-        curves: Vec<u32>,
+        curves: Vec<Name>,
     },
     /// Deletes a corner without curves or between two.
     DeleteCorner {
         /// The corner.
-        corner: u32,
+        corner: Name,
     },
     /// Deletes all corners and curves.
     Clear {},
     /// Moves a corner; its curves follow.
     DragCorner {
         /// The corner.
-        corner: u32,
+        corner: Name,
         /// Where to.
         to: Spot,
         /// Share of each curve that relaxes.
@@ -236,7 +149,7 @@ pub enum Edit {
     /// Pulls a point of a curve; a section around it relaxes.
     DragCurve {
         /// The curve.
-        curve: u32,
+        curve: Name,
         /// Share of its length.
         at: f64,
         /// World units.
@@ -247,13 +160,19 @@ pub enum Edit {
         /// How it relaxes.
         #[serde(default)]
         forces: Forces,
+        /// Shares of the length where the curve stays where it is.
+        #[serde(default)]
+        pins: Vec<f64>,
+        /// Stretches with weights of their own.
+        #[serde(default)]
+        stiffness: Vec<Stretch>,
     },
     /// Relaxes a curve, a section of it, or all curves.
     Relax {
         /// The curve; absent for all that are free to move and do not lie in the plane of symmetry. Of these one stays
         /// as it is where it would run into another.
         #[serde(default)]
-        curve: Option<u32>,
+        curve: Option<Name>,
         /// Middle and width of the section, shares of the length.
         #[serde(default)]
         section: Option<[f64; 2]>,
@@ -263,11 +182,17 @@ pub enum Edit {
         /// What it is drawn to.
         #[serde(default)]
         pull: Option<Pull>,
+        /// Shares of the length where the curve stays where it is.
+        #[serde(default)]
+        pins: Vec<f64>,
+        /// Stretches with weights of their own.
+        #[serde(default)]
+        stiffness: Vec<Stretch>,
     },
     /// Fits a space curve with some control vertices, moves it, and lets the curve follow. Without moves it smooths.
     Spline {
         /// The curve.
-        curve: u32,
+        curve: Name,
         /// Control vertices.
         control: usize,
         /// Moves, one after the other.
@@ -294,16 +219,20 @@ pub enum Edit {
     Feature {
         /// The picks, from side to side; the patch is that of the middle one.
         picks: Vec<Spot>,
-        /// Which iso-curves it is one of.
-        family: Family,
+        /// Which iso-curves it is one of; absent to tell it by the sides that its ends lie nearest to.
+        #[serde(default)]
+        family: Option<Family>,
         /// How the way between picks is found.
         #[serde(default)]
         mode: PaintMode,
+        /// What a magnetic stroke is drawn to.
+        #[serde(default)]
+        magnet: Option<Magnetism>,
     },
     /// Deletes a feature curve.
     DeleteFeature {
         /// Its number.
-        feature: u32,
+        feature: Name,
     },
     /// Gives the numbers of cells between the feature curves of a patch; empty lists take them back.
     Sections {
@@ -384,89 +313,6 @@ impl Edit {
 
 /// Another model by the name that a script has for it: its mesh and its drawing.
 pub type Others<'a> = dyn Fn(&str) -> Result<(crate::mesh::TriMesh, Drawing), String> + 'a;
-
-/// Why an edit was not made.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ApplyError {
-    /// The edit of the network.
-    #[error(transparent)]
-    Edit(#[from] EditError),
-    /// A curve.
-    #[error(transparent)]
-    Curve(#[from] CurveError),
-    /// A corner that is not there.
-    #[error("corner {corner} is not there, there are {count} - hint: they are counted from 0")]
-    NoSuchCorner {
-        /// The corner.
-        corner: u32,
-        /// How many there are.
-        count: usize,
-    },
-    /// A place or a number that is not finite.
-    #[error("{what} is not a finite number - hint: give numbers in the units of the mesh")]
-    NotFinite {
-        /// What it is of.
-        what: &'static str,
-    },
-    /// A position far off the mesh.
-    #[error(
-        "({:.6}, {:.6}, {:.6}) is {:.0} % of the diagonal off the mesh - hint: check the units and the axes",
-        place[0], place[1], place[2], 100.0 * away
-    )]
-    OffMesh {
-        /// The position.
-        place: [f64; 3],
-        /// Its distance over the diagonal.
-        away: f64,
-    },
-    /// No patch where one is wanted.
-    #[error("there is no patch at ({:.6}, {:.6}, {:.6}) yet - hint: finish the curves around it", place[0], place[1], place[2])]
-    NoPatch {
-        /// The place.
-        place: [f64; 3],
-    },
-    /// A feature curve that is not there.
-    #[error("feature curve {feature} is not there, there are {count} - hint: they are counted from 0")]
-    NoSuchFeature {
-        /// Its number.
-        feature: u32,
-        /// How many there are.
-        count: usize,
-    },
-    /// The vertices have no such attribute.
-    #[error("the vertices have no \"{name}\" - hint: use {there}")]
-    NoSuchAttribute {
-        /// The name asked for.
-        name: String,
-        /// The names there are.
-        there: String,
-    },
-    /// Mirroring without a plane.
-    #[error("no plane of symmetry is set - hint: an edit \"symmetry\" sets or finds one")]
-    NoPlane,
-    /// A curve crosses the plane of symmetry more than once.
-    #[error("curve {curve} crosses the plane of symmetry more than once, at ({:.6}, {:.6}, {:.6}) the last time - hint: divide it there, or delete it", place[0], place[1], place[2])]
-    AcrossPlane {
-        /// The curve.
-        curve: usize,
-        /// The place.
-        place: [f64; 3],
-    },
-    /// The other model cannot be read.
-    #[error("{name}: {what}")]
-    Other {
-        /// Its name.
-        name: String,
-        /// What is wrong.
-        what: String,
-    },
-    /// An edit of the history where a drawing is edited.
-    #[error("edits are taken back and made again on the model, not on a drawing - hint: apply them to the model")]
-    NotADrawing,
-    /// Stopped by the observer.
-    #[error("cancelled")]
-    Cancelled,
-}
 
 /// What `kind` means for an edge line found by its angle.
 const LINE_KIND: CurveKind = CurveKind::Feature;

@@ -173,7 +173,7 @@ pub enum FeatureError {
 /// Share of the time that reading the slides takes.
 const READING: f64 = 0.3;
 /// Fewest cells of a section: with fewer its points would tell nothing of its shape.
-const FEWEST_CELLS: usize = 2;
+pub(super) const FEWEST_CELLS: usize = 2;
 
 /// Resamples a patch so that its feature curves are iso-curves of the grid, exactly.
 /// * `patch` - exact sub-mesh of `input`
@@ -201,17 +201,18 @@ pub fn relax_with_features(
     relax_along(input, patch, &strands, &cells, &stops, params, observer)
 }
 
-/// The grid along strands that are there already, with the cells of every section and the stops of the sides, those
-/// of the strands among them.
-pub(super) fn relax_along(
-    input: &TriMesh,
-    patch: &PatchMesh,
-    strands: &Strands,
-    cells: &[Vec<usize>; 2],
-    stops: &SideStops,
-    params: &GridParams,
-    observer: &dyn Observer,
-) -> Result<FeatureGrid, FeatureError> {
+/// Feature curves woven into their patch.
+pub(super) struct Woven {
+    /// The patch cut along the v curves.
+    first: imprint::Cut,
+    /// The u curves over that.
+    lines: Vec<Vec<FacePoint>>,
+    /// The sub-patches between the curves.
+    network: Network,
+}
+
+/// Steps 1 and 2: the v curves are cut into the patch and the u curves drawn over them.
+pub(super) fn weave(patch: &PatchMesh, strands: &Strands) -> Result<Woven, FeatureError> {
     let mesh = &patch.mesh;
     let adjacency = &strands.adjacency;
     let (across, along) = (&strands.across, &strands.along);
@@ -240,6 +241,25 @@ pub(super) fn relax_along(
         sketch.insert_on_side(1, line[line.len() - 1]);
     }
     let network = sketch.network(across, along, &lines, &line_places)?;
+    Ok(Woven { first, lines, network })
+}
+
+/// The grid along strands that are there already, with the cells of every section and the stops of the sides, those
+/// of the strands among them.
+pub(super) fn relax_along(
+    input: &TriMesh,
+    patch: &PatchMesh,
+    strands: &Strands,
+    cells: &[Vec<usize>; 2],
+    stops: &SideStops,
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<FeatureGrid, FeatureError> {
+    let mesh = &patch.mesh;
+    let adjacency = &strands.adjacency;
+    let (across, along) = (&strands.across, &strands.along);
+    let Woven { first, lines, network } = weave(patch, strands)?;
+    let ground = &first.mesh;
     // 3. Every sub-patch is resampled on its own; shared sides get the same points.
     let sub = imprint::imprint(ground, &network)?;
     let (u, v) = (&cells[0], &cells[1]);
@@ -327,6 +347,14 @@ fn part_of(stops: &side::Stops, first: usize, last: usize, count: usize) -> side
     inner.map(|&(s, k)| (((s - low) / (high - low)).clamp(0.0, 1.0), k - first)).collect()
 }
 
+/// Refuses another number of sections than there are, unless none is given.
+pub(super) fn check_count(family: &'static str, given: &[usize], needed: usize) -> Result<(), FeatureError> {
+    match given.len() {
+        n if n == 0 || n == needed => Ok(()),
+        n => Err(FeatureError::SectionCount { family, given: n, needed }),
+    }
+}
+
 /// Cells of every section between curves at `means`, rising: as given, or `cells` of them by share.
 pub(super) fn cells_between(
     family: &'static str,
@@ -335,10 +363,8 @@ pub(super) fn cells_between(
     cells: usize,
 ) -> Result<Vec<usize>, FeatureError> {
     let needed = means.len() + 1;
+    check_count(family, given, needed)?;
     if !given.is_empty() {
-        if given.len() != needed {
-            return Err(FeatureError::SectionCount { family, given: given.len(), needed });
-        }
         return Ok(given.iter().map(|&c| c.max(FEWEST_CELLS)).collect());
     }
     if cells < FEWEST_CELLS * needed {

@@ -3,10 +3,12 @@
 //! A feature curve ends on curves of the network; the grids on both sides of such a curve share their nodes, so the
 //! curve gets a stop there and the grid beyond it follows ([`super::side`]). Numbers of cells go along chords.
 
-use super::feature_curve::{FeatureCurve, FeatureError, Sections, cells_between, relax_along};
+use super::feature_curve::{
+    FEWEST_CELLS, Family, FeatureCurve, FeatureError, Sections, cells_between, check_count, relax_along, weave,
+};
 use super::feature_strand::Strands;
 use super::{Grid, GridError, GridParams, SideStops, relax_at, side};
-use crate::mesh::TriMesh;
+use crate::mesh::{FacePoint, TriMesh};
 use crate::network::{Network, PatchMesh};
 use crate::observe::{Observer, Part};
 use std::collections::BTreeMap;
@@ -18,6 +20,44 @@ const SAME_END: f64 = 1e-6;
 /// What is drawn in the patches of a network: feature curves with the patch that each is in, and for some patches the
 /// cells between theirs.
 pub type Drawn<'a> = (&'a [FeatureCurve], &'a [(u32, Sections)]);
+
+/// The family that a curve from side to side of a patch is of, by the sides that its ends lie nearest to.
+/// * `patch` - exact sub-mesh of `input`
+pub fn family_of(input: &TriMesh, patch: &PatchMesh, points: &[FacePoint]) -> Family {
+    let [Some(first), Some(last)] = [points.first(), points.last()] else { return Family::U };
+    let ends = [first, last].map(|p| p.position(input));
+    let away = |side: usize, end: usize| {
+        let chain = patch.sides[side].iter().map(|&v| patch.mesh.points[v as usize].distance(ends[end]));
+        chain.fold(f64::INFINITY, f64::min)
+    };
+    let miss = |k: usize| (away(k, 0) + away(k + 2, 1)).min(away(k, 1) + away(k + 2, 0));
+    if miss(0) < miss(1) { Family::V } else { Family::U }
+}
+
+/// Looks whether the feature curves of a patch, and its sections if they are given, suit it, without making its grid.
+/// * `patch` - its number, and its exact sub-mesh of `input`
+/// * `features` - those of all patches
+/// # Errors
+/// See [`FeatureError`]; curves are named by their index.
+pub fn check_features(
+    input: &TriMesh,
+    (number, patch): (u32, &PatchMesh),
+    features: &[FeatureCurve],
+    sections: Option<&Sections>,
+) -> Result<(), FeatureError> {
+    let own: Vec<usize> = (0..features.len()).filter(|&k| features[k].patch == number).collect();
+    let curves: Vec<FeatureCurve> = own.iter().map(|&k| features[k].clone()).collect();
+    let strands = Strands::new(input, patch, &curves).map_err(|e| named(e, &own))?;
+    if !curves.is_empty() {
+        weave(patch, &strands).map_err(|e| named(e, &own))?;
+    }
+    let none = Sections::default();
+    let sections = sections.unwrap_or(&none);
+    for (family, given, list) in [("u", &sections.u, &strands.across), ("v", &sections.v, &strands.along)] {
+        check_count(family, given, list.len() + 1)?;
+    }
+    Ok(())
+}
 
 /// Resamples every patch of a network; those with feature curves follow them exactly.
 /// * `sizes` - as of [`super::choose_sizes`]; numbers given by sections go over them along their chord
@@ -138,14 +178,16 @@ pub(super) fn give_sums(
     let chords = network.chords();
     let chord = |p: usize, k: usize| chords[network.patches[p].sides[k].curve as usize];
     let mut sums: BTreeMap<u32, usize> = BTreeMap::new();
-    let with_curves: std::collections::BTreeSet<usize> = features.iter().map(|f| f.patch as usize).collect();
-    for p in with_curves.into_iter().filter(|&p| p < sizes.len()) {
-        let Some((_, sections)) = sections.iter().rfind(|s| s.0 as usize == p) else { continue };
+    for &(p, ref sections) in sections.iter().filter(|s| (s.0 as usize) < network.patches.len()) {
+        let p = p as usize;
+        let curves = |family: Family| features.iter().filter(|f| f.patch as usize == p && f.family == family).count();
+        check_count("u", &sections.u, curves(Family::V) + 1)?;
+        check_count("v", &sections.v, curves(Family::U) + 1)?;
         for (k, cells) in [(0, &sections.u), (1, &sections.v)] {
             if cells.is_empty() {
                 continue;
             }
-            let sum = cells.iter().map(|&c| c.max(2)).sum();
+            let sum = cells.iter().map(|&c| c.max(FEWEST_CELLS)).sum();
             let other = *sums.entry(chord(p, k)).or_insert(sum);
             if other != sum {
                 return Err(FeatureError::SumsDiffer { patch: p, given: sum, other });

@@ -214,125 +214,12 @@ impl Map<'_> {
 
 /// The net of `old` carried to the new sides; nothing where it cannot be without cells that turn over.
 fn carried<'a>(chart: &'a Chart, patch: &PatchMesh, old: &Grid) -> Option<Net<'a>> {
-    let (cols, rows) = (old.cols, old.rows);
-    let map = Map(old);
-    let at = |k: usize| DVec2::new((k % cols) as f64, (k / cols) as f64);
-    let owners = Owners::new(chart);
-    let known: Vec<Option<Spot>> = old.places.iter().map(|p| owners.spot(p.face, p.bary)).collect();
-    // Places are known to a small part of a cell.
-    let rest = NEAR_ENOUGH * old.points.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>() / old.points.len() as f64;
-    let rim_uv = |k: usize| DVec2::new((k % cols) as f64 / (cols - 1) as f64, (k / cols) as f64 / (rows - 1) as f64);
-    // Shifts of the nodes of the sides.
-    let mut shift = vec![DVec2::ZERO; cols * rows];
-    for (k, chain) in patch.sides.iter().enumerate() {
-        let count = if k % 2 == 0 { cols } else { rows };
-        let points: Vec<DVec3> = chain.iter().map(|&v| patch.mesh.points[v as usize]).collect();
-        let samples = side::resample_at(&points, count, &side::Stops::new());
-        let mut last = DVec2::ZERO;
-        let mut hint = 0;
-        for (n, &p) in samples.points.iter().enumerate() {
-            let node = rim_node(k, n, cols, rows);
-            if p == old.points[node] {
-                last = DVec2::ZERO;
-                continue;
-            }
-            last = map.indices(p, at(node) + last)? - at(node);
-            shift[node] = last;
-            // Where the patch has grown there is no map: the way over the surface tells how many cells went in.
-            let (out, cell) = map.outward(k, node);
-            if last.dot(out) > GROWN {
-                let spot = chart.locate(rim_uv(node), hint);
-                hint = spot.triangle;
-                let from = walk(chart, known[node].unwrap_or(spot), old.points[node], rest);
-                let from = walk(chart, from, old.points[node], rest);
-                let (mut length, mut before) = (0.0, chart.position(from));
-                chart.trace(chart.uv_of(from), from.triangle, rim_uv(node), &mut |_, x| {
-                    length += before.distance(x);
-                    before = x;
-                });
-                length += before.distance(p);
-                shift[node] += out * (length / cell - last.dot(out));
-            }
-            let far = shift[node].abs() / DVec2::new((cols - 1) as f64, (rows - 1) as f64);
-            if !(far.max_element() <= FARTHEST) || far.dot(out.abs()) > FARTHEST_OUT && shift[node].dot(out) > 0.0 {
-                return None;
-            }
-        }
-    }
-    let blended = |k: usize| {
-        let (i, j) = (k % cols, k / cols);
-        let (s, t) = (i as f64 / (cols - 1) as f64, j as f64 / (rows - 1) as f64);
-        let node = |i: usize, j: usize| shift[j * cols + i];
-        let (right, top) = (cols - 1, rows - 1);
-        let corners = (node(0, 0) * (1.0 - s) + node(right, 0) * s) * (1.0 - t)
-            + (node(0, top) * (1.0 - s) + node(right, top) * s) * t;
-        node(i, 0) * (1.0 - t) + node(i, top) * t + node(0, j) * (1.0 - s) + node(right, j) * s - corners
-    };
-    let goals: Vec<(DVec2, DVec3)> = (0..cols * rows)
-        .map(|k| {
-            let x = at(k) + blended(k);
-            (x, map.at(x).0)
-        })
-        .collect();
-    // The sides lie evenly on those of the square; an inner node is walked to from the old node nearest to its goal, or
-    // from a neighbour that is there already.
-    let is_inner = |k: usize| {
-        let (i, j) = (k % cols, k / cols);
-        i > 0 && j > 0 && i + 1 < cols && j + 1 < rows
-    };
-    let mut spots: Vec<Option<Spot>> = (0..cols * rows)
-        .into_par_iter()
-        .map(|k| {
-            let (x, p) = goals[k];
-            let near = |x: f64, n: usize| (x.round().max(0.0) as usize).min(n - 1);
-            let start = known[near(x.y, rows) * cols + near(x.x, cols)];
-            if is_inner(k) && map.holds(x) { start.map(|s| walk(chart, s, p, rest)) } else { None }
-        })
-        .collect();
-    let mut hint = 0;
-    for k in (0..cols * rows).filter(|&k| !is_inner(k)) {
-        let spot = chart.locate(rim_uv(k), hint);
-        hint = spot.triangle;
-        spots[k] = Some(spot);
-    }
-    // Nodes with goals on the old grid whose own face was cut, from a neighbour; again until there are none.
-    let mut waiting: Vec<usize> = (0..cols * rows).filter(|&k| spots[k].is_none() && map.holds(goals[k].0)).collect();
-    loop {
-        let before = waiting.len();
-        waiting.retain(|&k| {
-            let near = [k - 1, k - cols, k + 1, k + cols].into_iter().find_map(|n| spots[n]);
-            if let Some(start) = near {
-                spots[k] = Some(walk(chart, walk(chart, start, goals[k].1, rest), goals[k].1, rest));
-            }
-            near.is_none()
-        });
-        if waiting.len() == before {
-            break;
-        }
-    }
-    // The others lie where the patch has grown: evenly between those that are placed, in the square.
-    let mut uv: Vec<DVec2> = (0..cols * rows)
-        .map(|k| match spots[k] {
-            Some(spot) if is_inner(k) => chart.uv_of(spot),
-            _ => rim_uv(k),
-        })
-        .collect();
-    for k in (0..cols * rows).filter(|&k| spots[k].is_none()) {
-        let x = goals[k].0;
-        let (i, j) = (k % cols, k / cols);
-        let over_u = x.x < 0.0 || x.x > (cols - 1) as f64;
-        let (first, stride, n, m) = if over_u { (j * cols, 1, cols, i) } else { (i, cols, rows, j) };
-        let placed = |m: &usize| spots[first + m * stride].is_some();
-        let (low, high) = ((0..m).rfind(placed)?, (m + 1..n).find(placed)?);
-        let (a, b) = (uv[first + low * stride], uv[first + high * stride]);
-        uv[k] = a.lerp(b, (m - low) as f64 / (high - low) as f64);
-    }
-    for k in 0..cols * rows {
-        if spots[k].is_none() {
-            let hint = spots[k - 1].or(spots[k - cols]).map_or(0, |s| s.triangle);
-            spots[k] = Some(chart.locate(uv[k], hint));
-        }
-    }
+    let carry = Carry::new(chart, old);
+    let Grid { cols, rows, .. } = *old;
+    let shift = carry.sides(patch)?;
+    let goals = carry.goals(&shift);
+    let mut spots = carry.inside(&goals);
+    let mut uv = carry.grown(&goals, &mut spots)?;
     let spots: Vec<Spot> = spots.into_iter().collect::<Option<_>>()?;
     let turned = |uv: &[DVec2]| (0..(cols - 1) * (rows - 1)).any(|c| turns_over(uv, cols, c));
     if !turned(&uv) {
@@ -341,6 +228,182 @@ fn carried<'a>(chart: &'a Chart, patch: &PatchMesh, old: &Grid) -> Option<Net<'a
     }
     smooth_turned(&mut uv, cols, rows);
     (!turned(&uv)).then(|| Net::new(chart, cols, rows, uv))
+}
+
+/// Where a node is to go: its indices on the old grid, and the place there.
+type Goal = (DVec2, DVec3);
+
+/// A grid on its way to the new sides of its patch.
+struct Carry<'a> {
+    chart: &'a Chart,
+    map: Map<'a>,
+    /// Where the nodes lie on the chart, for those whose face is whole there.
+    known: Vec<Option<Spot>>,
+    /// Places are known to this length, a small part of a cell.
+    rest: f64,
+}
+
+impl<'a> Carry<'a> {
+    fn new(chart: &'a Chart, old: &'a Grid) -> Carry<'a> {
+        let owners = Owners::new(chart);
+        let known = old.places.iter().map(|p| owners.spot(p.face, p.bary)).collect();
+        let length: f64 = old.points.windows(2).map(|w| w[0].distance(w[1])).sum();
+        Carry { chart, map: Map(old), known, rest: NEAR_ENOUGH * length / old.points.len() as f64 }
+    }
+
+    fn size(&self) -> (usize, usize) {
+        (self.map.0.cols, self.map.0.rows)
+    }
+
+    /// Indices of a node.
+    fn at(&self, k: usize) -> DVec2 {
+        let (cols, _) = self.size();
+        DVec2::new((k % cols) as f64, (k / cols) as f64)
+    }
+
+    /// Where a node of the sides lies on the square.
+    fn rim_uv(&self, k: usize) -> DVec2 {
+        let (cols, rows) = self.size();
+        self.at(k) / DVec2::new((cols - 1) as f64, (rows - 1) as f64)
+    }
+
+    fn is_inner(&self, k: usize) -> bool {
+        let (cols, rows) = self.size();
+        let (i, j) = (k % cols, k / cols);
+        i > 0 && j > 0 && i + 1 < cols && j + 1 < rows
+    }
+
+    /// Shifts of the nodes of the sides, in indices of the old grid; nothing where one goes too far.
+    fn sides(&self, patch: &PatchMesh) -> Option<Vec<DVec2>> {
+        let ((cols, rows), old) = (self.size(), self.map.0);
+        let mut shift = vec![DVec2::ZERO; cols * rows];
+        for (k, chain) in patch.sides.iter().enumerate() {
+            let count = if k % 2 == 0 { cols } else { rows };
+            let points: Vec<DVec3> = chain.iter().map(|&v| patch.mesh.points[v as usize]).collect();
+            let samples = side::resample_at(&points, count, &side::Stops::new());
+            let mut last = DVec2::ZERO;
+            let mut hint = 0;
+            for (n, &p) in samples.points.iter().enumerate() {
+                let node = rim_node(k, n, cols, rows);
+                if p == old.points[node] {
+                    last = DVec2::ZERO;
+                    continue;
+                }
+                last = self.map.indices(p, self.at(node) + last)? - self.at(node);
+                shift[node] = last;
+                // Where the patch has grown there is no map: the way over the surface tells how many cells went in.
+                let (out, cell) = self.map.outward(k, node);
+                if last.dot(out) > GROWN {
+                    shift[node] += out * (self.way_out(node, p, &mut hint) / cell - last.dot(out));
+                }
+                let far = shift[node].abs() / DVec2::new((cols - 1) as f64, (rows - 1) as f64);
+                if !(far.max_element() <= FARTHEST) || far.dot(out.abs()) > FARTHEST_OUT && shift[node].dot(out) > 0.0 {
+                    return None;
+                }
+            }
+        }
+        Some(shift)
+    }
+
+    /// Length of the way over the surface from where a node of a side was to where it goes, `p`.
+    /// * `hint` - a triangle near the side, led on
+    fn way_out(&self, node: usize, p: DVec3, hint: &mut u32) -> f64 {
+        let (chart, old, goal) = (self.chart, self.map.0, self.rim_uv(node));
+        let spot = chart.locate(goal, *hint);
+        *hint = spot.triangle;
+        let from = walk(chart, self.known[node].unwrap_or(spot), old.points[node], self.rest);
+        let from = walk(chart, from, old.points[node], self.rest);
+        let (mut length, mut before) = (0.0, chart.position(from));
+        chart.trace(chart.uv_of(from), from.triangle, goal, &mut |_, x| {
+            length += before.distance(x);
+            before = x;
+        });
+        length + before.distance(p)
+    }
+
+    /// Goals of all nodes: the shifts of the sides blended over the inside.
+    fn goals(&self, shift: &[DVec2]) -> Vec<Goal> {
+        let (cols, rows) = self.size();
+        let blended = |k: usize| {
+            let (i, j) = (k % cols, k / cols);
+            let (s, t) = (i as f64 / (cols - 1) as f64, j as f64 / (rows - 1) as f64);
+            let node = |i: usize, j: usize| shift[j * cols + i];
+            let (right, top) = (cols - 1, rows - 1);
+            let corners = (node(0, 0) * (1.0 - s) + node(right, 0) * s) * (1.0 - t)
+                + (node(0, top) * (1.0 - s) + node(right, top) * s) * t;
+            node(i, 0) * (1.0 - t) + node(i, top) * t + node(0, j) * (1.0 - s) + node(right, j) * s - corners
+        };
+        let goal = |k: usize| {
+            let x = self.at(k) + blended(k);
+            (x, self.map.at(x).0)
+        };
+        (0..cols * rows).map(goal).collect()
+    }
+
+    /// Places of the nodes with goals on the old grid. The sides lie evenly on those of the square; an inner node is
+    /// walked to from the old node nearest to its goal, or from a neighbour that is there already.
+    fn inside(&self, goals: &[Goal]) -> Vec<Option<Spot>> {
+        let ((cols, rows), chart, rest) = (self.size(), self.chart, self.rest);
+        let mut spots: Vec<Option<Spot>> = (0..cols * rows)
+            .into_par_iter()
+            .map(|k| {
+                let (x, p) = goals[k];
+                let near = |x: f64, n: usize| (x.round().max(0.0) as usize).min(n - 1);
+                let start = self.known[near(x.y, rows) * cols + near(x.x, cols)];
+                if self.is_inner(k) && self.map.holds(x) { start.map(|s| walk(chart, s, p, rest)) } else { None }
+            })
+            .collect();
+        let mut hint = 0;
+        for k in (0..cols * rows).filter(|&k| !self.is_inner(k)) {
+            let spot = chart.locate(self.rim_uv(k), hint);
+            hint = spot.triangle;
+            spots[k] = Some(spot);
+        }
+        // Nodes with goals on the old grid whose own face was cut, from a neighbour; again until there are none.
+        let missing = |k: &usize| spots[*k].is_none() && self.map.holds(goals[*k].0);
+        let mut waiting: Vec<usize> = (0..cols * rows).filter(missing).collect();
+        loop {
+            let before = waiting.len();
+            waiting.retain(|&k| {
+                let near = [k - 1, k - cols, k + 1, k + cols].into_iter().find_map(|n| spots[n]);
+                if let Some(start) = near {
+                    spots[k] = Some(walk(chart, walk(chart, start, goals[k].1, rest), goals[k].1, rest));
+                }
+                near.is_none()
+            });
+            if waiting.len() == before {
+                return spots;
+            }
+        }
+    }
+
+    /// Places of the other nodes, which lie where the patch has grown: evenly between those that are placed, in the
+    /// square. Returns where all nodes lie on it.
+    fn grown(&self, goals: &[Goal], spots: &mut [Option<Spot>]) -> Option<Vec<DVec2>> {
+        let ((cols, rows), chart) = (self.size(), self.chart);
+        let place = |k: usize| match spots[k] {
+            Some(spot) if self.is_inner(k) => chart.uv_of(spot),
+            _ => self.rim_uv(k),
+        };
+        let mut uv: Vec<DVec2> = (0..cols * rows).map(place).collect();
+        for k in (0..cols * rows).filter(|&k| spots[k].is_none()) {
+            let x = goals[k].0;
+            let (i, j) = (k % cols, k / cols);
+            let over_u = x.x < 0.0 || x.x > (cols - 1) as f64;
+            let (first, stride, n, m) = if over_u { (j * cols, 1, cols, i) } else { (i, cols, rows, j) };
+            let placed = |m: &usize| spots[first + m * stride].is_some();
+            let (low, high) = ((0..m).rfind(placed)?, (m + 1..n).find(placed)?);
+            let (a, b) = (uv[first + low * stride], uv[first + high * stride]);
+            uv[k] = a.lerp(b, (m - low) as f64 / (high - low) as f64);
+        }
+        for k in 0..cols * rows {
+            if spots[k].is_none() {
+                let hint = spots[k - 1].or(spots[k - cols]).map_or(0, |s| s.triangle);
+                spots[k] = Some(chart.locate(uv[k], hint));
+            }
+        }
+        Some(uv)
+    }
 }
 
 /// Walks over the surface to the foot of `goal`, in a few straight steps along the tangent plane, until it is nearer

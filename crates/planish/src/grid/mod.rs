@@ -32,7 +32,7 @@ mod springs;
 mod walk;
 
 pub use feature_curve::{Family, FeatureCurve, FeatureError, FeatureGrid, Sections, relax_with_features};
-pub use feature_network::relax_network;
+pub use feature_network::{check_features, family_of, relax_network};
 pub use follow::follow;
 pub use quality::{GridQuality, measure};
 pub use resample::{resample, resample_with_features};

@@ -6,10 +6,12 @@
 
 use super::diagnose::{Diagnosis, diagnose, glance};
 use super::{Corner, Curve, CurveKind, ImprintError, LayoutError, Network};
-use crate::curve::{CurveError, ScalarField, Snake, SnakeParams, SurfaceCurve};
+use crate::curve::{CurveError, Relaxed, ScalarField, Section, Snake, SnakeParams, SurfaceCurve};
 use crate::mesh::{Adjacency, CurvePlace, FacePoint, NONE, TriMesh, move_point_on_curve, next};
 use crate::observe::Observer;
 use glam::DVec3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Why an edit cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -25,7 +27,9 @@ pub enum EditError {
         count: usize,
     },
     /// Only a corner between two curves can be joined away.
-    #[error("corner {corner} ends {curves} curves, not 2 - hint: delete the others first")]
+    #[error(
+        "corner {corner} does not lie between two curves (ends of others there: {curves}) - hint: delete the others first; the corner of a closed curve stays"
+    )]
     NotBetweenTwo {
         /// The corner.
         corner: u32,
@@ -41,7 +45,7 @@ pub enum EditError {
         curves: usize,
     },
     /// A split at the end of a curve.
-    #[error("curve {curve} cannot be split at its end - hint: give a place between 0 and 1")]
+    #[error("curve {curve} stays where it is at its ends - hint: give a place between 0 and 1")]
     AtEnd {
         /// The curve.
         curve: u32,
@@ -53,6 +57,12 @@ pub enum EditError {
         curve: u32,
         /// What it follows.
         line: &'static str,
+    },
+    /// A closed curve that its forces draw together.
+    #[error("curve {curve} shrinks to nothing under these forces - hint: pin some of it, or give it less fairness")]
+    Shrunk {
+        /// The curve.
+        curve: u32,
     },
     /// A region that no offered split suits.
     #[error("region {region} has {sides} sides around one loop - hint: 3, 5 and 6 sides can be split")]
@@ -73,6 +83,42 @@ pub enum EditError {
     Layout(#[from] LayoutError),
 }
 
+/// A closed curve shorter than this many mean edges is none.
+const SHORTEST_LOOP: f64 = 3.0;
+
+/// A stretch of a curve with weights of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stretch {
+    /// Its start as a share of the length of the curve.
+    pub from: f64,
+    /// Its end as a share of the length.
+    pub to: f64,
+    /// Factor on the weight of fairness.
+    #[serde(default = "one")]
+    pub fairness: f64,
+    /// Factor on the weight of curvature.
+    #[serde(default = "one")]
+    pub curvature: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// What a relaxation is told besides its weights; all shares are of the length of the whole curve.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Holds<'a> {
+    /// Middle and width of the section that moves; nothing for all of the curve.
+    pub section: Option<(f64, f64)>,
+    /// A scalar that draws the curve.
+    pub field: Option<&'a ScalarField>,
+    /// Where the curve stays where it is.
+    pub pins: &'a [f64],
+    /// Stretches with weights of their own.
+    pub stiffness: &'a [Stretch],
+}
+
 /// A network under edit on its mesh.
 #[derive(Clone, Debug)]
 pub struct Editor<'m> {
@@ -86,10 +132,10 @@ pub struct Editor<'m> {
 
 /// Where on a curve: its points and the share of the piece after one of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct OnCurve {
-    curve: u32,
-    at: CurvePlace,
-    distance: f64,
+pub(super) struct OnCurve {
+    pub curve: u32,
+    pub at: CurvePlace,
+    pub distance: f64,
 }
 
 impl<'m> Editor<'m> {
@@ -98,7 +144,7 @@ impl<'m> Editor<'m> {
         Editor { mesh, adjacency, network }
     }
 
-    fn corner(&self, index: u32) -> Result<&Corner, EditError> {
+    pub(super) fn corner(&self, index: u32) -> Result<&Corner, EditError> {
         let count = self.network.corners.len();
         self.network.corners.get(index as usize).ok_or(EditError::NoSuchPart { what: "corner", index, count })
     }
@@ -118,12 +164,12 @@ impl<'m> Editor<'m> {
             .collect()
     }
 
-    fn positions(&self, curve: u32) -> Vec<DVec3> {
+    pub(super) fn positions(&self, curve: u32) -> Vec<DVec3> {
         self.network.curves[curve as usize].points.iter().map(|p| p.position(self.mesh)).collect()
     }
 
     /// The place on a curve nearest to `p` within `reach`, ends excluded.
-    fn nearest_on_curves(&self, p: DVec3, reach: f64) -> Option<OnCurve> {
+    pub(super) fn nearest_on_curves(&self, p: DVec3, reach: f64) -> Option<OnCurve> {
         let mut best: Option<OnCurve> = None;
         for c in 0..self.network.curves.len() as u32 {
             let at = self.positions(c);
@@ -170,18 +216,28 @@ impl<'m> Editor<'m> {
         let chain = curve.trace(self.mesh, self.adjacency)?;
         let first = self.add_corner(chain[0], snap)?;
         let last = if curve.closed { first } else { self.add_corner(chain[chain.len() - 1], snap)? };
-        let ends = [first, last].map(|k| self.network.corners[k as usize].place);
+        self.push_between([first, last], &chain, kind)
+    }
+
+    /// Adds a curve between two corners along a chain from about one to about the other.
+    pub(super) fn push_between(
+        &mut self,
+        corners: [u32; 2],
+        chain: &[FacePoint],
+        kind: CurveKind,
+    ) -> Result<u32, EditError> {
+        let ends = corners.map(|k| self.network.corners[k as usize].place);
         let mut places = vec![ends[0]];
         // The piece within the snap distance of an end gives way to the straight way to the corner.
         let at: Vec<DVec3> = chain.iter().map(|p| p.position(self.mesh)).collect();
-        let corners = ends.map(|p| p.position(self.mesh));
-        let moved = [corners[0].distance(at[0]), corners[1].distance(at[at.len() - 1])];
-        let inner = (1..chain.len() - 1)
-            .filter(|&i| at[i].distance(corners[0]) > moved[0] && at[i].distance(corners[1]) > moved[1]);
+        let tops = ends.map(|p| p.position(self.mesh));
+        let moved = [tops[0].distance(at[0]), tops[1].distance(at[at.len() - 1])];
+        let inner =
+            (1..chain.len() - 1).filter(|&i| at[i].distance(tops[0]) > moved[0] && at[i].distance(tops[1]) > moved[1]);
         places.extend(inner.map(|i| chain[i]));
         places.push(ends[1]);
         let points = SurfaceCurve::open(places).trace(self.mesh, self.adjacency)?;
-        self.network.curves.push(Curve { corners: [first, last], kind, points });
+        self.network.curves.push(Curve { corners, kind, points });
         Ok(self.network.curves.len() as u32 - 1)
     }
 
@@ -199,7 +255,7 @@ impl<'m> Editor<'m> {
         self.split_at(curve, place)
     }
 
-    fn split_at(&mut self, curve: u32, at: CurvePlace) -> Result<u32, EditError> {
+    pub(super) fn split_at(&mut self, curve: u32, at: CurvePlace) -> Result<u32, EditError> {
         let points = &self.network.curves[curve as usize].points;
         let last = points.len() - 1;
         let CurvePlace { segment, share } = at;
@@ -319,6 +375,7 @@ impl<'m> Editor<'m> {
     }
 
     /// Moves a corner to a place; the curves that end there follow, each relaxed over `reach` (0 to 1) of its length.
+    /// Returns these curves and how they relaxed.
     /// # Errors
     /// `NoSuchPart`; `Bound` if one of the curves follows an edge or the boundary; `Curve`.
     pub fn drag_corner(
@@ -328,7 +385,7 @@ impl<'m> Editor<'m> {
         reach: f64,
         params: &SnakeParams,
         observer: &dyn Observer,
-    ) -> Result<(), EditError> {
+    ) -> Result<Vec<(u32, Relaxed)>, EditError> {
         self.corner(corner)?;
         let faces = self.mesh.triangles.len();
         if to.face as usize >= faces {
@@ -339,7 +396,7 @@ impl<'m> Editor<'m> {
         let mut moved = Vec::with_capacity(curves.len());
         for &c in &curves {
             let curve = self.movable(c)?;
-            let even = self.sampled(curve)?;
+            let even = self.sampled(&SurfaceCurve::open(curve.points.clone()))?;
             let n = even.points.len();
             let count = ((reach.clamp(0.0, 1.0) * n as f64).ceil() as usize).clamp(3.min(n), n);
             let mut points = even.points;
@@ -363,18 +420,20 @@ impl<'m> Editor<'m> {
                 let first = if curve.corners[0] == corner { 0 } else { n - count };
                 snake.edit_section(first, count)?;
             }
-            snake.relax(params, observer)?;
-            moved.push((c, snake.curve().trace(self.mesh, self.adjacency)?));
+            let relaxed = snake.relax(params, observer)?;
+            moved.push((c, relaxed, snake.curve().trace(self.mesh, self.adjacency)?));
         }
         self.network.corners[corner as usize].place = to;
-        for (c, points) in moved {
+        let mut told = Vec::with_capacity(moved.len());
+        for (c, relaxed, points) in moved {
             self.network.curves[c as usize].points = points;
+            told.push((c, relaxed));
         }
-        Ok(())
+        Ok(told)
     }
 
-    /// Pulls a curve: its point at `share` of its length goes by `force` (world units, along the surface), a section
-    /// of `width` of the length around it relaxes, the rest stays as it is.
+    /// Pulls a curve: its point at `share` of its length goes by `force` (world units, along the surface), the section
+    /// of `holds` relaxes, the rest stays as it is. The scalar of `holds` is of no use here.
     /// # Errors
     /// `NoSuchPart`, `Bound`, `AtEnd` for a share outside 0 to 1, `Curve`.
     /// Source: [K98] §3.8.1.
@@ -383,43 +442,109 @@ impl<'m> Editor<'m> {
         curve: u32,
         share: f64,
         force: DVec3,
-        width: f64,
+        holds: &Holds,
         params: &SnakeParams,
         observer: &dyn Observer,
-    ) -> Result<(), EditError> {
+    ) -> Result<Relaxed, EditError> {
+        self.movable(curve)?;
         if !(share > 0.0 && share < 1.0) {
             return Err(EditError::AtEnd { curve });
         }
-        self.resnake(curve, Some((share, width)), None, |snake, edit| {
+        self.resnake(curve, share, holds, |snake, edit| {
             snake.drag(edit, force)?;
-            snake.relax(params, observer)?;
-            snake.pin(edit, false)
+            let relaxed = snake.relax(params, observer)?;
+            snake.pin(edit, false)?;
+            Ok(relaxed)
         })
     }
 
-    /// Relaxes a curve, or a section of it (`(middle, width)`, shares of its length), under `params` and the pull of
-    /// a scalar.
+    /// Relaxes a curve, or a section of it, under `params`. A closed curve whose corner has no other curves moves
+    /// with its corner.
     /// # Errors
-    /// `NoSuchPart`, `Bound`, `Curve`.
+    /// `NoSuchPart`, `Bound`, `Curve`, `Shrunk`.
     pub fn relax_curve(
         &mut self,
         curve: u32,
-        section: Option<(f64, f64)>,
-        field: Option<&ScalarField>,
+        holds: &Holds,
         params: &SnakeParams,
         observer: &dyn Observer,
-    ) -> Result<(), EditError> {
-        self.resnake(curve, section, field, |snake, _| snake.relax(params, observer).map(drop))
+    ) -> Result<Relaxed, EditError> {
+        self.movable(curve)?;
+        let middle = holds.section.map_or(0.5, |s| s.0);
+        if holds.section.is_none() && self.is_free_loop(curve) {
+            return self.relax_loop(curve, holds, params, observer);
+        }
+        self.resnake(curve, middle, holds, |snake, _| snake.relax(params, observer))
     }
 
-    /// Lets `work` change a curve as a snake; points outside the section stay as they are, bit for bit.
+    /// True for a closed curve whose corner ends no other.
+    fn is_free_loop(&self, curve: u32) -> bool {
+        let [a, b] = self.network.curves[curve as usize].corners;
+        a == b && self.ends_at(a).len() == 2
+    }
+
+    /// The course of a curve: closed where it is a loop that no other curve ends on.
+    pub fn course(&self, curve: u32) -> SurfaceCurve {
+        let mut points = self.network.curves[curve as usize].points.clone();
+        let closed = self.is_free_loop(curve) && points.len() > 3;
+        if closed {
+            points.pop();
+        }
+        SurfaceCurve { points, closed }
+    }
+
+    fn relax_loop(
+        &mut self,
+        curve: u32,
+        holds: &Holds,
+        params: &SnakeParams,
+        observer: &dyn Observer,
+    ) -> Result<Relaxed, EditError> {
+        let even = self.sampled(&self.course(curve))?;
+        let n = even.points.len();
+        let mut snake = self.held(&even, holds, |share| (share * n as f64).round() as usize % n)?;
+        let relaxed = snake.relax(params, observer)?;
+        self.replace_curve(curve, &snake.curve())?;
+        Ok(relaxed)
+    }
+
+    /// A snake with the holds of a relaxation; `index` tells the point at a share of the length.
+    fn held<'f>(
+        &self,
+        even: &SurfaceCurve,
+        holds: &Holds<'f>,
+        index: impl Fn(f64) -> usize,
+    ) -> Result<Snake<'f>, CurveError>
+    where
+        'm: 'f,
+    {
+        let n = even.points.len();
+        let mut snake = Snake::new(self.mesh, self.adjacency, even)?;
+        if let Some(field) = holds.field {
+            snake = snake.attracted_to(field)?;
+        }
+        for stretch in holds.stiffness {
+            let first = index(stretch.from).min(n - 1);
+            let last = if stretch.to >= 1.0 { n - 1 } else { index(stretch.to).min(n - 1) };
+            let Stretch { fairness, curvature, .. } = *stretch;
+            let count = (last + 1).saturating_sub(first);
+            snake.stiffen(&Section { first, count, fairness, curvature })?;
+        }
+        for &pin in holds.pins {
+            snake.pin(index(pin).min(n - 1), true)?;
+        }
+        Ok(snake)
+    }
+
+    /// Lets `work` change a curve as a snake; it is told the point at the share `middle`. Points outside the section
+    /// stay as they are, bit for bit.
     fn resnake(
         &mut self,
         curve: u32,
-        section: Option<(f64, f64)>,
-        field: Option<&ScalarField>,
-        work: impl FnOnce(&mut Snake<'_>, usize) -> Result<(), CurveError>,
-    ) -> Result<(), EditError> {
+        middle: f64,
+        holds: &Holds,
+        work: impl FnOnce(&mut Snake<'_>, usize) -> Result<Relaxed, CurveError>,
+    ) -> Result<Relaxed, EditError> {
         let old = self.movable(curve)?;
         let at = self.positions(curve);
         let mut sums = vec![0.0];
@@ -427,57 +552,74 @@ impl<'m> Editor<'m> {
             sums.push(sums[sums.len() - 1] + w[0].distance(w[1]));
         }
         let total = sums[sums.len() - 1];
-        let (middle, width) = section.unwrap_or((0.5, 1.0));
+        let (center, width) = holds.section.unwrap_or((0.5, 1.0));
         // The points of the curve that bound the section.
-        let low = (middle - width / 2.0).max(0.0) * total;
-        let high = (middle + width / 2.0).min(1.0) * total;
-        let first = sums.partition_point(|s| *s <= low).saturating_sub(1);
+        let low = (center - width / 2.0).max(0.0) * total;
+        let high = (center + width / 2.0).min(1.0) * total;
+        let first = sums.partition_point(|s| *s <= low).saturating_sub(1).min(at.len() - 2);
         let last = sums.partition_point(|s| *s < high).clamp(first + 1, at.len() - 1);
-        let part = Curve { points: old.points[first..=last].to_vec(), ..old.clone() };
-        let even = self.sampled(&part)?;
+        let even = self.sampled(&SurfaceCurve::open(old.points[first..=last].to_vec()))?;
         let n = even.points.len();
-        let mut snake = Snake::new(self.mesh, self.adjacency, &even)?;
-        if let Some(field) = field {
-            snake = snake.attracted_to(field)?;
+        let index = |share: f64| {
+            let at = ((share * total - sums[first]) / (sums[last] - sums[first])).clamp(0.0, 1.0);
+            (at * (n - 1) as f64).round() as usize
+        };
+        let mut snake = self.held(&even, holds, index)?;
+        let relaxed = work(&mut snake, index(middle).clamp(1, n - 2))?;
+        let [a, b] = old.corners;
+        if a == b && (first, last) == (0, at.len() - 1) {
+            self.check_loop(curve, &snake.curve())?;
         }
-        let edit = ((middle * total - sums[first]) / (sums[last] - sums[first]) * (n - 1) as f64).round();
-        let edit = (edit.max(1.0) as usize).min(n - 2);
-        work(&mut snake, edit)?;
         let chain = snake.curve().trace(self.mesh, self.adjacency)?;
         let points = &mut self.network.curves[curve as usize].points;
         points.splice(first + 1..last, chain[1..chain.len() - 1].iter().copied());
-        Ok(())
+        Ok(relaxed)
+    }
+
+    /// Refuses a loop that has shrunk to nothing.
+    fn check_loop(&self, curve: u32, course: &SurfaceCurve) -> Result<(), EditError> {
+        match course.length(self.mesh) < SHORTEST_LOOP * self.mean_edge(&course.points) {
+            true => Err(EditError::Shrunk { curve }),
+            false => Ok(()),
+        }
+    }
+
+    /// Mean edge of the faces of places.
+    fn mean_edge(&self, places: &[FacePoint]) -> f64 {
+        let edge = |p: &FacePoint| {
+            let [a, b, c] = self.mesh.corners(p.face as usize);
+            (a.distance(b) + b.distance(c) + c.distance(a)) / 3.0
+        };
+        places.iter().map(edge).sum::<f64>() / places.len().max(1) as f64
     }
 
     /// A curve sampled about one mean edge apart, for a snake.
-    fn sampled(&self, curve: &Curve) -> Result<SurfaceCurve, CurveError> {
+    fn sampled(&self, course: &SurfaceCurve) -> Result<SurfaceCurve, CurveError> {
         const FEWEST: usize = 9;
-        let open = SurfaceCurve::open(curve.points.clone());
-        let edges: f64 = curve
-            .points
-            .iter()
-            .map(|p| {
-                let [a, b, c] = self.mesh.corners(p.face as usize);
-                (a.distance(b) + b.distance(c) + c.distance(a)) / 3.0
-            })
-            .sum::<f64>()
-            / curve.points.len() as f64;
-        let count = (open.length(self.mesh) / edges.max(f64::MIN_POSITIVE)).round().clamp(0.0, 1e5) as usize + 1;
-        open.resampled(self.mesh, self.adjacency, count.max(FEWEST))
+        let edges = self.mean_edge(&course.points);
+        let count = (course.length(self.mesh) / edges.max(f64::MIN_POSITIVE)).round().clamp(0.0, 1e5) as usize + 1;
+        course.resampled(self.mesh, self.adjacency, count.max(FEWEST))
     }
 
-    /// Puts another course in the place of a curve; its ends must be those of the curve, or lie within `snap` of them.
+    /// Puts another course in the place of a curve. The ends of an open one go to those of the curve; a closed one is
+    /// for a closed curve whose corner has no other curves, and takes the corner along.
     /// # Errors
-    /// `NoSuchPart`, `Bound`, `Curve`.
+    /// `NoSuchPart`, `Bound`, `Curve`, `Shrunk`.
     pub fn replace_curve(&mut self, curve: u32, with: &SurfaceCurve) -> Result<(), EditError> {
-        let ends = self.movable(curve)?.corners.map(|k| self.network.corners[k as usize].place);
-        let mut points = with.points.clone();
-        if points.len() < 2 {
-            return Err(CurveError::TooFewPoints { found: points.len(), needed: 2 }.into());
+        let corners = self.movable(curve)?.corners;
+        if with.points.len() < 2 {
+            return Err(CurveError::TooFewPoints { found: with.points.len(), needed: 2 }.into());
         }
-        let last = points.len() - 1;
-        (points[0], points[last]) = (ends[0], ends[1]);
-        self.network.curves[curve as usize].points = SurfaceCurve::open(points).trace(self.mesh, self.adjacency)?;
+        let mut course = with.clone();
+        if with.closed && self.is_free_loop(curve) {
+            self.check_loop(curve, with)?;
+            self.network.corners[corners[0] as usize].place = course.points[0];
+        } else {
+            let last = course.points.len() - 1;
+            let [first, end] = corners.map(|k| self.network.corners[k as usize].place);
+            (course.points[0], course.points[last], course.closed) = (first, end, false);
+        }
+        self.network.curves[curve as usize].points = course.trace(self.mesh, self.adjacency)?;
         Ok(())
     }
 

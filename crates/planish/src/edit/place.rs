@@ -1,0 +1,36 @@
+//! Places, corners and curves as a script names them.
+
+use crate::mesh::FacePoint;
+use serde::{Deserialize, Serialize};
+
+/// A place as a script names it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "a place is [x, y, z], { face = .., bary = [..] } or { corner = .. }"
+)]
+pub enum Spot {
+    /// A world position; the nearest place of the mesh is meant.
+    Position([f64; 3]),
+    /// A place by its face.
+    Place(FacePoint),
+    /// A corner of the network.
+    Corner {
+        /// Its number.
+        corner: u32,
+    },
+}
+
+/// A corner, a curve or a feature curve as a script names it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, deny_unknown_fields, expecting = "a number counted from 0, or { near = [x, y, z] }, is wanted")]
+pub enum Name {
+    /// By its number.
+    Number(u32),
+    /// By a world position: the nearest one is meant.
+    Near {
+        /// World units.
+        near: [f64; 3],
+    },
+}

@@ -1,0 +1,395 @@
+//! Sessions of edits as a person would make them: strokes led on pick by pick, curves that meet others, held and
+//! stiffened curves, wrong edits.
+
+use glam::DVec3;
+use planish::curve::Relaxed;
+use planish::edit::{ApplyError, Edit, Ground, Made, apply};
+use planish::geom::Bvh;
+use planish::grid::{self, Family};
+use planish::mesh::{Adjacency, Attribute, TriMesh, shapes};
+use planish::model::{Drawing, HistoryEntry, Model};
+use planish::network::{EditError, diagnose, imprint};
+use planish::observe::Silent;
+use planish::pipeline::{self, PipelineParams};
+
+fn json(text: &str) -> Edit {
+    serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+fn make(ground: &Ground, drawing: &mut Drawing, edit: &str) -> Result<Made, ApplyError> {
+    apply(drawing, &json(edit), ground, &|_| Err("no other".into()), &Silent)
+}
+
+/// Applies edits written as JSON, and gives what they did.
+fn run(mesh: &TriMesh, edits: &[&str]) -> (Drawing, Vec<Made>) {
+    let ground = Ground::new(mesh);
+    let mut drawing = Drawing::default();
+    let made = edits.iter().map(|e| make(&ground, &mut drawing, e).unwrap_or_else(|x| panic!("{x}: {e}"))).collect();
+    (drawing, made)
+}
+
+const CUTS: [&str; 3] = [
+    r#"{"edit":"cut","through":[1,0,0.003],"normal":[0,0.02,1]}"#,
+    r#"{"edit":"cut","through":[1,0.004,0],"normal":[0.01,1,0]}"#,
+    r#"{"edit":"cut","through":[0.002,1,0],"normal":[1,0,0.03]}"#,
+];
+
+#[test]
+fn three_great_circles_divide_each_other_at_6_corners_and_their_8_triangles_split_into_24_patches() {
+    let mesh = shapes::sphere(1.0, 5);
+    let (drawing, made) = run(&mesh, &CUTS);
+    let network = &drawing.network;
+    let ends = |k: u32| network.curves.iter().flat_map(|c| c.corners).filter(|&c| c == k).count();
+    let meetings = (0..network.corners.len() as u32).filter(|&k| ends(k) == 4).count();
+    assert_eq!(meetings, 6, "{network:?}");
+    // Besides the corners where they meet one is left where the first circle starts.
+    assert_eq!((network.corners.len(), network.curves.len()), (7, 13));
+    let told = made[2].faults.as_ref().unwrap();
+    assert!(told.iter().all(|f| f.to_string().contains("sides, not 4")), "{told:?}");
+    // Corners lie on both planes.
+    for (k, c) in network.corners.iter().enumerate().filter(|(k, _)| ends(*k as u32) == 4) {
+        let p = c.place.position(&mesh);
+        let on = [p.z + 0.02 * p.y - 0.003, 0.01 * (p.x - 1.0) + p.y - 0.004, p.x - 0.002 + 0.03 * p.z];
+        assert_eq!(on.iter().filter(|h| h.abs() < 1e-6).count(), 2, "{k}: {p} {on:?}");
+    }
+    // The corner of the first circle's start goes, and every region is split.
+    let ground = Ground::new(&mesh);
+    let mut drawing = drawing.clone();
+    let start = (0..7u32).find(|&k| ends(k) == 2).unwrap();
+    make(&ground, &mut drawing, &format!(r#"{{"edit":"delete_corner","corner":{start}}}"#)).unwrap();
+    for s in 0..8u32 {
+        let at = |bit: u32| if s >> bit & 1 == 1 { 0.6 } else { -0.6 };
+        let split = format!(r#"{{"edit":"split_region","at":[{},{},{}]}}"#, at(0), at(1), at(2));
+        make(&ground, &mut drawing, &split).unwrap();
+    }
+    let found = diagnose(&mesh, &Adjacency::new(&mesh), &drawing.network);
+    assert!(found.is_finished(), "{:?}", found.faults);
+    assert_eq!(found.patches.len(), 24);
+    assert_eq!(imprint(&mesh, &drawing.network).unwrap().len(), 24);
+}
+
+#[test]
+fn a_stroke_through_a_corner_where_others_meet_is_divided_there_and_nowhere_else() {
+    let mesh = shapes::sphere(1.0, 5);
+    let ground = Ground::new(&mesh);
+    let (mut drawing, _) = run(&mesh, &CUTS[..2]);
+    let four = |d: &Drawing, p: DVec3| {
+        let ends = |k: usize| d.network.curves.iter().flat_map(|c| c.corners).filter(|&c| c as usize == k).count();
+        let near = d.network.corners.iter().position(|c| c.place.position(&mesh).distance(p) < 0.02);
+        near.map(ends)
+    };
+    assert_eq!(four(&drawing, DVec3::X), Some(4));
+    let before = drawing.network.curves.len();
+    let stroke =
+        r#"{"edit":"paint","mode":"geodesic","picks":[[0.8,0.4,0.4],[1.0,0.005,0.004],[0.8,-0.4,-0.4]],"snap":0.02}"#;
+    let made = make(&ground, &mut drawing, stroke).unwrap();
+    assert_eq!(drawing.network.curves.len(), before + 2);
+    assert_eq!(four(&drawing, DVec3::X), Some(6));
+    assert_eq!(made.curves.len(), 2, "no other curve has another course: {made:?}");
+}
+
+#[test]
+fn a_stroke_led_on_pick_by_pick_is_that_painted_at_once_and_is_taken_back_pick_by_pick() {
+    let mesh = shapes::sphere(1.0, 5);
+    let at = ["[1,0,0.1]", "[0.6,0.7,0]", "[0,1,0.2]", "[-0.7,0.6,0]"];
+    for mode in ["straight", "geodesic", "magnetic"] {
+        let whole = format!(r#"{{"edit":"paint","mode":"{mode}","snap":0,"picks":[{}]}}"#, at.join(","));
+        let (whole, _) = run(&mesh, &[&whole]);
+        let ground = Ground::new(&mesh);
+        let mut model = Model { mesh: mesh.clone(), ..Model::default() };
+        let mut states = vec![model.drawing()];
+        let first = format!(r#"{{"edit":"paint","mode":"{mode}","snap":0,"picks":[{},{}]}}"#, at[0], at[1]);
+        let more = |p: &str| format!(r#"{{"edit":"extend","curve":0,"mode":"{mode}","snap":0,"picks":[{p}]}}"#);
+        for edit in [first, more(at[2]), more(at[3])] {
+            let mut drawing = model.drawing();
+            make(&ground, &mut drawing, &edit).unwrap();
+            model.record(HistoryEntry { command: json(&edit).name(), parameters: json(&edit).parameters() }, drawing);
+            states.push(model.drawing());
+        }
+        assert_eq!(model.network.curves.len(), 1);
+        assert_eq!(model.network.corners.len(), 2);
+        assert_eq!(model.network.curves[0].points, whole.network.curves[0].points, "{mode}");
+        for state in states.iter().rev().skip(1) {
+            assert!(model.undo());
+            assert_eq!(model.drawing(), *state);
+        }
+        assert!(!model.undo());
+        // Led on to its own start it is closed, and has no free end any more.
+        let mut drawing = whole.clone();
+        let close = format!(
+            r#"{{"edit":"extend","curve":{{"near":[0,1,0.2]}},"mode":"{mode}","picks":[[0,-1,0]],"closed":true}}"#
+        );
+        make(&ground, &mut drawing, &close).unwrap();
+        let curve = &drawing.network.curves[0];
+        assert_eq!((drawing.network.corners.len(), curve.corners[0]), (1, curve.corners[1]));
+        let refused = make(&ground, &mut drawing, &close).unwrap_err();
+        assert_eq!(refused, ApplyError::NotFree { curve: 0 });
+    }
+}
+
+#[test]
+fn picks_go_to_sharp_edges_within_the_snap_distance_and_stay_where_they_are_without() {
+    let mesh = shapes::cuboid(DVec3::ONE, 20);
+    let stroke = |snap: f64| {
+        let edit = format!(r#"{{"edit":"paint","snap":{snap},"picks":[[0.22,0.51,1.0],[0.97,0.52,1.0]]}}"#);
+        let (drawing, _) = run(&mesh, &[&edit]);
+        drawing.network.corners.iter().map(|c| c.place.position(&mesh)).collect::<Vec<_>>()
+    };
+    let b = mesh.bounds();
+    let x = |p: DVec3| (p.x - b.min.x) / (b.max.x - b.min.x);
+    let free = stroke(0.0);
+    let held = stroke(0.03);
+    assert!((x(free[1]) - x(held[1])).abs() > 1e-6);
+    assert_eq!(x(held[1]), 1.0, "{held:?}");
+    assert_eq!(free[0], held[0]);
+}
+
+#[test]
+fn energy_and_rest_are_told_pins_hold_and_a_stiff_stretch_bends_less() {
+    let mesh = shapes::sphere(1.0, 5);
+    let ground = Ground::new(&mesh);
+    let painted = r#"{"edit":"paint","picks":[[1,0,-0.2],[0.7,0.7,0.3],[0,1,-0.2],[-0.7,0.7,0.3]],"snap":0}"#;
+    let (start, _) = run(&mesh, &[painted]);
+    let relax = |more: &str| {
+        let mut drawing = start.clone();
+        let edit = format!(
+            r#"{{"edit":"relax","curve":0,"forces":{{"fairness":1.0,"curvature":0.5,"sweeps":400,"settle":1e-5}}{more}}}"#
+        );
+        let made = make(&ground, &mut drawing, &edit).unwrap();
+        let at: Vec<DVec3> = drawing.network.curves[0].points.iter().map(|p| p.position(&mesh)).collect();
+        (at, made)
+    };
+    let (free, made) = relax("");
+    let [told] = &made.relaxed[..] else { panic!("{made:?}") };
+    let Relaxed { energy, settled, sweeps, last_move, .. } = told.relaxed;
+    assert!(settled && sweeps <= 400 && last_move < 1e-5 && energy[1].total() < energy[0].total(), "{told:?}");
+    assert_eq!(told.curve, 0);
+    let away = |curve: &[DVec3], p: DVec3| curve.iter().map(|q| q.distance(p)).fold(f64::INFINITY, f64::min);
+    let old: Vec<DVec3> = start.network.curves[0].points.iter().map(|p| p.position(&mesh)).collect();
+    let length: f64 = old.windows(2).map(|w| w[0].distance(w[1])).sum();
+    let mut sum = 0.0;
+    let third = old.windows(2).find_map(|w| {
+        sum += w[0].distance(w[1]);
+        (sum > length / 3.0).then_some(w[1])
+    });
+    let third = third.unwrap();
+    let edge = length / 60.0;
+    let (held, _) = relax(r#","pins":[0.3333333]"#);
+    assert!(away(&free, third) > 2.0 * edge && away(&held, third) < edge, "{} {edge}", away(&held, third));
+    // Turn of the middle third in the surface, stiff and not.
+    let turn = |curve: &[DVec3]| -> f64 {
+        let n = curve.len();
+        curve[n / 3..2 * n / 3]
+            .windows(3)
+            .map(|w| {
+                let (a, b, up) = (w[1] - w[0], w[2] - w[1], w[1].normalize());
+                let flat = |v: DVec3| (v - up * v.dot(up)).normalize_or_zero();
+                flat(a).cross(flat(b)).dot(up).abs()
+            })
+            .sum()
+    };
+    let pins = r#","pins":[0.3333333,0.6666667]"#;
+    let (even, _) = relax(pins);
+    let stretch = r#","stiffness":[{"from":0.33,"to":0.67,"curvature":200.0,"fairness":0.05}]"#;
+    let (stiff, _) = relax(&format!("{pins}{stretch}"));
+    assert!(even != stiff && turn(&stiff) < 2.0 * turn(&even) + 1.0);
+}
+
+#[test]
+fn a_loop_without_other_curves_relaxes_and_bends_as_one_without_a_corner_and_one_that_shrinks_is_refused() {
+    let mesh = shapes::torus(2.0, 0.6, 120, 48);
+    let ground = Ground::new(&mesh);
+    let around = r#"{"edit":"paint","closed":true,"snap":0,"mode":"geodesic",
+        "picks":[[1.5,0.2,0.2],[0.0,1.5,-0.2],[-1.5,0.0,0.2],[0.0,-1.5,0.1]]}"#;
+    let (start, _) = run(&mesh, &[around]);
+    let bend = |d: &Drawing| {
+        let p: Vec<DVec3> = d.network.curves[0].points.iter().map(|p| p.position(&mesh)).collect();
+        // Over four edges to both sides of the corner.
+        let reach = 4.0 * (2.0 * std::f64::consts::TAU / 120.0);
+        let ahead = p.iter().find(|q| q.distance(p[0]) > reach).unwrap();
+        let back = p.iter().rev().find(|q| q.distance(p[0]) > reach).unwrap();
+        (*ahead - p[0]).angle_between(p[0] - *back).to_degrees()
+    };
+    let (before, mut drawing) = (start.network.corners[0].place, start.clone());
+    make(&ground, &mut drawing, r#"{"edit":"relax","curve":0,"forces":{"fairness":1.0,"curvature":0.0}}"#).unwrap();
+    // The shortest way around the hole is the inner equator, 1.4 away from the axis.
+    let far = |d: &Drawing| {
+        let p = d.network.curves[0].points.iter().map(|p| p.position(&mesh));
+        p.map(|p| (p.truncate().length() - 1.4).abs()).fold(0.0, f64::max)
+    };
+    assert!(drawing.network.corners[0].place != before && far(&drawing) < 0.01, "{}", far(&drawing));
+    let mut smooth = start.clone();
+    make(&ground, &mut smooth, r#"{"edit":"spline","curve":0,"control":8}"#).unwrap();
+    assert!(bend(&smooth) < 0.8 * bend(&start).max(25.0), "{} {}", bend(&smooth), bend(&start));
+    let ends = &smooth.network.curves[0];
+    assert_eq!(ends.points[0], smooth.network.corners[0].place);
+    assert_eq!(ends.points[0], ends.points[ends.points.len() - 1]);
+    // A small loop on the outside shrinks.
+    let small = r#"{"edit":"paint","closed":true,"snap":0,"picks":[[2.55,0.3,0],[2.5,0,0.3],[2.55,-0.3,0]]}"#;
+    let (mut drawing, _) = run(&mesh, &[small]);
+    let kept = drawing.clone();
+    let refused = make(
+        &ground,
+        &mut drawing,
+        r#"{"edit":"relax","curve":0,"forces":{"fairness":1.0,"curvature":0.0,"sweeps":5000}}"#,
+    );
+    assert_eq!(refused.unwrap_err(), ApplyError::Edit(EditError::Shrunk { curve: 0 }));
+    assert_eq!(drawing, kept);
+}
+
+#[test]
+fn curves_are_drawn_to_colour_luminance_curvatures_and_a_users_values_within_half_an_edge() {
+    // A ring of colour at z = 0.3, as luminance, as a channel, as an attribute of the user's, as values in the script.
+    let mut mesh = shapes::sphere(1.0, 4);
+    let ring = |p: DVec3| (-((p.z - 0.3) / 0.12).powi(2)).exp();
+    let color: Vec<f32> = mesh.points.iter().flat_map(|p| [ring(*p) as f32; 3]).collect();
+    let heat: Vec<f32> = mesh.points.iter().map(|p| ring(*p) as f32).collect();
+    mesh.attributes.push(Attribute { name: "color".into(), width: 3, values: color });
+    mesh.attributes.push(Attribute { name: "heat".into(), width: 1, values: heat });
+    let values: Vec<String> = mesh.points.iter().map(|p| format!("{:.6}", ring(*p))).collect();
+    let edge = mesh.points[mesh.triangles[0][0] as usize].distance(mesh.points[mesh.triangles[0][1] as usize]);
+    let ground = Ground::new(&mesh);
+    let painted = r#"{"edit":"paint","closed":true,"snap":0,"mode":"geodesic",
+        "picks":[[0.9,0,0.4],[0,0.95,0.2],[-0.9,0,0.4],[0,-0.95,0.2]]}"#;
+    let (start, _) = run(&mesh, &[painted]);
+    let scalars = [
+        r#""luminance""#.to_string(),
+        r#"{"channel":{"attribute":"color","channel":1}}"#.into(),
+        r#"{"channel":{"attribute":"heat","channel":0}}"#.into(),
+        format!(r#"{{"values":[{}]}}"#, values.join(",")),
+    ];
+    for scalar in scalars {
+        let mut drawing = start.clone();
+        let edit = format!(
+            r#"{{"edit":"relax","curve":0,"pull":{{"scalar":{scalar},"weight":30.0,"blending":4}},
+                "forces":{{"fairness":0.02,"curvature":0.2,"sweeps":300}}}}"#
+        );
+        make(&ground, &mut drawing, &edit).unwrap();
+        let at = drawing.network.curves[0].points.iter().map(|p| p.position(&mesh));
+        let miss = at.map(|p| (p.z - 0.3).abs()).fold(0.0, f64::max);
+        assert!(miss < edge / 2.0, "{miss} {edge} {}", &scalar[..scalar.len().min(40)]);
+    }
+    // Curvature: the rim of a lens, and low values turned round lead away from it.
+    let mut lens = shapes::sphere(1.0, 4);
+    lens.points.iter_mut().for_each(|p| p.z *= 0.4);
+    let ground = Ground::new(&lens);
+    let painted = r#"{"edit":"paint","closed":true,"snap":0,"mode":"geodesic",
+        "picks":[[0.95,0,0.1],[0,0.95,0.12],[-0.95,0,0.1],[0,-0.95,0.12]]}"#;
+    let (start, _) = run(&lens, &[painted]);
+    let height = |d: &Drawing| {
+        let at = d.network.curves[0].points.iter().map(|p| p.position(&lens).z.abs());
+        at.fold(0.0, f64::max)
+    };
+    for scalar in ["mean_curvature", "gaussian_curvature", "maximum_curvature"] {
+        let mut drawing = start.clone();
+        let edit = format!(
+            r#"{{"edit":"relax","curve":0,"pull":{{"scalar":"{scalar}","weight":30.0}},
+                "forces":{{"fairness":0.02,"curvature":0.2,"sweeps":300}}}}"#
+        );
+        make(&ground, &mut drawing, &edit).unwrap();
+        assert!(height(&drawing) < edge / 2.0, "{scalar}: {} {}", height(&drawing), height(&start));
+    }
+}
+
+/// A flat sheet with a bump as one patch, and strokes from side to side of it.
+fn sheet() -> (TriMesh, Drawing) {
+    let at =
+        |s: f64, t: f64| DVec3::new(2.0 * s, t, 0.2 * (-(9.0 * (s - 0.5).powi(2) + 12.0 * (t - 0.5).powi(2))).exp());
+    let mesh = shapes::sheet(60, 40, false, false, at);
+    let corner = |x: f64, y: f64| format!(r#"{{"edit":"add_corner","at":[{x},{y},0],"snap":0.002}}"#);
+    let corners = [corner(0.0, 0.0), corner(2.0, 0.0), corner(2.0, 1.0), corner(0.0, 1.0)];
+    let mut edits: Vec<&str> = corners.iter().map(|s| s.as_str()).collect();
+    edits.push(r#"{"edit":"boundaries"}"#);
+    let (drawing, _) = run(&mesh, &edits);
+    assert_eq!(drawing.network.patches.len(), 1);
+    (mesh, drawing)
+}
+
+#[test]
+fn feature_curves_tell_their_family_and_those_that_cross_are_refused_when_they_are_drawn() {
+    let (mesh, start) = sheet();
+    let ground = Ground::new(&mesh);
+    let feature = |a: [f64; 2], b: [f64; 2]| {
+        format!(r#"{{"edit":"feature","mode":"geodesic","picks":[[{},{},0],[{},{},0]]}}"#, a[0], a[1], b[0], b[1])
+    };
+    let mut drawing = start.clone();
+    make(&ground, &mut drawing, &feature([0.6, 0.02], [0.8, 0.98])).unwrap();
+    make(&ground, &mut drawing, &feature([0.03, 0.4], [1.97, 0.6])).unwrap();
+    let families: Vec<Family> = drawing.sketch.features.iter().map(|f| f.family).collect();
+    assert!(families[0] != families[1], "{families:?}");
+    let kept = drawing.clone();
+    let refused = make(&ground, &mut drawing, &feature([0.9, 0.02], [0.4, 0.98])).unwrap_err().to_string();
+    assert!(refused.contains("feature curves 0 and 2 of one family cross at ("), "{refused}");
+    assert_eq!(drawing, kept);
+    // One that is not from side to side, and a wrong number of sections.
+    let sections = |u: &str| format!(r#"{{"edit":"sections","at":[1.0,0.5,0.2],"{}":{u}}}"#, across(&families));
+    let refused = make(&ground, &mut drawing, &sections("[8,8,8]")).unwrap_err().to_string();
+    assert!(refused.contains("3 sections") && refused.contains("2 are between"), "{refused}");
+    make(&ground, &mut drawing, &sections("[8,20]")).unwrap();
+    assert_eq!(drawing.sketch.sections.len(), 1);
+    // One curve less: the cells across it were of other sections.
+    make(&ground, &mut drawing, r#"{"edit":"delete_feature","feature":{"near":[0.7,0.5,0.1]}}"#).unwrap();
+    assert_eq!((drawing.sketch.features.len(), drawing.sketch.sections.len()), (1, 0));
+}
+
+/// The letter of the direction in which sections lie between curves of the first family.
+fn across(families: &[Family]) -> &'static str {
+    if families[0] == Family::V { "u" } else { "v" }
+}
+
+#[test]
+fn a_patch_without_feature_curves_gets_the_cells_that_are_given() {
+    let (mesh, start) = sheet();
+    let ground = Ground::new(&mesh);
+    let mut drawing = start;
+    make(&ground, &mut drawing, r#"{"edit":"sections","at":[1.0,0.5,0.2],"u":[37],"v":[23]}"#).unwrap();
+    let mut model = Model { mesh, network: drawing.network, sketch: drawing.sketch, ..Model::default() };
+    pipeline::rework(&mut model, &PipelineParams::default(), &Silent).unwrap();
+    assert_eq!((model.grids[0].cols, model.grids[0].rows), (38, 24));
+    let patches = imprint(&model.mesh, &model.network).unwrap();
+    assert_eq!(grid::measure(&model.grids[0], &patches[0]).folds, 0);
+}
+
+#[test]
+fn numbers_out_of_their_range_are_told_by_name_and_leave_the_drawing_as_it_was() {
+    let mesh = shapes::sphere(1.0, 4);
+    let ground = Ground::new(&mesh);
+    let (mut drawing, _) = run(&mesh, &CUTS[..1]);
+    let before = drawing.clone();
+    for (edit, told) in [
+        (r#"{"edit":"relax","curve":0,"forces":{"fairness":-1.0}}"#, "fairness is -1, not 0 or more"),
+        (r#"{"edit":"relax","curve":0,"section":[0.5,0.0]}"#, "the width of the section is 0, not more than 0"),
+        (r#"{"edit":"relax","curve":0,"pins":[1.5]}"#, "a pin is 1.5, not between 0 and 1"),
+        (r#"{"edit":"relax","curve":0,"stiffness":[{"from":0.6,"to":0.4}]}"#, "the length of a stretch is"),
+        (r#"{"edit":"cut","through":[1,0,0],"normal":[0,0,0]}"#, "the length of normal is 0, not more than 0"),
+        (r#"{"edit":"spline","curve":0,"control":3}"#, "control is 3, not 4 or more"),
+        (r#"{"edit":"paint","picks":[[1,0,0],[0,1,0]],"snap":-0.1}"#, "snap is -0.1, not 0 or more"),
+        (r#"{"edit":"feature_lines","angle_deg":200}"#, "angle_deg is 200, not between 0 and 180 degrees"),
+        (r#"{"edit":"complete","patches":0}"#, "patches is 0, not 1 or more"),
+        (r#"{"edit":"sections","at":[1,0,0],"u":[1]}"#, "the number of cells of a section is 1"),
+        (r#"{"edit":"split_curve","curve":{"near":[90,0,0]},"at":0.5}"#, "off the mesh"),
+        (r#"{"edit":"delete_feature","feature":{"near":[1,0,0]}}"#, "there is no feature curve yet"),
+        (r#"{"edit":"join","corner":9}"#, "corner 9 is not there, there are 1"),
+    ] {
+        let refused = make(&ground, &mut drawing, edit).unwrap_err().to_string();
+        assert!(refused.contains(told), "{edit}: {refused}");
+        assert_eq!(drawing, before, "{edit}");
+    }
+    assert!(serde_json::from_str::<Edit>(r#"{"edit":"relax","curve":{"close":[1,0,0]}}"#).is_err());
+}
+
+#[test]
+fn face_points_of_strokes_that_meet_lie_on_their_faces_and_on_both_curves() {
+    let mesh = shapes::sphere(1.0, 4);
+    let (drawing, _) = run(&mesh, &CUTS);
+    let bvh = Bvh::new(&mesh);
+    for curve in &drawing.network.curves {
+        for p in &curve.points {
+            assert!(p.bary.iter().all(|b| (-1e-12..=1.0 + 1e-12).contains(b)));
+            let at = p.position(&mesh);
+            assert!(bvh.closest(at).position.distance(at) < 1e-12);
+        }
+        let [a, b] = curve.corners.map(|k| drawing.network.corners[k as usize].place);
+        assert_eq!((curve.points[0], curve.points[curve.points.len() - 1]), (a, b));
+    }
+}
