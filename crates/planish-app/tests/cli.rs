@@ -347,8 +347,21 @@ fn a_script_draws_a_network_on_a_bare_mesh_and_the_history_goes_back_and_forth_i
     write_box(&folder.path().join("box.ply"), 12);
     let script = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     script("draw.toml", BOX_SCRIPT);
-    let output = planish(&["edit", "box.ply", "draw.toml", "-o", "box.planish", "--pictures", "seen"], folder.path());
+    let arguments = ["edit", "box.ply", "draw.toml", "-o", "box.planish", "--pictures", "seen", "--report", "r.json"];
+    let output = planish(&arguments, folder.path());
     assert_eq!(status(&output), 0, "{}", stderr(&output));
+    // What every step did, in the table and in the report.
+    let table = stdout(&output);
+    assert!(table.contains("feature_lines: corners 0 to 7, curves 0 to 11, all patches"), "{table}");
+    assert!(table.contains("paint: corners 8, 9, curves ") && table.contains(", 2 to put right"), "{table}");
+    let report: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(folder.path().join("r.json")).unwrap()).unwrap();
+    assert_eq!(report["edits"][1]["faults"], 2, "{report}");
+    assert_eq!(report["edits"][1]["corners"], serde_json::json!([8, 9]));
+    // The same is told of the model later on.
+    let output = planish(&["info", "box.planish"], folder.path());
+    assert_eq!(stderr(&output).lines().filter(|l| l.contains("has 5 sides, not 4")).count(), 2);
+    assert!(stdout(&output).contains("10 corners, 15 curves"), "{}", stdout(&output));
     // The stroke divides the top in two patches and puts a corner into two edges: their other sides have five.
     let told = stderr(&output);
     assert_eq!(
@@ -418,6 +431,22 @@ fn wrong_scripts_are_told_with_file_line_and_hint_and_nothing_is_written() {
         (
             "[[step]]\nedit = \"paint\"\npicks = [[0.5, 0.5, 1.0], [900, 0, 0]]\n".into(),
             "(900.000000, 0.000000, 0.000000) is 51904 % of the diagonal off the mesh",
+        ),
+        (
+            format!("{good}[[step]]\nedit = \"relax\"\ncurve = {{ near = [0, 0, 90] }}\n"),
+            "step 2 (relax, line 5): (0.000000, 0.000000, 90.000000) is ",
+        ),
+        (
+            format!("{good}[[step]]\nedit = \"relax\"\ncurve = {{ close = [0, 0, 1] }}\n"),
+            "step 2: a number counted from 0, or { near = [x, y, z] }, is wanted (line 5)",
+        ),
+        (
+            format!("{good}[[step]]\nedit = \"spline\"\ncurve = 0\ncontrol = 100000\n"),
+            "step 2 (spline, line 5): control is 100000, not between 4 and 1000",
+        ),
+        (
+            "[[step]]\nedit = \"paint\"\npicks = [{ face = 1, bary = [2, 0, 5] }, [1, 1, 1]]\n".into(),
+            "step 1 (paint, line 1): a weight of bary is 2, not between 0 and 1",
         ),
         ("[[step]]\nedit = \"undo\"\n".into(), "step 1 (undo, line 1): there is nothing left to take back"),
         (

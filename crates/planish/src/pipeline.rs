@@ -291,8 +291,8 @@ fn remade(
             {
                 return Ok(grids);
             }
-            match drawn.0 {
-                [] => Ok(grid::resample(mesh, network, &patches, &params.grid, o)?),
+            match drawn {
+                ([], []) => Ok(grid::resample(mesh, network, &patches, &params.grid, o)?),
                 _ => Ok(grid::resample_with_features(mesh, network, &patches, drawn, &params.grid, o)?),
             }
         },

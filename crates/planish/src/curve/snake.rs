@@ -43,6 +43,8 @@ const DAMPING_STEP: f64 = 1e3;
 const GREATEST_DAMPING: f64 = 1e2;
 /// Share by which the damping falls again after a sweep that went well.
 const RELIEF: f64 = 0.1;
+/// Least damping of a free loop that a scalar draws, where no energy tells that it only slides along itself.
+const PULLED_DAMPING: f64 = 1e-2;
 /// Shares of a fine step that are tried until one lowers the energy.
 const SHARES: [f64; 2] = [1.0, 0.3];
 /// Longest fine move, in mean spacings of the points: beyond, tangent planes tell little.
@@ -543,7 +545,7 @@ impl<'m> Snake<'m> {
         let longest = LONGEST_MOVE * self.spacing();
         let before = self.energy(params).total();
         let (points, at) = (self.points.clone(), self.at.clone());
-        let mut damping = self.damping;
+        let mut damping = if pulled && whole { self.damping.max(PULLED_DAMPING) } else { self.damping };
         while damping <= GREATEST_DAMPING {
             let Some(x) = system.solve(damping) else {
                 damping *= DAMPING_STEP;

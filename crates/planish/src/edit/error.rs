@@ -28,7 +28,7 @@ pub enum ApplyError {
         what: &'static str,
     },
     /// A number that is out of its range.
-    #[error("{what} is {value}, not {wanted}")]
+    #[error("{what} is {value}, not {wanted} - hint: give a number in that range")]
     OutOfRange {
         /// What it is of.
         what: &'static str,

@@ -59,7 +59,9 @@ pub enum EditError {
         line: &'static str,
     },
     /// A closed curve that its forces draw together.
-    #[error("curve {curve} shrinks to nothing under these forces - hint: pin some of it, or give it less fairness")]
+    #[error(
+        "curve {curve} shrinks to nothing under these forces - hint: pin some of it, relax sections of it, or draw it to a scalar"
+    )]
     Shrunk {
         /// The curve.
         curve: u32,
