@@ -6,6 +6,7 @@
 use super::fit::{Weighted, sheet};
 use super::front::{PRICE, VARIATION_PRICE};
 use super::nest::{self, LIMIT, Seen, cost, nest};
+use super::rim::rim;
 use super::sites::{Sites, in_pieces};
 use super::{Quadric, Sample};
 use crate::geom::KdTree;
@@ -255,14 +256,16 @@ fn find(
     let known = again && found.order.iter().all(|&k| asked[k].owner == site);
     let rounds = if sheets.len() > 1 && !known { REFINED } else { 0 };
     let mut worth = spread(&sheets, concave).1;
+    let mut widths = WIDTHS.to_vec();
     for _ in 0..rounds {
-        let tried = WIDTHS.into_iter().map(|width| {
+        let tried = widths.iter().map(|width| {
             let better = refined(&sheets, concave, place, width * HEARD * support, tree);
             let (cost, worth) = spread(&better, concave);
-            (better, cost, worth)
+            (better, cost, worth, *width)
         });
         let Some(best) = tried.min_by(|a, b| a.2.total_cmp(&b.2)).filter(|b| b.2 < worth) else { break };
-        (sheets, spent, worth) = best;
+        (sheets, spent, worth) = (best.0, best.1, best.2);
+        widths = vec![best.3];
         // What better sheets leave nothing to explain for goes: it may lie on another one, turned over.
         while sheets.len() > 1 {
             let fewer = (0..sheets.len()).map(|k| {
@@ -275,6 +278,15 @@ fn find(
             prices.remove(less.0);
             (_, sheets, concave, spent, worth) = less;
         }
+    }
+    // A plate ends where its points do: no sheet says so, if it is as thin as the noise.
+    let found = sheets.len();
+    while found > 1 && sheets.len() < MOST {
+        let bare: Vec<Quadric> = sheets.iter().map(|s| s.0).collect();
+        let Some((normal, at)) = rim(&bare, concave, center, HEARD * support, &ball, noise) else { break };
+        let gap = concave >> (found - 1) & 1 == 1;
+        concave |= u8::from(gap) << sheets.len();
+        sheets.push((Quadric::plane(at, support, if gap { -normal } else { normal }), at, sheets[0].2));
     }
     let plain = sheets.len() == 1 && spent < PLAIN * count + count.sqrt();
     let total = spent + prices.iter().sum::<f64>();
