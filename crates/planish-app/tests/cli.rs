@@ -359,9 +359,9 @@ fn a_script_draws_a_network_on_a_bare_mesh_and_the_history_goes_back_and_forth_i
     assert_eq!(report["edits"][1]["faults"], 2, "{report}");
     assert_eq!(report["edits"][1]["corners"], serde_json::json!([8, 9]));
     // The same is told of the model later on.
-    let output = planish(&["info", "box.planish"], folder.path());
-    assert_eq!(stderr(&output).lines().filter(|l| l.contains("has 5 sides, not 4")).count(), 2);
-    assert!(stdout(&output).contains("10 corners, 15 curves"), "{}", stdout(&output));
+    let info = planish(&["info", "box.planish"], folder.path());
+    assert_eq!(stderr(&info).lines().filter(|l| l.contains("has 5 sides, not 4")).count(), 2);
+    assert!(stdout(&info).contains("10 corners, 15 curves"), "{}", stdout(&info));
     // The stroke divides the top in two patches and puts a corner into two edges: their other sides have five.
     let told = stderr(&output);
     assert_eq!(

@@ -37,13 +37,14 @@ const CUTS: [&str; 3] = [
 #[test]
 fn three_great_circles_divide_each_other_at_6_corners_and_their_8_triangles_split_into_24_patches() {
     let mesh = shapes::sphere(1.0, 5);
-    let (drawing, made) = run(&mesh, &CUTS);
+    let cuts = CUTS.map(|c| c.replace('}', r#","snap":0}"#));
+    let (drawing, made) = run(&mesh, &cuts.each_ref().map(|c| c.as_str()));
     let network = &drawing.network;
     let ends = |k: u32| network.curves.iter().flat_map(|c| c.corners).filter(|&c| c == k).count();
     let meetings = (0..network.corners.len() as u32).filter(|&k| ends(k) == 4).count();
     assert_eq!(meetings, 6, "{network:?}");
-    // The corner where the first circle starts is within the snap distance of the second.
-    assert_eq!((network.corners.len(), network.curves.len()), (6, 12));
+    // Besides the corners where they meet one is left where the first circle starts.
+    assert_eq!((network.corners.len(), network.curves.len()), (7, 13));
     let told = made[2].faults.as_ref().unwrap();
     assert!(told.iter().all(|f| f.to_string().contains("sides, not 4")), "{told:?}");
     // Corners lie on both planes.
@@ -52,9 +53,11 @@ fn three_great_circles_divide_each_other_at_6_corners_and_their_8_triangles_spli
         let on = [p.z + 0.02 * p.y - 0.003, 0.01 * (p.x - 1.0) + p.y - 0.004, p.x - 0.002 + 0.03 * p.z];
         assert_eq!(on.iter().filter(|h| h.abs() < 1e-6).count(), 2, "{k}: {p} {on:?}");
     }
-    // Every region is split.
+    // The corner of the first circle's start goes, and every region is split.
     let ground = Ground::new(&mesh);
     let mut drawing = drawing.clone();
+    let start = (0..7u32).find(|&k| ends(k) == 2).unwrap();
+    make(&ground, &mut drawing, &format!(r#"{{"edit":"delete_corner","corner":{start}}}"#)).unwrap();
     for s in 0..8u32 {
         let at = |bit: u32| if s >> bit & 1 == 1 { 0.6 } else { -0.6 };
         let split = format!(r#"{{"edit":"split_region","at":[{},{},{}]}}"#, at(0), at(1), at(2));
@@ -139,6 +142,17 @@ fn picks_go_to_sharp_edges_within_the_snap_distance_and_stay_where_they_are_with
     assert!((x(free[1]) - x(held[1])).abs() > 1e-6);
     assert_eq!(x(held[1]), 1.0, "{held:?}");
     assert_eq!(free[0], held[0]);
+}
+
+#[test]
+fn sharp_lines_asked_for_twice_are_there_once_and_a_part_that_was_deleted_comes_back() {
+    let mesh = shapes::cuboid(DVec3::ONE, 6);
+    let lines = r#"{"edit":"feature_lines","angle_deg":40}"#;
+    let (twice, made) = run(&mesh, &[lines, lines]);
+    assert_eq!((twice.network.curves.len(), twice.network.patches.len()), (12, 6));
+    assert!(made[0].changed && !made[1].changed);
+    let (again, _) = run(&mesh, &[lines, r#"{"edit":"delete_curves","curves":[0,{"near":[0.5,0.5,0.0]}]}"#, lines]);
+    assert_eq!((again.network.curves.len(), again.network.patches.len()), (12, 6));
 }
 
 #[test]

@@ -27,7 +27,7 @@ pub mod symmetry;
 pub use attract::{attract, slide_to};
 pub use canvas::{Canvas, Magnet};
 pub use chain::SurfaceCurve;
-pub(crate) use chain::{between, without_repeats, without_spur};
+pub(crate) use chain::{between, without_repeats};
 pub use curvature::{VertexCurvature, vertex_curvature};
 pub use paint::{PaintMode, PaintParams, Snap, SnapTargets, Stroke, snap, way};
 pub use scalar::ScalarField;

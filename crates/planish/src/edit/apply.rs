@@ -12,9 +12,10 @@ use crate::geom::Bvh;
 use crate::grid::{Family, FeatureCurve, Sections, check_features, family_of};
 use crate::mesh::{FacePoint, TriMesh, sharp_edges};
 use crate::model::Drawing;
-use crate::network::{CurveKind, EditError, Editor, Holds, LayoutParams, PatchMesh, imprint};
+use crate::network::{CurveKind, EditError, Editor, Holds, LayoutParams, Network, PatchMesh, imprint};
 use crate::observe::Observer;
 use glam::DVec3;
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 /// A position further off the mesh than this share of its diagonal is a mistake: of units, or of axes.
@@ -290,8 +291,9 @@ impl Work<'_, '_> {
             Edit::FeatureLines { angle_deg, shortest } => {
                 let lines = section::lines(mesh, adjacency, &sharp_edges(mesh, adjacency, *angle_deg));
                 let least = shortest * mesh.bounds().diagonal();
-                for line in lines.iter().filter(|l| l.length(mesh) >= least) {
-                    self.add(line, LINE_KIND, crate::geom::tolerance::RELATIVE)?;
+                let lines = lines.iter().filter(|l| l.length(mesh) >= least);
+                for line in lines.flat_map(|l| uncovered(mesh, l, &self.drawing.network)).collect::<Vec<_>>() {
+                    self.add(&line, LINE_KIND, crate::geom::tolerance::RELATIVE)?;
                 }
                 Ok(())
             }
@@ -498,4 +500,32 @@ fn forget_cells(sections: &mut Vec<(u32, Sections)>, patch: u32, family: Family)
         }
     }
     sections.retain(|(_, cells)| !cells.u.is_empty() || !cells.v.is_empty());
+}
+
+/// The parts of a line along edges where no curve runs yet.
+fn uncovered(mesh: &TriMesh, line: &SurfaceCurve, network: &Network) -> Vec<SurfaceCurve> {
+    let vertex = |p: &FacePoint| (0..3).find(|&k| p.bary[k] == 1.0).map(|k| mesh.triangles[p.face as usize][k]);
+    let edge = |w: &[FacePoint]| match [vertex(&w[0]), vertex(&w[1])] {
+        [Some(a), Some(b)] => Some((a.min(b), a.max(b))),
+        _ => None,
+    };
+    let taken: BTreeSet<(u32, u32)> =
+        network.curves.iter().flat_map(|c| c.points.windows(2)).filter_map(edge).collect();
+    let mut points = line.points.clone();
+    points.extend(line.points.first().filter(|_| line.closed));
+    let is_free = |w: &[FacePoint]| edge(w).is_none_or(|e| !taken.contains(&e));
+    if points.windows(2).all(is_free) {
+        return vec![line.clone()];
+    }
+    let mut parts: Vec<Vec<FacePoint>> = Vec::new();
+    let mut goes_on = false;
+    for w in points.windows(2) {
+        match (is_free(w), parts.last_mut().filter(|_| goes_on)) {
+            (true, Some(part)) => part.push(w[1]),
+            (true, None) => parts.push(w.to_vec()),
+            (false, _) => {}
+        }
+        goes_on = is_free(w);
+    }
+    parts.into_iter().map(SurfaceCurve::open).collect()
 }
