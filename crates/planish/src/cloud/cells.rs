@@ -8,10 +8,11 @@ use super::front::{PRICE, VARIATION_PRICE};
 use super::nest::{self, LIMIT, Seen, cost, nest};
 use super::rim::rim;
 use super::sites::{Sites, in_pieces};
-use super::{Quadric, Sample};
+use super::{Blend, Quadric, Sample};
 use crate::geom::KdTree;
 use crate::observe::Observer;
 use glam::DVec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// The points that a cell explains lie within this many supports: a fillet and an edge differ only from afar.
@@ -57,6 +58,26 @@ pub struct Cell {
     pub count: u8,
     /// Bit k: sheet k is joined to those before it by the minimum (a concave edge), else by the maximum (a convex one).
     pub concave: u8,
+}
+
+impl Cell {
+    /// Signed distance, positive outside, and unit normal of the sheet that decides.
+    pub(super) fn evaluate(&self, p: DVec3) -> (f64, DVec3) {
+        let mut best = self.sheets[0].distance(p);
+        for k in 1..self.count as usize {
+            let next = self.sheets[k].distance(p);
+            if (next.0 < best.0) == (self.concave >> k & 1 == 1) {
+                best = next;
+            }
+        }
+        best
+    }
+
+    /// Weight in the blend at a point whose squared distance is this share of the squared support.
+    pub(super) fn weight(&self, t2: f64) -> f64 {
+        // C2 at the rim; a steep bell, so that a point hears the cells beside it.
+        (1.0 - t2).max(0.0).powi(4) * self.trust
+    }
 }
 
 /// The cells of all sites. `None` if cancelled.
@@ -117,7 +138,50 @@ pub(super) fn cells(
             })
             .collect();
     }
-    Some(made.iter().zip(&places).filter_map(|(f, p)| f.as_ref().filter(|f| f.at_home(p)).map(|f| f.cell(p))).collect())
+    let home =
+        made.iter().zip(&places).filter_map(|(f, p)| Some((f.as_ref().filter(|f| f.at_home(p))?.cell(p), p.noise)));
+    let (cells, noise): (Vec<Cell>, Vec<f64>) = home.unzip();
+    Some(outvoted(cells, &noise))
+}
+
+/// How far beside a cell its neighbours are asked, in noise levels, and how sure they must be of the other side.
+const BESIDE: f64 = 3.0;
+const SURE: f64 = 1.0;
+/// What is left of the trust of a cell that they contradict, and rounds.
+const OUTVOTED: f64 = 1e-3;
+const VOTES: usize = 3;
+
+/// The cells, those with hardly a say whose neighbours see another side right beside them.
+///
+/// Where two sheets are closer than the noise, as at the tip of a wedge, a single one explains the points, and faces
+/// either way; the cells around that know both sheets tell that there is no inside behind it.
+fn outvoted(cells: Vec<Cell>, noise: &[f64]) -> Vec<Cell> {
+    let mut now = cells.clone();
+    for _ in 0..VOTES {
+        let voters: Vec<Cell> = now.iter().filter(|c| c.count > 1).copied().collect();
+        let blend = Blend::new(&voters);
+        now = (0..cells.len())
+            .into_par_iter()
+            .map(|i| {
+                let mut cell = cells[i];
+                let (d, n) = cell.evaluate(cell.center);
+                let foot = cell.center - d * n;
+                let contradicted = [-BESIDE, BESIDE].into_iter().any(|side| {
+                    let p = foot + side * noise[i] * n;
+                    let own = cell.evaluate(p).0;
+                    let votes = if cell.count > 1 { 1.0 } else { 0.0 };
+                    let weight = votes * now[i].weight(cell.center.distance_squared(p) / cell.support.powi(2));
+                    blend.at(p).is_some_and(|all| {
+                        let others = (all.value * all.weight - own * weight) / (all.weight - weight);
+                        others * own < 0.0 && others.abs() > SURE * noise[i]
+                    })
+                });
+                cell.trust *= if contradicted { OUTVOTED } else { 1.0 };
+                cell
+            })
+            .collect();
+    }
+    now
 }
 
 /// Where a cell is.
