@@ -43,8 +43,6 @@ const DAMPING_STEP: f64 = 1e3;
 const GREATEST_DAMPING: f64 = 1e2;
 /// Share by which the damping falls again after a sweep that went well.
 const RELIEF: f64 = 0.1;
-/// Least damping of a free loop that a scalar draws, where no energy tells that it only slides along itself.
-const PULLED_DAMPING: f64 = 1e-2;
 /// Shares of a fine step that are tried until one lowers the energy.
 const SHARES: [f64; 2] = [1.0, 0.3];
 /// Longest fine move, in mean spacings of the points: beyond, tangent planes tell little.
@@ -545,7 +543,7 @@ impl<'m> Snake<'m> {
         let longest = LONGEST_MOVE * self.spacing();
         let before = self.energy(params).total();
         let (points, at) = (self.points.clone(), self.at.clone());
-        let mut damping = if pulled && whole { self.damping.max(PULLED_DAMPING) } else { self.damping };
+        let mut damping = self.damping;
         while damping <= GREATEST_DAMPING {
             let Some(x) = system.solve(damping) else {
                 damping *= DAMPING_STEP;
@@ -562,12 +560,6 @@ impl<'m> Snake<'m> {
                 moves.iter_mut().for_each(|m| *m *= longest / reach);
             }
             if pulled {
-                if whole {
-                    // A free loop slides along itself under no force: it would never come to rest.
-                    let along = |i: usize| (self.at[(i + 1) % n] - self.at[(i + n - 1) % n]).normalize_or_zero();
-                    let slide = (0..n).map(|i| moves[i].dot(along(i))).sum::<f64>() / n as f64;
-                    moves.iter_mut().enumerate().for_each(|(i, m)| *m -= along(i) * slide);
-                }
                 // The pull has no energy of its own to compare.
                 return (self.apply(&moves), true);
             }
