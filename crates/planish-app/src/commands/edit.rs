@@ -219,13 +219,18 @@ fn row(k: usize, edit: &Edit, line: usize, made: Made) -> EditRow {
     }
 }
 
+/// Where an edit changes more runs of numbers than this the table tells how many; the report has them all.
+const MOST_RUNS: usize = 8;
+
 /// What an edit did, in words.
 fn told_row(row: &EditRow) -> String {
     let mut parts = Vec::new();
     for (what, list) in [("corner", &row.corners), ("curve", &row.curves), ("feature curve", &row.features)] {
-        if !list.is_empty() {
-            let s = if list.len() > 1 { "s" } else { "" };
-            parts.push(format!("{what}{s} {}", ranges(list)));
+        let s = if list.len() > 1 { "s" } else { "" };
+        match runs(list) {
+            runs if runs.is_empty() => {}
+            runs if runs.len() > MOST_RUNS => parts.push(format!("{} {what}s", list.len())),
+            runs => parts.push(format!("{what}{s} {}", runs.join(", "))),
         }
     }
     match &row.relaxed[..] {
@@ -254,8 +259,8 @@ fn told_row(row: &EditRow) -> String {
     if parts.is_empty() { name.clone() } else { format!("{name}: {}", parts.join(", ")) }
 }
 
-/// Numbers with their runs drawn together: `3, 5 to 9`.
-fn ranges(list: &[u32]) -> String {
+/// Numbers with their runs drawn together: `3`, `5 to 9`.
+fn runs(list: &[u32]) -> Vec<String> {
     let mut runs: Vec<[u32; 2]> = Vec::new();
     for &k in list {
         match runs.last_mut() {
@@ -268,7 +273,7 @@ fn ranges(list: &[u32]) -> String {
         1 => format!("{a}, {b}"),
         _ => format!("{a} to {b}"),
     };
-    runs.iter().map(word).collect::<Vec<_>>().join(", ")
+    runs.iter().map(word).collect()
 }
 
 enum Wrong {
