@@ -5,7 +5,7 @@
 //! sides. Where a split puts a corner into the side of a neighbour of four sides, the split goes on through that
 //! neighbour to its opposite side, and so on, until it ends in another split region or at the boundary.
 
-use super::diagnose::{Drawn, Regions, regions};
+use super::diagnose::{Regions, regions};
 use super::disk::{Disk, Met};
 use super::edit::{EditError, Editor};
 use super::imprint::Cut;
@@ -13,15 +13,11 @@ use super::layout::layout_around;
 use super::{Corner, Curve, CurveKind, LayoutParams, Network};
 use crate::curve::without_repeats;
 use crate::mesh::{Adjacency, FacePoint, NONE, next};
-use crate::observe::{Observer, Part};
+use crate::observe::Observer;
 use std::f64::consts::TAU;
 
 /// Patches that one split may run through: more than any chord of a network has.
 const LONGEST_CHORD: usize = 10_000;
-
-/// Layouts that are tried to complete a network, each with this share more patches than asked for than the one before.
-const COMPLETIONS: usize = 3;
-const MORE_PATCHES: f64 = 0.06;
 
 impl Editor<'_> {
     /// Splits region `region` (numbered as by [`super::diagnose()`]) of three, five or six sides into four-sided
@@ -218,38 +214,22 @@ impl Editor<'_> {
                 kind[h as usize] = Some(self.network.curves[half / 2].kind);
             }
         }
-        for attempt in 0..COMPLETIONS {
-            let patches = (params.patches as f64 * (1.0 + MORE_PATCHES * attempt as f64)).round() as usize;
-            let params = LayoutParams { patches, ..params.clone() };
-            let part = Part::new(observer, attempt as f64 / COMPLETIONS as f64, 1.0 / COMPLETIONS as f64);
-            let laid = layout_around(&drawn.cut.mesh, &drawn.barrier, &corner, &[], &params, &part)?;
-            let network = self.on_input(drawn, &kind, &laid);
-            // Beside curves the cut mesh has slivers, and what is apart there may touch on the mesh by rounding.
-            if attempt + 1 == COMPLETIONS || regions(self.mesh, self.adjacency, &network).is_ok() {
-                self.network = network;
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// A network of the cut mesh on the mesh itself.
-    /// * `kind` - for each half-edge of the cut mesh the kind of the user's curve along it
-    fn on_input(&self, drawn: &Drawn, kind: &[Option<CurveKind>], laid: &Network) -> Network {
+        let laid = layout_around(&drawn.cut.mesh, &drawn.barrier, &corner, &[], params, observer)?;
         let triangles = &drawn.cut.mesh.triangles;
         let to_input = |p: &FacePoint| place_on_input(self, &drawn.cut, p.face, p.bary);
         let mut network = Network { patches: laid.patches.clone(), ..Network::default() };
         network.corners = laid.corners.iter().map(|c| Corner { place: to_input(&c.place) }).collect();
         for curve in &laid.curves {
             // A curve along a user's line keeps the user's kind: lines of smooth curves are not sharp.
-            let user = curve.points.windows(2).find_map(|w| line_of(triangles, &drawn.adjacency, kind, w));
+            let user = curve.points.windows(2).find_map(|w| line_of(triangles, &drawn.adjacency, &kind, w));
             network.curves.push(Curve {
                 corners: curve.corners,
                 kind: user.unwrap_or(curve.kind),
                 points: curve.points.iter().map(to_input).collect(),
             });
         }
-        network
+        self.network = network;
+        Ok(())
     }
 }
 
