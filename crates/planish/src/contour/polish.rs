@@ -13,9 +13,10 @@
 use super::local::{CellRange, GONE, Local};
 use super::patch::Wish;
 use crate::field::{Creases, Directed};
+use crate::geom::KdTree;
 use crate::mesh::{DEGENERATE_AREA, FeatureKind, TriMesh};
 use glam::DVec3;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap};
 
 /// Parts of the way that are tried in the end.
 const WAYS: [f64; 3] = [1.0, 0.6, 0.3];
@@ -39,34 +40,54 @@ pub struct Polished {
 }
 
 /// Where lines run: for each feature vertex those beside it on its lines.
-struct Lines(BTreeMap<u32, Vec<u32>>);
+struct Lines {
+    /// All vertices of lines, ascending.
+    names: Vec<u32>,
+    beside: Vec<Vec<u32>>,
+}
 
 impl Lines {
+    fn new(edges: &[[u32; 2]]) -> Lines {
+        let mut names: Vec<u32> = edges.iter().flatten().copied().collect();
+        names.sort_unstable();
+        names.dedup();
+        let mut lines = Lines { beside: vec![Vec::new(); names.len()], names };
+        edges.iter().for_each(|&[a, b]| lines.join(a, b));
+        lines
+    }
+
+    /// Vertices with others beside them, ascending.
+    fn vertices(&self) -> impl Iterator<Item = (u32, &[u32])> {
+        let all = self.names.iter().zip(&self.beside).map(|(&v, beside)| (v, beside.as_slice()));
+        all.filter(|(_, beside)| !beside.is_empty())
+    }
+
+    fn beside(&self, v: u32) -> &[u32] {
+        self.names.binary_search(&v).map_or(&[], |n| &self.beside[n])
+    }
+
     fn join(&mut self, v: u32, w: u32) {
         for (a, b) in [(v, w), (w, v)] {
-            let list = self.0.entry(a).or_default();
-            if !list.contains(&b) {
-                list.push(b);
+            let n = self.names.binary_search(&a).unwrap_or_else(|n| {
+                self.names.insert(n, a);
+                self.beside.insert(n, Vec::new());
+                n
+            });
+            if !self.beside[n].contains(&b) {
+                self.beside[n].push(b);
             }
         }
     }
 
-    fn beside(&self, v: u32) -> Vec<u32> {
-        self.0.get(&v).cloned().unwrap_or_default()
-    }
-
+    /// `v` becomes `w`.
     fn merge(&mut self, v: u32, w: u32) {
-        for x in self.0.remove(&v).unwrap_or_default() {
-            let list = self.0.entry(x).or_default();
-            list.retain(|&y| y != v);
+        let Ok(n) = self.names.binary_search(&v) else { return };
+        for x in std::mem::take(&mut self.beside[n]) {
+            if let Ok(n) = self.names.binary_search(&x) {
+                self.beside[n].retain(|&y| y != v);
+            }
             if x != w {
-                if !list.contains(&w) {
-                    list.push(w);
-                }
-                let own = self.0.entry(w).or_default();
-                if !own.contains(&x) {
-                    own.push(x);
-                }
+                self.join(x, w);
             }
         }
     }
@@ -91,15 +112,12 @@ pub fn polish(
     let mut seeds: Vec<u32> = wishes.iter().map(|w| w.0).collect();
     seeds.extend(calls.iter().flat_map(|c| &c.1));
     seeds.extend(thin.iter().flat_map(|&t| mesh.triangles[t as usize]));
-    let mut lines = Lines(BTreeMap::new());
-    for &[a, b] in edges.iter() {
-        lines.join(a, b);
-    }
+    let mut lines = Lines::new(edges);
     let special = |v: u32, beside: &[u32]| beside.len() != 2 || kinds[v as usize] == FeatureKind::Corner;
-    for (&v, beside) in lines.0.iter().filter(|(v, beside)| special(**v, beside)) {
+    for (v, beside) in lines.vertices().filter(|(v, beside)| special(*v, beside)) {
         // A corner may call the next vertices of the lines.
         seeds.push(v);
-        seeds.extend(beside.iter().flat_map(|&w| lines.beside(w)).chain(beside.iter().copied()));
+        seeds.extend(beside.iter().flat_map(|&w| lines.beside(w)).chain(beside));
     }
     if seeds.is_empty() {
         return Polished::default();
@@ -128,12 +146,14 @@ pub fn polish(
             }
         }
     }
+    let mut tried = [(); 3].map(|()| Tried { names: open.clone(), at: vec![None; open.len()] });
     for _ in 0..ROUNDS {
         let before = open.len();
         together(&mut local, &lines, &targets, &mut open);
-        open.retain(|&v| !local.shift(&[(v, targets[&v])]));
-        merge_along(&mut local, &mut lines, kinds, &targets, &mut open);
-        open.retain(|&v| !local.flip_and_shift(v, targets[&v]));
+        let [single, merged, flipped] = &mut tried;
+        open.retain(|&v| !single.again(&local, &lines, &targets, v) || !local.shift(&[(v, targets[&v])]));
+        merge_along(&mut local, &mut lines, kinds, &targets, &mut open, merged);
+        open.retain(|&v| !flipped.again(&local, &lines, &targets, v) || !local.flip_and_shift(v, targets[&v]));
         if open.is_empty() || open.len() == before {
             break;
         }
@@ -150,7 +170,7 @@ pub fn polish(
 
     mesh.triangles.retain(|t| *t != GONE);
     *edges =
-        lines.0.iter().flat_map(|(&v, beside)| beside.iter().filter(move |&&w| v < w).map(move |&w| [v, w])).collect();
+        lines.vertices().flat_map(|(v, beside)| beside.iter().filter(move |&&w| v < w).map(move |&w| [v, w])).collect();
     Polished { moved: count.saturating_sub(kept), kept }
 }
 
@@ -165,26 +185,15 @@ fn calls(
     if corners.is_empty() {
         return Vec::new();
     }
-    let l = &field.lattice;
-    let cell = |p: DVec3| ((p - l.origin) / l.step).floor().to_array().map(|x| x as i64);
-    let mut vertices: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    let size = field.lattice.step.max_element();
+    let tree = KdTree::new(&corners);
+    let mut near: Vec<Vec<(f64, u32)>> = vec![Vec::new(); corners.len()];
     for v in (0..kinds.len()).filter(|&v| kinds[v] != FeatureKind::None) {
-        vertices.entry(cell(mesh.points[v])).or_default().push(v as u32);
+        tree.within(mesh.points[v], CALL * size, |c, p, _| {
+            near[c as usize].push((mesh.points[v].distance(p), v as u32));
+        });
     }
-    let size = l.step.max_element();
-    let around = |p: DVec3| {
-        let [x, y, z] = cell(p);
-        let cells = (0..27).map(|n| [x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]);
-        let mut near: Vec<(f64, u32)> = cells
-            .filter_map(|c| vertices.get(&c))
-            .flatten()
-            .map(|&v| (mesh.points[v as usize].distance(p), v))
-            .filter(|n| n.0 < CALL * size)
-            .collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        near
-    };
-    let near: Vec<_> = corners.iter().map(|&p| around(p)).collect();
+    near.iter_mut().for_each(|near| near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))));
     let taken: BTreeSet<u32> = near.iter().flatten().filter(|n| n.0 <= TAKEN * size).map(|n| n.1).collect();
     let mut calls = Vec::new();
     for (p, near) in corners.into_iter().zip(near) {
@@ -193,6 +202,24 @@ fn calls(
         }
     }
     calls
+}
+
+/// When vertices were tried in vain: only what changes near a vertex can make room for it.
+struct Tried {
+    names: Vec<u32>,
+    /// For each the number of changes that there were.
+    at: Vec<Option<usize>>,
+}
+
+impl Tried {
+    /// True if `v` was not tried yet, or something changed near it since; it counts as tried now.
+    fn again(&mut self, local: &Local, lines: &Lines, targets: &HashMap<u32, DVec3>, v: u32) -> bool {
+        let Ok(n) = self.names.binary_search(&v) else { return true };
+        let places = lines.beside(v).iter().chain([&v]).filter_map(|w| targets.get(w).copied());
+        let again = self.at[n].is_none_or(|since| local.changed(since, v, places));
+        self.at[n] = Some(local.changes());
+        again
+    }
 }
 
 /// Neighbours on a line move together.
@@ -206,7 +233,7 @@ fn together(local: &mut Local, lines: &Lines, targets: &HashMap<u32, DVec3>, ope
         let mut group = vec![first];
         let mut at = 0;
         while at < group.len() {
-            for w in lines.beside(group[at]) {
+            for &w in lines.beside(group[at]) {
                 if open.binary_search(&w).is_ok() && !group.contains(&w) && !seen.contains(&w) && group.len() < TOGETHER
                 {
                     group.push(w);
@@ -232,14 +259,19 @@ fn merge_along(
     kinds: &[FeatureKind],
     targets: &HashMap<u32, DVec3>,
     open: &mut Vec<u32>,
+    tried: &mut Tried,
 ) {
     let mut at = 0;
     while at < open.len() {
         let v = open[at];
+        if !tried.again(local, lines, targets, v) {
+            at += 1;
+            continue;
+        }
         let is_corner = |v: u32| kinds[v as usize] == FeatureKind::Corner;
         let is_open = |v: u32, open: &[u32]| open.binary_search(&v).is_ok();
         let mut done = false;
-        for w in lines.beside(v) {
+        for w in lines.beside(v).to_vec() {
             if is_corner(v) {
                 // Others make room for a corner.
                 if !is_corner(w) && local.merge(w, v, targets[&v]) {
@@ -288,6 +320,7 @@ fn approach(local: &mut Local, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32
         }
     }
     for _ in 0..ROUNDS {
+        let mut back = false;
         for &(v, start) in &starts {
             let here = local.position(v);
             let turned = local.turned(v);
@@ -297,10 +330,16 @@ fn approach(local: &mut Local, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32
             if local.shift_leaning(&[(v, start)]) {
                 if local.turned(v) >= turned {
                     local.shift_leaning(&[(v, here)]);
-                } else if !open.contains(&v) {
+                    continue;
+                }
+                back = true;
+                if !open.contains(&v) {
                     open.push(v);
                 }
             }
+        }
+        if !back {
+            break;
         }
     }
 }
@@ -316,10 +355,9 @@ fn ask_corners(
     size: f64,
 ) -> Vec<DVec3> {
     let special: Vec<u32> = lines
-        .0
-        .iter()
-        .filter(|(v, beside)| beside.len() != 2 || kinds[**v as usize] == FeatureKind::Corner)
-        .map(|(v, _)| *v)
+        .vertices()
+        .filter(|(v, beside)| beside.len() != 2 || kinds[*v as usize] == FeatureKind::Corner)
+        .map(|(v, _)| v)
         .collect();
     let mut corners: Vec<DVec3> = Vec::new();
     for v in special {
@@ -357,34 +395,24 @@ fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corne
     if corners.is_empty() {
         return;
     }
-    let key = |p: DVec3| (p / size).floor().to_array().map(|x| x as i64);
-    let mut places: HashMap<[i64; 3], Vec<DVec3>> = HashMap::new();
-    for &p in corners {
-        places.entry(key(p)).or_default().push(p);
-    }
-    let near = |p: DVec3| {
-        let [x, y, z] = key(p);
-        (0..27)
-            .filter_map(|n| places.get(&[x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]))
-            .flatten()
-            .copied()
-            .collect::<Vec<DVec3>>()
+    let tree = KdTree::new(corners);
+    // Distance of the nearest corner within reach.
+    let off = |p: DVec3| {
+        let mut least = f64::INFINITY;
+        tree.within(p, (CALL + TAKEN) * size, |_, c, _| least = least.min(c.distance(p)));
+        least
     };
-    let vertices: Vec<u32> = lines.0.keys().copied().collect();
+    let mut vertices: Vec<u32> = Vec::new();
+    for (v, _) in lines.vertices() {
+        let off = off(local.position(v));
+        if off < TAKEN * size {
+            kinds[v as usize] = FeatureKind::Corner;
+        } else if off.is_finite() && kinds[v as usize] == FeatureKind::Corner {
+            vertices.push(v);
+        }
+    }
     for v in vertices {
         let p = local.position(v);
-        let around = near(p);
-        if around.iter().any(|c| c.distance(p) < TAKEN * size) {
-            kinds[v as usize] = FeatureKind::Corner;
-        }
-    }
-    let vertices: Vec<u32> = lines.0.keys().copied().filter(|&v| kinds[v as usize] == FeatureKind::Corner).collect();
-    for &v in &vertices {
-        let p = local.position(v);
-        let around = near(p);
-        if around.is_empty() || around.iter().any(|c| c.distance(p) < TAKEN * size) {
-            continue;
-        }
         // The vertex at the nearest corner, if there is one within reach of a flip.
         let mut ring = local.neighbours(v);
         ring.extend(
@@ -398,10 +426,7 @@ fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corne
         );
         ring.sort_unstable();
         ring.dedup();
-        let taken = |w: u32| {
-            kinds[w as usize] == FeatureKind::Corner
-                && near(local.position(w)).iter().any(|c| c.distance(local.position(w)) < TAKEN * size)
-        };
+        let taken = |w: u32| kinds[w as usize] == FeatureKind::Corner && off(local.position(w)) < TAKEN * size;
         let goal = ring
             .into_iter()
             .filter(|&w| w != v && taken(w) && local.position(w).distance(p) < CALL * size)
@@ -416,7 +441,7 @@ fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corne
 
 /// Joins loose ends of lines with what they end beside: over an edge that is there, or that a flip makes.
 fn join_ends(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], sharp: f64) {
-    let ends: Vec<u32> = lines.0.iter().filter(|(_, beside)| beside.len() == 1).map(|(v, _)| *v).collect();
+    let ends: Vec<u32> = lines.vertices().filter(|(_, beside)| beside.len() == 1).map(|(v, _)| v).collect();
     for v in ends {
         if lines.beside(v).len() != 1 || local.star(v).is_empty() {
             continue;
