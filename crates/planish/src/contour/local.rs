@@ -22,6 +22,8 @@ const LEAN: f64 = 0.5;
 const CLOSE: f64 = 5.0;
 /// Rounding may put a place into the next cell if it is this near, in cells.
 const SLACK: f64 = 1e-6;
+/// A vertex reaches over so many triangles at most.
+const FLIPS: usize = 4;
 
 /// A mesh in the cells of its field, around some vertices.
 pub struct Local<'a> {
@@ -185,9 +187,12 @@ impl<'a> Local<'a> {
         if moves.iter().any(|m| self.star(m.0).is_empty()) {
             return false;
         }
-        let mut changed: Vec<u32> = moves.iter().flat_map(|m| self.star(m.0)).copied().collect();
-        changed.sort_unstable();
-        changed.dedup();
+        let mut changed: Vec<u32> = Vec::with_capacity(8 * moves.len());
+        moves.iter().for_each(|m| changed.extend(self.star(m.0)));
+        if moves.len() > 1 {
+            changed.sort_unstable();
+            changed.dedup();
+        }
         let leaning = self.leaning(&changed);
         let areas: Vec<f64> = changed.iter().map(|&t| self.mesh.area(t as usize)).collect();
         let before: Vec<DVec3> = moves.iter().map(|m| self.position(m.0)).collect();
@@ -280,28 +285,109 @@ impl<'a> Local<'a> {
         self.flip_if(v, w, true).is_some()
     }
 
-    /// [`Local::flip_to`] of the edge to some vertex opposite of `v` together with [`Local::shift`] of `v`: a vertex may
-    /// have to reach over the next triangle to find its place. All or nothing.
-    pub fn flip_and_shift(&mut self, v: u32, to: DVec3) -> bool {
-        let from = self.position(v);
-        self.beyond(v).into_iter().any(|w| {
-            let Some(flip) = self.flip_between(v, w) else { return false };
-            let mut changed = self.star(v).to_vec();
-            changed.push(flip.triangles[1]);
-            let leaning = self.leaning(&changed);
-            let areas: Vec<f64> = changed.iter().map(|&t| self.mesh.area(t as usize)).collect();
-            self.mesh.points[v as usize] = to;
-            self.set(&flip, flip.after);
-            let kept =
-                self.is_wide(&changed, &areas) && self.leaning(&changed) <= leaning && self.is_embedded(&changed);
-            if kept {
-                self.finish(&flip, &changed, Some(from));
-            } else {
-                self.mesh.points[v as usize] = from;
-                self.set(&flip, flip.before);
-            }
-            kept
+    /// [`Local::shift`] of `v` over triangles that are in its way: a vertex may have to reach over the next ones to find
+    /// its place. All or nothing.
+    /// * `fixed` - edges that may not be flipped
+    pub fn flip_and_shift(&mut self, v: u32, to: DVec3, fixed: impl Fn(u32, u32) -> bool) -> bool {
+        self.reach_over(v, to, &fixed) || {
+            let beyond = self.beyond(v);
+            beyond.into_iter().any(|w| match self.flip_between(v, w) {
+                Some(flip) if !fixed(flip.edge[0], flip.edge[1]) => self.flipped_and_shifted(v, to, vec![flip]),
+                _ => false,
+            })
+        }
+    }
+
+    /// Makes `v` and `w` neighbours by one flip or two, if the mesh stays embedded and no more triangles lean than before;
+    /// returns whether.
+    /// * `fixed` - edges that may not be flipped
+    pub fn connect(&mut self, v: u32, w: u32, fixed: impl Fn(u32, u32) -> bool) -> bool {
+        let at = self.position(v);
+        let free = |f: &Flip| !fixed(f.edge[0], f.edge[1]);
+        if let Some(flip) = self.flip_between(v, w).filter(free)
+            && self.flipped_and_shifted(v, at, vec![flip])
+        {
+            return true;
+        }
+        self.beyond(v).into_iter().any(|x| {
+            let Some(first) = self.flip_between(v, x).filter(free) else { return false };
+            // The second goes over one of the two edges that the first lays open.
+            let second = [0, 1].into_iter().find_map(|k| {
+                let (s, a) = (first.after[k], first.edge[k]);
+                let own = first.triangles[k];
+                let shares = |t: &&u32| {
+                    let names = self.mesh.triangles[**t as usize];
+                    !first.triangles.contains(t) && [a, x, w].iter().all(|n| names.contains(n))
+                };
+                let t = *self.star(w).iter().find(shares)?;
+                // v a x and w x a become v a w and w x v, or with a and x exchanged.
+                let i = s.iter().position(|&n| n == v)?;
+                let edge = [s[(i + 1) % 3], s[(i + 2) % 3]];
+                let before = [s, self.mesh.triangles[t as usize]];
+                Some(Flip { triangles: [own, t], edge, before, after: [[v, edge[0], w], [w, edge[1], v]] })
+            });
+            second.filter(free).is_some_and(|second| self.flipped_and_shifted(v, at, vec![first, second]))
         })
+    }
+
+    /// Flips away what is in the way of `v`, one after another.
+    fn reach_over(&mut self, v: u32, to: DVec3, fixed: &impl Fn(u32, u32) -> bool) -> bool {
+        let from = self.position(v);
+        let mut flips: Vec<Flip> = Vec::new();
+        let mut star = self.star(v).to_vec();
+        let mut clear = false;
+        while flips.len() < FLIPS {
+            self.mesh.points[v as usize] = to;
+            let bars = self.in_the_way(&star);
+            self.mesh.points[v as usize] = from;
+            if bars.is_empty() {
+                clear = true;
+                break;
+            }
+            let next = bars.iter().find_map(|&t| {
+                let own = self.mesh.triangles[t as usize];
+                let beside = |s: &&u32| {
+                    let shared = |x: &&u32| **x != v && own.contains(x);
+                    self.mesh.triangles[**s as usize].iter().filter(shared).count() == 2
+                };
+                let s = *star.iter().find(beside)?;
+                let before = [self.mesh.triangles[s as usize], own];
+                let w = *own.iter().find(|x| !before[0].contains(x))?;
+                let at = before[0].iter().position(|&x| x == v)?;
+                let edge = [before[0][(at + 1) % 3], before[0][(at + 2) % 3]];
+                let new = !star.iter().any(|&s| self.mesh.triangles[s as usize].contains(&w));
+                let after = [[v, edge[0], w], [w, edge[1], v]];
+                (new && !fixed(edge[0], edge[1])).then_some(Flip { triangles: [s, t], edge, before, after })
+            });
+            let Some(flip) = next else { break };
+            self.set(&flip, flip.after);
+            star.push(flip.triangles[1]);
+            flips.push(flip);
+        }
+        for flip in flips.iter().rev() {
+            self.set(flip, flip.before);
+        }
+        clear && !flips.is_empty() && self.flipped_and_shifted(v, to, flips)
+    }
+
+    /// Flips, one after another, and then a shift of `v`, if all is well in the end.
+    fn flipped_and_shifted(&mut self, v: u32, to: DVec3, flips: Vec<Flip>) -> bool {
+        let from = self.position(v);
+        let mut changed = self.star(v).to_vec();
+        changed.extend(flips.iter().map(|f| f.triangles[1]));
+        let leaning = self.leaning(&changed);
+        let areas: Vec<f64> = changed.iter().map(|&t| self.mesh.area(t as usize)).collect();
+        self.mesh.points[v as usize] = to;
+        flips.iter().for_each(|f| self.set(f, f.after));
+        let kept = self.is_wide(&changed, &areas) && self.leaning(&changed) <= leaning && self.is_embedded(&changed);
+        if kept {
+            flips.iter().for_each(|f| self.adopt(f));
+            self.stray(&changed, [from].into_iter());
+        } else {
+            self.mesh.points[v as usize] = from;
+            flips.iter().rev().for_each(|f| self.set(f, f.before));
+        }
+        kept
     }
 
     /// Makes `v` and `w` neighbours by a flip if need be and merges them at the place of `w`. All or nothing.
@@ -357,8 +443,8 @@ impl<'a> Local<'a> {
         }
     }
 
-    /// Stars after a flip, and the note that `changed` changed.
-    fn finish(&mut self, flip: &Flip, changed: &[u32], from: Option<DVec3>) {
+    /// Stars after a flip.
+    fn adopt(&mut self, flip: &Flip) {
         let ([s, t], [a, b], [v, _, w]) = (flip.triangles, flip.edge, flip.after[0]);
         let mut change = |x: u32, lost: Option<u32>, won: Option<u32>| {
             if let Some(star) = self.stars.get_mut(self.which[x as usize] as usize) {
@@ -370,7 +456,6 @@ impl<'a> Local<'a> {
         change(w, None, Some(s));
         change(a, Some(t), None);
         change(b, Some(s), None);
-        self.stray(changed, from.into_iter());
     }
 
     /// Returns the edge that was flipped.
@@ -387,7 +472,8 @@ impl<'a> Local<'a> {
             self.set(&flip, flip.before);
             return None;
         }
-        self.finish(&flip, &changed, None);
+        self.adopt(&flip);
+        self.stray(&changed, std::iter::empty());
         Some(flip.edge)
     }
 
@@ -516,6 +602,27 @@ impl<'a> Local<'a> {
 
     /// True if no triangle that reaches into a box and was not seen in this search meets one of `own`.
     fn is_free(&mut self, own: &[Placed], low: DVec3, high: DVec3) -> bool {
+        self.search(own, low, high, |_| true)
+    }
+
+    /// Triangles that meet those given.
+    fn in_the_way(&mut self, changed: &[u32]) -> Vec<u32> {
+        self.search += 1;
+        changed.iter().for_each(|&t| self.seen[t as usize] = self.search);
+        let own: Vec<Placed> = changed.iter().map(|&t| self.placed(t)).collect();
+        let low = own.iter().fold(DVec3::INFINITY, |low, t| low.min(t.low));
+        let high = own.iter().fold(DVec3::NEG_INFINITY, |high, t| high.max(t.high));
+        let mut found = Vec::new();
+        self.search(&own, low, high, |t| {
+            found.push(t);
+            false
+        });
+        found
+    }
+
+    /// Calls `enough` for triangles that reach into a box, were not seen in this search and meet one of `own`; false if
+    /// it was enough.
+    fn search(&mut self, own: &[Placed], low: DVec3, high: DVec3, mut enough: impl FnMut(u32) -> bool) -> bool {
         let [[x0, x1], [y0, y1], [z0, z1]] = self.reach(low, high);
         for z in z0..=z1 {
             for y in y0..=y1 {
@@ -525,7 +632,7 @@ impl<'a> Local<'a> {
                 at += self.cells[at..end].partition_point(|(c, ..)| (c[0] as i64) < x0);
                 while at < end && self.cells[at].0[0] as i64 <= x1 {
                     let (_, first, last) = self.cells[at];
-                    if (first..last).any(|t| self.bars(t, own, low, high)) {
+                    if (first..last).any(|t| self.bars(t, own, low, high) && enough(t)) {
                         return false;
                     }
                     at += 1;
@@ -533,7 +640,8 @@ impl<'a> Local<'a> {
                 let mut at = self.last[row];
                 while at != 0 {
                     let Stray { triangle, from, to, before } = self.strays[at as usize - 1];
-                    if from as i64 <= x1 && to as i64 >= x0 && self.bars(triangle, own, low, high) {
+                    let near = from as i64 <= x1 && to as i64 >= x0;
+                    if near && self.bars(triangle, own, low, high) && enough(triangle) {
                         return false;
                     }
                     at = before;

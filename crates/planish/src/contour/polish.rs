@@ -10,6 +10,7 @@
 //! 3. what is left: a part of the way     4. loose ends of lines joined, by a flip if need be
 //! 5. triangles without area: merged away
 
+use super::lines::{Lines, TAKEN, follow, join_ends};
 use super::local::{CellRange, GONE, Local};
 use super::patch::Wish;
 use crate::field::{Creases, Directed};
@@ -24,11 +25,11 @@ const WAYS: [f64; 3] = [1.0, 0.6, 0.3];
 const ROUNDS: usize = 8;
 /// So many vertices move together at most.
 const TOGETHER: usize = 24;
-/// A corner that a vertex is this near to is taken, in cells.
-const TAKEN: f64 = 1e-6;
 /// A corner calls vertices of lines from this distance, in cells, and so many of them at most.
 const CALL: f64 = 0.9;
 const CALLED: usize = 4;
+/// In the end a corner calls any vertex from this distance, in cells.
+const CALL_ANY: f64 = 0.5;
 
 /// What was done.
 #[derive(Clone, Copy, Debug, Default)]
@@ -37,60 +38,6 @@ pub struct Polished {
     pub moved: usize,
     /// Feature vertices that did not.
     pub kept: usize,
-}
-
-/// Where lines run: for each feature vertex those beside it on its lines.
-struct Lines {
-    /// All vertices of lines, ascending.
-    names: Vec<u32>,
-    beside: Vec<Vec<u32>>,
-}
-
-impl Lines {
-    fn new(edges: &[[u32; 2]]) -> Lines {
-        let mut names: Vec<u32> = edges.iter().flatten().copied().collect();
-        names.sort_unstable();
-        names.dedup();
-        let mut lines = Lines { beside: vec![Vec::new(); names.len()], names };
-        edges.iter().for_each(|&[a, b]| lines.join(a, b));
-        lines
-    }
-
-    /// Vertices with others beside them, ascending.
-    fn vertices(&self) -> impl Iterator<Item = (u32, &[u32])> {
-        let all = self.names.iter().zip(&self.beside).map(|(&v, beside)| (v, beside.as_slice()));
-        all.filter(|(_, beside)| !beside.is_empty())
-    }
-
-    fn beside(&self, v: u32) -> &[u32] {
-        self.names.binary_search(&v).map_or(&[], |n| &self.beside[n])
-    }
-
-    fn join(&mut self, v: u32, w: u32) {
-        for (a, b) in [(v, w), (w, v)] {
-            let n = self.names.binary_search(&a).unwrap_or_else(|n| {
-                self.names.insert(n, a);
-                self.beside.insert(n, Vec::new());
-                n
-            });
-            if !self.beside[n].contains(&b) {
-                self.beside[n].push(b);
-            }
-        }
-    }
-
-    /// `v` becomes `w`.
-    fn merge(&mut self, v: u32, w: u32) {
-        let Ok(n) = self.names.binary_search(&v) else { return };
-        for x in std::mem::take(&mut self.beside[n]) {
-            if let Ok(n) = self.names.binary_search(&x) {
-                self.beside[n].retain(|&y| y != v);
-            }
-            if x != w {
-                self.join(x, w);
-            }
-        }
-    }
 }
 
 /// Brings the vertices of `wishes` to their places, and merges triangles without area away.
@@ -107,11 +54,20 @@ pub fn polish(
     edges: &mut Vec<[u32; 2]>,
     sharp: f64,
 ) -> Polished {
-    let calls = calls(mesh, field, creases, kinds);
+    let source = creases.map(|c| c.corners()).unwrap_or_default();
+    let size = field.lattice.step.max_element();
+    let tagged = (0..kinds.len()).filter(|&v| kinds[v] != FeatureKind::None).map(|v| (v as u32, mesh.points[v]));
+    let (calls, untaken) = calls(&source, size, CALL, tagged);
     let thin = thin(mesh);
     let mut seeds: Vec<u32> = wishes.iter().map(|w| w.0).collect();
     seeds.extend(calls.iter().flat_map(|c| &c.1));
     seeds.extend(thin.iter().flat_map(|&t| mesh.triangles[t as usize]));
+    if !untaken.is_empty() {
+        // Any vertex near by may be needed there.
+        let tree = KdTree::new(&untaken);
+        let near = |p: &DVec3| tree.closest(*p).is_some_and(|c| untaken[c as usize].distance(*p) < size);
+        seeds.extend((0..mesh.points.len()).filter(|&v| near(&mesh.points[v])).map(|v| v as u32));
+    }
     let mut lines = Lines::new(edges);
     let special = |v: u32, beside: &[u32]| beside.len() != 2 || kinds[v as usize] == FeatureKind::Corner;
     for (v, beside) in lines.vertices().filter(|(v, beside)| special(*v, beside)) {
@@ -153,18 +109,28 @@ pub fn polish(
         let [single, merged, flipped] = &mut tried;
         open.retain(|&v| !single.again(&local, &lines, &targets, v) || !local.shift(&[(v, targets[&v])]));
         merge_along(&mut local, &mut lines, kinds, &targets, &mut open, merged);
-        open.retain(|&v| !flipped.again(&local, &lines, &targets, v) || !local.flip_and_shift(v, targets[&v]));
+        open.retain(|&v| {
+            let fixed = |a: u32, b: u32| lines.beside(a).contains(&b);
+            !flipped.again(&local, &lines, &targets, v) || !local.flip_and_shift(v, targets[&v], fixed)
+        });
         if open.is_empty() || open.len() == before {
             break;
         }
     }
-    let mut corners = creases.map(|c| c.corners()).unwrap_or_default();
-    if let Some(creases) = creases.filter(|_| corners.is_empty()) {
-        corners = ask_corners(&mut local, &lines, kinds, creases, &mut open, field.lattice.step.max_element());
+    let (mut corners, mut came) = (source, Vec::new());
+    if corners.is_empty() {
+        if let Some(creases) = creases {
+            corners = ask_corners(&mut local, &lines, kinds, creases, &mut open, size);
+        }
+    } else {
+        came = call_again(&mut local, &lines, kinds, &untaken, &mut open, size);
     }
     approach(&mut local, &targets, &mut open);
     let kept = open.len();
-    gather(&mut local, &mut lines, kinds, &corners, field.lattice.step.max_element());
+    gather(&mut local, &mut lines, kinds, &corners, size);
+    if let Some(creases) = creases.filter(|c| !c.corners().is_empty()) {
+        follow(&mut local, &mut lines, kinds, creases, &corners, &came, size, sharp);
+    }
     join_ends(&mut local, &mut lines, kinds, sharp);
     merge_thin(&mut local, &mut lines, kinds, thin);
 
@@ -174,34 +140,67 @@ pub fn polish(
     Polished { moved: count.saturating_sub(kept), kept }
 }
 
-/// Corners of the source that no vertex is at, each with the nearest vertices of lines.
+/// Corners of the source that no vertex is at, each with the nearest of some vertices; and also those that have none of
+/// them within `reach` cells.
 fn calls(
-    mesh: &TriMesh,
-    field: &Directed,
-    creases: Option<&dyn Creases>,
-    kinds: &[FeatureKind],
-) -> Vec<(DVec3, Vec<u32>)> {
-    let corners = creases.map(|c| c.corners()).unwrap_or_default();
+    corners: &[DVec3],
+    size: f64,
+    reach: f64,
+    vertices: impl Iterator<Item = (u32, DVec3)>,
+) -> (Vec<(DVec3, Vec<u32>)>, Vec<DVec3>) {
     if corners.is_empty() {
-        return Vec::new();
+        return Default::default();
     }
-    let size = field.lattice.step.max_element();
-    let tree = KdTree::new(&corners);
+    let tree = KdTree::new(corners);
     let mut near: Vec<Vec<(f64, u32)>> = vec![Vec::new(); corners.len()];
-    for v in (0..kinds.len()).filter(|&v| kinds[v] != FeatureKind::None) {
-        tree.within(mesh.points[v], CALL * size, |c, p, _| {
-            near[c as usize].push((mesh.points[v].distance(p), v as u32));
-        });
+    for (v, at) in vertices {
+        tree.within(at, reach * size, |c, p, _| near[c as usize].push((at.distance(p), v)));
     }
     near.iter_mut().for_each(|near| near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))));
     let taken: BTreeSet<u32> = near.iter().flatten().filter(|n| n.0 <= TAKEN * size).map(|n| n.1).collect();
-    let mut calls = Vec::new();
-    for (p, near) in corners.into_iter().zip(near) {
+    let (mut calls, mut untaken) = (Vec::new(), Vec::new());
+    for (&p, near) in corners.iter().zip(near) {
+        if near.first().is_none_or(|n| n.0 > TAKEN * size) {
+            untaken.push(p);
+        }
         if near.first().is_some_and(|n| n.0 > TAKEN * size) {
             calls.push((p, near.iter().map(|n| n.1).filter(|v| !taken.contains(v)).take(CALLED).collect()));
         }
     }
-    calls
+    (calls, untaken)
+}
+
+/// Corners of the source that no vertex is at yet call once more: first vertices of lines, which have come nearer since,
+/// then any. Returns those that came.
+fn call_again(
+    local: &mut Local,
+    lines: &Lines,
+    kinds: &mut [FeatureKind],
+    corners: &[DVec3],
+    open: &mut Vec<u32>,
+    size: f64,
+) -> Vec<u32> {
+    let mut came = Vec::new();
+    let mut ask = |local: &mut Local, calls: Vec<(DVec3, Vec<u32>)>| {
+        for (p, vertices) in calls {
+            let fixed = |a: u32, b: u32| lines.beside(a).contains(&b);
+            let first = vertices.into_iter().find(|&v| local.shift(&[(v, p)]) || local.flip_and_shift(v, p, fixed));
+            if let Some(v) = first {
+                kinds[v as usize] = FeatureKind::Corner;
+                open.retain(|&o| o != v);
+                came.push(v);
+            }
+        }
+    };
+    let on_lines = lines.vertices().map(|(v, _)| (v, local.position(v)));
+    let (again, untaken) = calls(corners, size, CALL, on_lines);
+    ask(local, again);
+    if !untaken.is_empty() {
+        let all = (0..local.mesh.points.len() as u32).filter(|&v| !local.star(v).is_empty());
+        let (again, _) = calls(&untaken, size, CALL_ANY, all.map(|v| (v, local.position(v))));
+        ask(local, again);
+    }
+    came
 }
 
 /// When vertices were tried in vain: only what changes near a vertex can make room for it.
@@ -380,7 +379,7 @@ fn ask_corners(
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let taken = near.first().is_some_and(|n| n.0 < TAKEN * size);
         for &(_, w) in near.iter().take(CALLED).filter(|_| !taken) {
-            if local.shift(&[(w, corner)]) || local.flip_and_shift(w, corner) {
+            if local.shift(&[(w, corner)]) || local.flip_and_shift(w, corner, |a, b| lines.beside(a).contains(&b)) {
                 kinds[w as usize] = FeatureKind::Corner;
                 open.retain(|&o| o != w);
                 break;
@@ -435,36 +434,6 @@ fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corne
             && local.flip_and_merge(v, w)
         {
             lines.merge(v, w);
-        }
-    }
-}
-
-/// Joins loose ends of lines with what they end beside: over an edge that is there, or that a flip makes.
-fn join_ends(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], sharp: f64) {
-    let ends: Vec<u32> = lines.vertices().filter(|(_, beside)| beside.len() == 1).map(|(v, _)| v).collect();
-    for v in ends {
-        if lines.beside(v).len() != 1 || local.star(v).is_empty() {
-            continue;
-        }
-        let joins = |w: u32, lines: &Lines| {
-            let beside = lines.beside(w);
-            w != v
-                && !beside.contains(&v)
-                && (beside.len() == 1 || (kinds[w as usize] == FeatureKind::Corner && !beside.is_empty()))
-        };
-        let ring = local.neighbours(v);
-        if let Some(&w) = ring.iter().find(|&&w| joins(w, lines) && local.is_sharp(v, w, sharp)) {
-            lines.join(v, w);
-            continue;
-        }
-        // Vertices opposite over an edge of the star.
-        for w in local.beyond(v) {
-            if joins(w, lines) && local.flip_to(v, w) {
-                if local.is_sharp(v, w, sharp) {
-                    lines.join(v, w);
-                }
-                break;
-            }
         }
     }
 }
