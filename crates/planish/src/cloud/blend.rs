@@ -37,6 +37,8 @@ pub struct Blended {
     pub aside: f64,
     /// The heaviest cell.
     pub cell: usize,
+    /// Sum of the weights.
+    pub weight: f64,
 }
 
 /// A node of the tree over the supports, in preorder; the left child follows it.
@@ -93,20 +95,6 @@ impl Blend {
         }
     }
 
-    /// Value and unit normal of a cell.
-    fn evaluate(&self, i: usize, p: DVec3) -> (f64, DVec3) {
-        let c = &self.cells[i];
-        let sheets = &c.sheets;
-        let mut best = sheets[0].distance(p);
-        for k in 1..c.count as usize {
-            let next = sheets[k].distance(p);
-            if (next.0 < best.0) == (c.concave >> k & 1 == 1) {
-                best = next;
-            }
-        }
-        best
-    }
-
     /// Value and gradient at `p`; `None` where no cell reaches.
     pub fn at(&self, p: DVec3) -> Option<Blended> {
         let mut seen = [(0.0, DVec3::ZERO); ASKED];
@@ -114,10 +102,9 @@ impl Blend {
         let (mut sum, mut weight, mut aside) = (0.0, 0.0, 1.0f64);
         let mut lead = (0.0, DVec3::Z, 0);
         self.around(p, |i, t2| {
-            let (d, n) = self.evaluate(i, p);
+            let (d, n) = self.cells[i].evaluate(p);
             if d.is_finite() {
-                // C2 at the rim; a steep bell, so that a point hears the cells beside it.
-                let w = (1.0 - t2).powi(4) * self.cells[i].trust;
+                let w = self.cells[i].weight(t2);
                 sum += w * d;
                 weight += w;
                 aside = aside.min(t2);
@@ -134,7 +121,7 @@ impl Blend {
             return None;
         }
         let normal: DVec3 = seen[..count].iter().filter(|s| s.1.dot(lead.1) > SAME).map(|s| s.0 * s.1).sum();
-        Some(Blended { value: sum / weight, normal: normal.normalize_or(lead.1), aside, cell: lead.2 })
+        Some(Blended { value: sum / weight, normal: normal.normalize_or(lead.1), aside, cell: lead.2, weight })
     }
 
     /// May a support reach into this box?

@@ -6,11 +6,13 @@
 use super::fit::{Weighted, sheet};
 use super::front::{PRICE, VARIATION_PRICE};
 use super::nest::{self, LIMIT, Seen, cost, nest};
+use super::rim::rim;
 use super::sites::{Sites, in_pieces};
-use super::{Quadric, Sample};
+use super::{Blend, Quadric, Sample};
 use crate::geom::KdTree;
 use crate::observe::Observer;
 use glam::DVec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// The points that a cell explains lie within this many supports: a fillet and an edge differ only from afar.
@@ -56,6 +58,26 @@ pub struct Cell {
     pub count: u8,
     /// Bit k: sheet k is joined to those before it by the minimum (a concave edge), else by the maximum (a convex one).
     pub concave: u8,
+}
+
+impl Cell {
+    /// Signed distance, positive outside, and unit normal of the sheet that decides.
+    pub(super) fn evaluate(&self, p: DVec3) -> (f64, DVec3) {
+        let mut best = self.sheets[0].distance(p);
+        for k in 1..self.count as usize {
+            let next = self.sheets[k].distance(p);
+            if (next.0 < best.0) == (self.concave >> k & 1 == 1) {
+                best = next;
+            }
+        }
+        best
+    }
+
+    /// Weight in the blend at a point whose squared distance is this share of the squared support.
+    pub(super) fn weight(&self, t2: f64) -> f64 {
+        // C2 at the rim; a steep bell, so that a point hears the cells beside it.
+        (1.0 - t2).max(0.0).powi(4) * self.trust
+    }
 }
 
 /// The cells of all sites. `None` if cancelled.
@@ -116,7 +138,50 @@ pub(super) fn cells(
             })
             .collect();
     }
-    Some(made.iter().zip(&places).filter_map(|(f, p)| f.as_ref().filter(|f| f.at_home(p)).map(|f| f.cell(p))).collect())
+    let home =
+        made.iter().zip(&places).filter_map(|(f, p)| Some((f.as_ref().filter(|f| f.at_home(p))?.cell(p), p.noise)));
+    let (cells, noise): (Vec<Cell>, Vec<f64>) = home.unzip();
+    Some(outvoted(cells, &noise))
+}
+
+/// How far beside a cell its neighbours are asked, in noise levels, and how sure they must be of the other side.
+const BESIDE: f64 = 3.0;
+const SURE: f64 = 1.0;
+/// What is left of the trust of a cell that they contradict, and rounds.
+const OUTVOTED: f64 = 1e-3;
+const VOTES: usize = 3;
+
+/// The cells, those with hardly a say whose neighbours see another side right beside them.
+///
+/// Where two sheets are closer than the noise, as at the tip of a wedge, a single one explains the points, and faces
+/// either way; the cells around that know both sheets tell that there is no inside behind it.
+fn outvoted(cells: Vec<Cell>, noise: &[f64]) -> Vec<Cell> {
+    let mut now = cells.clone();
+    for _ in 0..VOTES {
+        let voters: Vec<Cell> = now.iter().filter(|c| c.count > 1).copied().collect();
+        let blend = Blend::new(&voters);
+        now = (0..cells.len())
+            .into_par_iter()
+            .map(|i| {
+                let mut cell = cells[i];
+                let (d, n) = cell.evaluate(cell.center);
+                let foot = cell.center - d * n;
+                let contradicted = [-BESIDE, BESIDE].into_iter().any(|side| {
+                    let p = foot + side * noise[i] * n;
+                    let own = cell.evaluate(p).0;
+                    let votes = if cell.count > 1 { 1.0 } else { 0.0 };
+                    let weight = votes * now[i].weight(cell.center.distance_squared(p) / cell.support.powi(2));
+                    blend.at(p).is_some_and(|all| {
+                        let others = (all.value * all.weight - own * weight) / (all.weight - weight);
+                        others * own < 0.0 && others.abs() > SURE * noise[i]
+                    })
+                });
+                cell.trust *= if contradicted { OUTVOTED } else { 1.0 };
+                cell
+            })
+            .collect();
+    }
+    now
 }
 
 /// Where a cell is.
@@ -232,46 +297,77 @@ fn find(
     let found = nest(&all, false, MOST)?;
     let mut sheets: Vec<(Quadric, DVec3, f64)> =
         found.order.iter().map(|&k| (asked[k].quadric, asked[k].at, asked[k].error)).collect();
-    let prices = found.total - found.cost;
+    let mut prices: Vec<f64> = found.order.iter().map(|&k| all[k].price).collect();
+    let mut concave = found.concave;
     let mut spent = found.cost;
     // Every point tells of the sheet that decides at it, and of no other. The wider the ball the less chance has a say, as
     // long as the points around the site agree: Akaike's criterion, here with points of which some are not asked.
-    let spread = |sheets: &[(Quadric, DVec3, f64)]| -> (f64, f64) {
-        let (mut cost, mut luck) = (0.0, 0.0);
-        for &q in &ball {
-            let (k, d) = joined(sheets, found.concave, q);
-            cost += (d / noise).powi(2).min(LIMIT * LIMIT);
-            luck += 2.0 * (sheets[k].2 / noise).powi(2);
+    let spread = |sheets: &[(Quadric, DVec3, f64)], concave: u8| -> (f64, f64) {
+        let seen: Vec<Seen> = sheets
+            .iter()
+            .map(|s| Seen { residuals: residuals(&s.0), normal: s.0.distance(center).1, price: 0.0 })
+            .collect();
+        let luck = |k: usize| 2.0 * (sheets[k].2 / noise).powi(2);
+        let (mut cost, mut lucky) = (nest::folds(&seen, concave), 0.0);
+        for q in 0..ball.len() {
+            let (k, d) = nest::joined(seen.iter().map(|s| s.residuals[q]), concave);
+            cost += (d * d).min(LIMIT * LIMIT);
+            lucky += luck(k);
         }
-        (cost, cost + luck)
+        (cost, cost + lucky)
     };
     // What the site has found before is refined already.
     let known = again && found.order.iter().all(|&k| asked[k].owner == site);
     let rounds = if sheets.len() > 1 && !known { REFINED } else { 0 };
-    let mut worth = spread(&sheets).1;
+    let mut worth = spread(&sheets, concave).1;
+    let mut widths = WIDTHS.to_vec();
     for _ in 0..rounds {
-        let tried = WIDTHS.into_iter().map(|width| {
-            let better = refined(&sheets, found.concave, place, width * HEARD * support, tree);
-            let (cost, worth) = spread(&better);
-            (better, cost, worth)
+        let tried = widths.iter().map(|width| {
+            let better = refined(&sheets, concave, place, width * HEARD * support, tree);
+            let (cost, worth) = spread(&better, concave);
+            (better, cost, worth, *width)
         });
         let Some(best) = tried.min_by(|a, b| a.2.total_cmp(&b.2)).filter(|b| b.2 < worth) else { break };
-        (sheets, spent, worth) = best;
+        (sheets, spent, worth) = (best.0, best.1, best.2);
+        widths = vec![best.3];
+        // What better sheets leave nothing to explain for goes: it may lie on another one, turned over.
+        while sheets.len() > 1 {
+            let fewer = (0..sheets.len()).map(|k| {
+                let (rest, concave) = without(&sheets, concave, k);
+                let (cost, worth) = spread(&rest, concave);
+                (k, rest, concave, cost, worth)
+            });
+            let least = fewer.min_by(|a, b| (a.4 - prices[a.0]).total_cmp(&(b.4 - prices[b.0])));
+            let Some(less) = least.filter(|l| l.4 - prices[l.0] < worth) else { break };
+            prices.remove(less.0);
+            (_, sheets, concave, spent, worth) = less;
+        }
+    }
+    // A plate ends where its points do: no sheet says so, if it is as thin as the noise.
+    let found = sheets.len();
+    while found > 1 && sheets.len() < MOST {
+        let bare: Vec<Quadric> = sheets.iter().map(|s| s.0).collect();
+        let Some((normal, at)) = rim(&bare, concave, center, HEARD * support, &ball, noise) else { break };
+        let gap = concave >> (found - 1) & 1 == 1;
+        concave |= u8::from(gap) << sheets.len();
+        sheets.push((Quadric::plane(at, support, if gap { -normal } else { normal }), at, sheets[0].2));
     }
     let plain = sheets.len() == 1 && spent < PLAIN * count + count.sqrt();
-    Some(Found { sheets, concave: found.concave, total: spent + prices, cost: spent / count, plain })
+    let total = spent + prices.iter().sum::<f64>();
+    Some(Found { sheets, concave, total, cost: spent / count, plain })
+}
+
+/// The nesting without its sheet `k`.
+fn without(sheets: &[(Quadric, DVec3, f64)], concave: u8, k: usize) -> (Vec<(Quadric, DVec3, f64)>, u8) {
+    let mut rest = sheets.to_vec();
+    rest.remove(k);
+    let below = concave & ((1 << k) - 1);
+    (rest, (below | (concave >> (k + 1)) << k) & !1)
 }
 
 /// The sheet that decides at a point and its signed distance.
 fn joined(sheets: &[(Quadric, DVec3, f64)], concave: u8, p: DVec3) -> (usize, f64) {
-    let mut best = (0, sheets[0].0.distance(p).0);
-    for (k, s) in sheets.iter().enumerate().skip(1) {
-        let d = s.0.distance(p).0;
-        if (d < best.1) == (concave >> k & 1 == 1) {
-            best = (k, d);
-        }
-    }
-    best
+    nest::joined(sheets.iter().map(|s| s.0.distance(p).0), concave)
 }
 
 /// Every sheet fitted again to the points of a ball at which it decides.

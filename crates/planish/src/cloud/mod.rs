@@ -21,6 +21,7 @@ mod nest;
 mod orient;
 mod project;
 mod quadric;
+mod rim;
 mod scanner;
 mod sites;
 mod strays;

@@ -29,6 +29,17 @@ pub(super) struct Seen {
     pub price: f64,
 }
 
+impl Seen {
+    /// The same sheet counted with this sign.
+    fn turned(&self, sign: f64) -> Seen {
+        Seen {
+            residuals: self.residuals.iter().map(|r| sign * r).collect(),
+            normal: sign * self.normal,
+            price: self.price,
+        }
+    }
+}
+
 /// Nested maxima and minima.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Nesting {
@@ -45,7 +56,7 @@ pub(super) struct Nesting {
 }
 
 /// Sheets that are tried in each step: those whose union with the chosen ones explains most.
-const TRIED: usize = 4;
+const TRIED: usize = 6;
 /// Structures are compared on about this many points; the best of each step is then asked of all.
 const ENOUGH: usize = 60;
 
@@ -67,30 +78,33 @@ pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
     let count = asked[0].residuals.len();
     let step = count.div_ceil(ENOUGH).max(1);
     let mut value = vec![0.0; count];
-    // One sheet after the other, each the best that can be joined to those chosen, in all nestings of the set.
+    let squared = |i: usize, k: usize| asked[i].residuals[k].powi(2).min(LIMIT * LIMIT);
+    // One sheet after the other, each the best that can be joined to those chosen, in all nestings of the set. The second
+    // may come with another first: between the two sides of a plate one sheet alone does best in the middle.
     while best.order.len() < most.min(MOST) {
-        let least: Vec<f64> = (0..count)
-            .map(|k| best.order.iter().map(|&s| asked[s].residuals[k].powi(2)).fold(LIMIT * LIMIT, f64::min))
-            .collect();
+        let sets: Vec<Vec<usize>> = if best.order.len() == 1 {
+            (0..asked.len()).flat_map(|i| (0..i).map(move |j| vec![j, i])).collect()
+        } else {
+            let others = (0..asked.len()).filter(|i| !best.order.contains(i));
+            others.map(|i| best.order.iter().copied().chain([i]).collect()).collect()
+        };
         // No nesting explains more than the union.
-        let mut bound: Vec<(f64, usize)> = (0..asked.len())
-            .filter(|i| !best.order.contains(i))
-            .map(|i| {
-                let union: f64 = asked[i].residuals.iter().zip(&least).map(|(r, l)| (r * r).min(*l)).sum();
-                (union + asked[i].price + price(&best.order), i)
+        let mut bound: Vec<(f64, Vec<usize>)> = sets
+            .into_iter()
+            .map(|set| {
+                let least = |k: usize| set.iter().map(|&i| squared(i, k)).fold(LIMIT * LIMIT, f64::min);
+                ((0..count).map(least).sum::<f64>() + price(&set), set)
             })
             .filter(|b| b.0 < best.total)
             .collect();
-        bound.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        bound.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
         bound.truncate(TRIED);
         let mut next: Option<Nesting> = None;
-        for (union, i) in bound {
+        for (union, set) in bound {
             let limit = next.as_ref().map_or(best.total, |n| n.total);
             if union >= limit {
                 break;
             }
-            let mut set = best.order.clone();
-            set.push(i);
             let priced = price(&set);
             let mut found: Option<Nesting> = None;
             for order in orders(&set) {
@@ -109,7 +123,9 @@ pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
             let Some(mut found) = found else { continue };
             found.cost = evaluate(asked, &found.order, found.flipped, found.concave, 1, &mut value);
             if found.cost + priced < limit {
-                found.cost += folds(asked, &found.order, found.flipped, found.concave);
+                let set: Vec<Seen> =
+                    found.order.iter().enumerate().map(|(k, &i)| asked[i].turned(sign(found.flipped, k))).collect();
+                found.cost += folds(&set, found.concave);
                 found.total = found.cost + priced;
                 if found.total < limit {
                     next = Some(found);
@@ -148,19 +164,26 @@ fn sign(flipped: u8, k: usize) -> f64 {
     if flipped >> k & 1 == 1 { -1.0 } else { 1.0 }
 }
 
+/// The sheet that decides where the sheets have these values, and its value.
+pub(super) fn joined(values: impl IntoIterator<Item = f64>, concave: u8) -> (usize, f64) {
+    let mut values = values.into_iter().enumerate();
+    let first = values.next().unwrap_or((0, f64::NAN));
+    values.fold(first, |best, next| if (next.1 < best.1) == (concave >> next.0 & 1 == 1) { next } else { best })
+}
+
 /// What the points pay for lying above several sheets of the surface at once: twice the logarithm of how many.
-fn folds(asked: &[Seen], order: &[usize], flipped: u8, concave: u8) -> f64 {
-    let m = order.len();
+pub(super) fn folds(sheets: &[Seen], concave: u8) -> f64 {
+    let m = sheets.len();
     let mut turn = [[0.0; MOST]; MOST];
     for j in 0..m {
         for k in 0..m {
-            turn[j][k] = sign(flipped, j) * sign(flipped, k) * asked[order[j]].normal.dot(asked[order[k]].normal);
+            turn[j][k] = sheets[j].normal.dot(sheets[k].normal);
         }
     }
     let mut price = 0.0;
-    for q in 0..asked[order[0]].residuals.len() {
+    for q in 0..sheets[0].residuals.len() {
         let mut at = [0.0; MOST];
-        (0..m).for_each(|k| at[k] = sign(flipped, k) * asked[order[k]].residuals[q]);
+        (0..m).for_each(|k| at[k] = sheets[k].residuals[q]);
         // The foot of the point on sheet k is part of the surface if the nesting vanishes there. Sheets at right angles
         // do not lie above each other; a foot on the edge itself would count as if they did.
         let own = (0..m).fold(0, |a, k| if at[k].abs() < at[a].abs() { k } else { a });

@@ -65,6 +65,8 @@ const CELL_GAPS: f64 = 0.6;
 const FINEST: f64 = 0.25;
 /// Components below this share of the area of the largest are specks of noise.
 const SPECK: f64 = 0.005;
+/// So are those with less than this share of the points that their area has elsewhere: what a blend leaves beside the data.
+const BARE: f64 = 0.1;
 /// Raw points that are measured against the mesh.
 const MEASURED: usize = 50_000;
 
@@ -88,8 +90,14 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
     };
     let sampling = Sampling { spacing, memory: params.memory };
     let mut meshed = contour::from_field(&field, sampling, &params.contour, &Share { observer, from: 0.6, to: 0.95 })?;
-    let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags);
-    let to_points = distances(scan, &meshed.extracted.mesh);
+    let mut reached = reach(scan, &meshed.extracted.mesh);
+    let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags, &reached);
+    if specks > 0 {
+        reached = reach(scan, &meshed.extracted.mesh);
+    }
+    let n = reached.len().max(1) as f64;
+    let squares = reached.iter().map(|r| r.0 * r.0).sum::<f64>();
+    let to_points = ((squares / n).sqrt(), reached.iter().map(|r| r.0).sum::<f64>() / n);
     observer.progress(1.0);
     Ok(ScanMeshed { samples, meshed, specks, closed, to_points })
 }
@@ -128,20 +136,25 @@ impl Observer for Share<'_> {
     }
 }
 
-/// Leaves out the components whose area is next to nothing; returns how many.
-fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags) -> usize {
+/// Leaves out the components whose area is next to nothing, or which hardly any point stands for; returns how many.
+fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags, reached: &[(f64, u32)]) -> usize {
     let mut sets = Sets::new(mesh.points.len());
     for t in &mesh.triangles {
         sets.join(t[0], t[1]);
         sets.join(t[0], t[2]);
     }
     let label: Vec<u32> = (0..mesh.points.len() as u32).map(|i| sets.root(i)).collect();
+    let component = |face: usize| label[mesh.triangles[face][0] as usize] as usize;
     let mut area = vec![0.0; mesh.points.len()];
-    for (t, triangle) in mesh.triangles.iter().enumerate() {
-        area[label[triangle[0] as usize] as usize] += mesh.area(t);
-    }
+    (0..mesh.triangles.len()).for_each(|t| area[component(t)] += mesh.area(t));
+    let mut points = vec![0.0; mesh.points.len()];
+    reached.iter().for_each(|r| points[component(r.1 as usize)] += 1.0);
     let most = area.iter().copied().fold(0.0, f64::max);
-    let stays = |v: u32| area[label[v as usize] as usize] >= SPECK * most;
+    let density = reached.len() as f64 / area.iter().sum::<f64>();
+    let stays = |v: u32| {
+        let c = label[v as usize] as usize;
+        area[c] >= SPECK * most && points[c] >= BARE * density * area[c]
+    };
     let specks = (0..label.len()).filter(|&i| label[i] == i as u32 && area[i] > 0.0 && !stays(i as u32)).count();
     if specks == 0 {
         return 0;
@@ -167,17 +180,16 @@ fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags) -> usize {
     specks
 }
 
-/// Root mean square and mean distance of raw points to a mesh.
-fn distances(scan: &Cloud, mesh: &TriMesh) -> (f64, f64) {
+/// Distance of raw points to a mesh, and the face that is closest.
+fn reach(scan: &Cloud, mesh: &TriMesh) -> Vec<(f64, u32)> {
     if mesh.triangles.is_empty() {
-        return (0.0, 0.0);
+        return Vec::new();
     }
     let bvh = Bvh::new(mesh);
     let step = scan.points.len().div_ceil(MEASURED).max(1);
     let finite: Vec<_> = scan.points.iter().step_by(step).filter(|p| p.is_finite()).collect();
-    let found: Vec<f64> = finite.par_iter().map(|p| bvh.closest(**p).distance).collect();
-    let n = found.len().max(1) as f64;
-    ((found.iter().map(|d| d * d).sum::<f64>() / n).sqrt(), found.iter().sum::<f64>() / n)
+    let hits = finite.par_iter().map(|p| bvh.closest(**p));
+    hits.map(|hit| (hit.distance, hit.place.face)).collect()
 }
 
 /// The figures and warnings of a scan that was meshed.
