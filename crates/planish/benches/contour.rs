@@ -22,7 +22,7 @@ use planish::field::{GridParams, Lattice, MeshField, Milling, Move, ScalarGrid, 
 use planish::geom::Aabb;
 use planish::geom::random;
 use planish::mesh::{
-    CompareParams, DecimateParams, SmoothParams, compare, decimate, diagnose, self_intersections, smooth,
+    CompareParams, DecimateParams, SmoothParams, TriMesh, compare, decimate, diagnose, self_intersections, smooth,
 };
 use planish::{DVec3, Silent};
 use std::collections::BTreeMap;
@@ -54,8 +54,11 @@ fn main() {
     if wanted("contour/grid_plain/sphere_257") {
         grid(&mut figures);
     }
-    if wanted("decimate") {
-        decimation("turbine_blade", &mut figures);
+    if wanted("decimate/ratio_0.1/turbine_blade") {
+        decimation("turbine_blade", common::data_mesh("turbine_blade.ply"), &mut figures);
+    }
+    if wanted("decimate/ratio_0.1/armadillo_346k") {
+        decimation("armadillo_346k", dense_armadillo(), &mut figures);
     }
     if wanted("smooth") {
         smoothing(&mut figures);
@@ -153,8 +156,16 @@ fn grid(figures: &mut Figures) {
     }
 }
 
-fn decimation(name: &str, figures: &mut Figures) {
-    let Some(mesh) = common::data_mesh(&format!("{name}.ply")) else { return };
+/// The Armadillo, extracted plain with so many cells that it has 346 742 triangles.
+fn dense_armadillo() -> Option<TriMesh> {
+    let mesh = common::data_mesh("armadillo.ply")?;
+    let sampling = contour::Sampling { spacing: Spacing::Resolution(266), memory: 8 << 30 };
+    let params = ContourParams { plain: true, ..Default::default() };
+    Some(contour::from_mesh(&mesh, sampling, &params, &Silent).expect("a surface").extracted.mesh)
+}
+
+fn decimation(name: &str, mesh: Option<TriMesh>, figures: &mut Figures) {
+    let Some(mesh) = mesh else { return };
     let start = Instant::now();
     let found = decimate(&mesh, None, &DecimateParams::default(), &Silent).expect("a manifold");
     let seconds = start.elapsed().as_secs_f64();

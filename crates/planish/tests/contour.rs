@@ -174,8 +174,7 @@ fn roof(deg: f64, seed: u64) -> [f64; 4] {
         *n = turn * *n;
         *d += n.dot(DVec3::new(r(6), r(7), r(0)) * 0.1);
     }
-    let mut parts: Vec<Solid> =
-        planes.iter().map(|&(normal, offset)| Solid::Plane { normal, offset }).collect();
+    let mut parts: Vec<Solid> = planes.iter().map(|&(normal, offset)| Solid::Plane { normal, offset }).collect();
     parts.push(box_of(DVec3::splat(4.0)));
     let params = ContourParams { sharp: 12f64.to_radians().cos(), ..Default::default() };
     let sampling = Sampling { spacing: Spacing::Voxel(2.0 / 48.0), memory: 4 << 30 };
@@ -236,9 +235,10 @@ fn corners_of_3_to_6_faces_turned_any_way_are_hit_within_2_hundredths_of_a_cell_
             let made = of_solid(&Solid::Intersection(parts), 40);
             let mesh = &made.extracted.mesh;
             certified("pyramid", mesh);
-            let near = |v: &usize| mesh.points[*v].distance(tip) < 0.02 * made.lattice.step.x;
-            let found = (0..mesh.points.len()).find(near);
-            hit += found.is_some_and(|v| made.extracted.tags.vertices[v] == FeatureKind::Corner) as usize;
+            let kinds = &made.extracted.tags.vertices;
+            let is_tip =
+                |v: usize| mesh.points[v].distance(tip) < 0.02 * made.lattice.step.x && kinds[v] == FeatureKind::Corner;
+            hit += (0..mesh.points.len()).any(is_tip) as usize;
             count += 1;
         }
     }

@@ -171,4 +171,3 @@ pub fn join_ends(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], sh
         }
     }
 }
-

@@ -32,6 +32,8 @@ pub struct Local<'a> {
     field: &'a Directed,
     /// First name of the hits of each axis.
     base: [u32; 3],
+    /// Cells along the axes.
+    size: [usize; 3],
     /// Cells in the order of z, y, x.
     cells: Vec<CellRange>,
     /// First of `cells` in each row (z, y).
@@ -118,7 +120,12 @@ impl<'a> Local<'a> {
             }
         }
         let least = 2.0 * DEGENERATE_AREA * mesh.bounds().diagonal().powi(2);
-        let [_, ny, nz] = field.lattice.cells;
+        // Merged cells may reach beyond the lattice.
+        let mut size = field.lattice.cells;
+        for (c, ..) in &cells {
+            size = [0, 1, 2].map(|a| size[a].max(c[a] as usize + 1));
+        }
+        let [_, ny, nz] = size;
         let mut rows = vec![0; ny * nz + 1];
         for (c, ..) in &cells {
             rows[c[2] as usize * ny + c[1] as usize + 1] += 1;
@@ -128,7 +135,7 @@ impl<'a> Local<'a> {
         }
         let (last, seen) = (vec![0; ny * nz], vec![0; mesh.triangles.len()]);
         let (strays, changes) = (Vec::new(), Vec::new());
-        Local { mesh, field, base, cells, rows, which, stars, last, strays, changes, seen, search: 0, least }
+        Local { mesh, field, base, size, cells, rows, which, stars, last, strays, changes, seen, search: 0, least }
     }
 
     /// Number of changes so far.
@@ -565,7 +572,7 @@ impl<'a> Local<'a> {
     fn reach(&self, low: DVec3, high: DVec3) -> [[i64; 2]; 3] {
         let l = &self.field.lattice;
         let (low, high) = (self.cell(low - l.step * SLACK), self.cell(high + l.step * SLACK));
-        [0, 1, 2].map(|a| [low[a].max(0), high[a].min(l.cells[a] as i64 - 1)])
+        [0, 1, 2].map(|a| [low[a].max(0), high[a].min(self.size[a] as i64 - 1)])
     }
 
     /// Notes a change: triangles as they are now, and where their vertices were before.
@@ -578,7 +585,7 @@ impl<'a> Local<'a> {
             let [[x0, x1], [y0, y1], [z0, z1]] = self.reach(l, h);
             for z in z0..=z1 {
                 for y in y0..=y1 {
-                    self.put(z as usize * self.field.lattice.cells[1] + y as usize, t, x0 as i32, x1 as i32);
+                    self.put(z as usize * self.size[1] + y as usize, t, x0 as i32, x1 as i32);
                 }
             }
         }
@@ -626,7 +633,7 @@ impl<'a> Local<'a> {
         let [[x0, x1], [y0, y1], [z0, z1]] = self.reach(low, high);
         for z in z0..=z1 {
             for y in y0..=y1 {
-                let row = z as usize * self.field.lattice.cells[1] + y as usize;
+                let row = z as usize * self.size[1] + y as usize;
                 let mut at = self.rows[row] as usize;
                 let end = self.rows[row + 1] as usize;
                 at += self.cells[at..end].partition_point(|(c, ..)| (c[0] as i64) < x0);

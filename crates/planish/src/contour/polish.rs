@@ -7,7 +7,7 @@
 //! Each step is kept only if the mesh stays embedded ([`Local`]), so the certificate holds.
 //!
 //! 1. corners of the source that no vertex took     2. vertices that were clamped: together, one by one, merged
-//! 3. what is left: a part of the way     4. loose ends of lines joined, by a flip if need be
+//! 3. what is left: a part of the way     4. lines that follow those of the source, loose ends joined ([`super::lines`])
 //! 5. triangles without area: merged away
 
 use super::lines::{Lines, TAKEN, follow, join_ends};
