@@ -1,6 +1,7 @@
 //! Extraction against the figures that it is to reach: quality on measured meshes, and times.
 //!
 //! * `contour/plain|sharp/<mesh>_<n>` - field and extraction, with the zone around sharp edges
+//! * `guarantee/<mesh>_<n>` - every closed mesh at 65, 129 and 257 cells, plain and sharp: what is not as promised
 //! * `contour/grid_plain/sphere_257` - a dense scalar grid, cells per second
 //! * `decimate/ratio_0.1/<mesh>`, `smooth/noise_0.1%/fandisk`
 //! * `milling/513/10000_moves`
@@ -49,6 +50,11 @@ fn main() {
     ] {
         if wanted(&format!("contour/{name}_{n}")) {
             mesh(name, n, &mut figures);
+        }
+    }
+    for name in CLOSED {
+        for n in [65, 129, 257].into_iter().filter(|n| wanted(&format!("guarantee/{name}_{n}"))) {
+            guarantee(name, n, &mut figures);
         }
     }
     if wanted("contour/grid_plain/sphere_257") {
@@ -124,6 +130,46 @@ fn mesh(name: &str, n: usize, figures: &mut Figures) {
             ("self_intersections", self_intersections(&found.mesh).len() as f64),
         ];
         figures.insert(format!("contour/{kind}/{name}_{n}"), own.into());
+    }
+}
+
+/// The measured meshes that are closed.
+const CLOSED: [&str; 13] = [
+    "acute_wedge_15",
+    "armadillo",
+    "casting",
+    "fandisk",
+    "gargoyle",
+    "goathead",
+    "horse",
+    "joint",
+    "rocker_arm",
+    "sharp_sphere",
+    "sword",
+    "thin_sheet",
+    "turbine_blade",
+];
+
+/// Counts what must not be: open, unmanifold, turned, without area, meeting. Pieces and genus tell of thin walls.
+fn guarantee(name: &str, n: usize, figures: &mut Figures) {
+    let Some(mesh) = common::data_mesh(&format!("{name}.ply")) else { return };
+    let sampling = contour::Sampling { spacing: Spacing::Resolution(n), memory: 8 << 30 };
+    let whole = diagnose(&mesh);
+    for plain in [true, false] {
+        let params = ContourParams { plain, ..Default::default() };
+        let made = contour::from_mesh(&mesh, sampling, &params, &Silent).expect("a surface").extracted.mesh;
+        let d = diagnose(&made);
+        let meeting = self_intersections(&made).len();
+        let wrong = [!d.watertight, !d.manifold, d.flipped_faces > 0, d.degenerate_faces > 0, meeting > 0];
+        let wrong = wrong.into_iter().filter(|w| *w).count();
+        let kind = if plain { "plain" } else { "sharp" };
+        eprintln!(
+            "guarantee/{name}_{n} {kind}: {wrong} wrong; watertight {} manifold {} degenerate {} meeting {meeting}; \
+             pieces {} of {}, genus {:?} of {:?}",
+            d.watertight, d.manifold, d.degenerate_faces, d.components, whole.components, d.genus, whole.genus
+        );
+        let own = [("wrong", wrong as f64), ("triangles", d.triangles as f64), ("pieces", d.components as f64)];
+        figures.insert(format!("guarantee/{name}_{n}/{kind}"), own.into());
     }
 }
 
