@@ -168,3 +168,33 @@ fn truncated_and_flipped_binary_scans_give_an_error_or_a_result_and_never_hang()
     std::fs::write(&path, b"this is no scan").unwrap();
     assert!(matches!(read(&path), Err(ReadError::WrongFormat { .. })));
 }
+
+#[test]
+fn an_e57_grid_without_a_pose_was_seen_from_its_origin_and_a_heap_of_points_from_nowhere() {
+    use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};
+    let folder = folder();
+    for grid in [true, false] {
+        let path = folder.path().join(format!("{grid}.e57"));
+        let mut file = E57Writer::from_file(&path, "a file").unwrap();
+        let mut prototype = vec![Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64];
+        if grid {
+            prototype
+                .push(Record { name: RecordName::RowIndex, data_type: RecordDataType::Integer { min: 0, max: 100 } });
+        }
+        let mut scan = file.add_pointcloud("a scan", prototype).unwrap();
+        for i in 0..30 {
+            let mut point: Vec<RecordValue> =
+                [f64::from(i), f64::from(i * i), 5.0].into_iter().map(RecordValue::Double).collect();
+            if grid {
+                point.push(RecordValue::Integer(i64::from(i)));
+            }
+            scan.add_point(point).unwrap();
+        }
+        scan.finalize().unwrap();
+        file.finalize().unwrap();
+        let cloud = read(&path).unwrap();
+        assert_eq!(cloud.points.len(), 30);
+        let seen: Vec<DVec3> = cloud.scanners.iter().map(|s| *s + cloud.shift).collect();
+        assert_eq!(seen, if grid { vec![DVec3::ZERO] } else { vec![] });
+    }
+}

@@ -572,3 +572,17 @@ fn comparison_tells_empty_meshes_and_no_samples() {
     assert_eq!(run(&good, &empty, 10), CompareError::NoArea { which: 'b', triangles: 0 });
     assert_eq!(run(&good, &good, 0), CompareError::NoSamples);
 }
+
+#[test]
+fn two_triangles_that_touch_in_a_point_come_apart_with_their_attributes() {
+    let points = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
+    let mut mesh = TriMesh::new(points.map(|[x, y]| DVec3::new(x, y, 0.0)).to_vec(), vec![[0, 1, 2], [0, 3, 4]]);
+    let values = vec![5.0, 1.0, 2.0, 3.0, 4.0];
+    mesh.attributes.push(Attribute { name: "heat".into(), width: 1, values });
+    let (parted, source) = part_fans(&mesh);
+    assert_eq!(source, [0, 1, 2, 3, 4, 0]);
+    assert_eq!(parted.triangles, [[0, 1, 2], [5, 3, 4]]);
+    assert_eq!(parted.attributes[0].values[5], 5.0);
+    assert!(!diagnose(&mesh).manifold && diagnose(&parted).manifold);
+    assert_eq!(part_fans(&shapes::sphere(1.0, 2)).0.points.len(), shapes::sphere(1.0, 2).points.len());
+}

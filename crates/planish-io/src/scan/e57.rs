@@ -3,7 +3,9 @@
 
 use super::{column, foreign, guarded};
 use crate::{Place, ReadError, WriteError};
-use e57::{CartesianCoordinate, E57Reader, E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
+use e57::{
+    CartesianCoordinate, E57Reader, E57Writer, Quaternion, Record, RecordName, RecordValue, Transform, Translation,
+};
 use glam::DVec3;
 use planish::cloud::Cloud;
 use std::io::Cursor;
@@ -31,7 +33,11 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Cloud, ReadError> {
                 return Err(ReadError::Truncated { what, needed, left: size, place: Place::Item("scan", k) });
             }
             let origin = scan.transform.as_ref().map(|t| &t.translation).map(|t| DVec3::new(t.x, t.y, t.z));
-            // Without a pose nobody knows where the scanner stood.
+            // Rows and columns are those of a station, which is its own origin where no pose moves it. Without either nobody
+            // knows where the scanner stood.
+            let grid =
+                scan.prototype.iter().any(|r| r.name == RecordName::RowIndex || r.name == RecordName::ColumnIndex);
+            let origin = origin.or(grid.then_some(DVec3::ZERO));
             let station = origin.map_or(u32::MAX, |o| {
                 cloud.scanners.push(o);
                 cloud.scanners.len() as u32 - 1

@@ -27,7 +27,7 @@ pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
 pub use face_point::FacePoint;
 pub use features::{boundary_loops, components, sharp_edges};
 pub use intersect::self_intersections;
-pub use repair::{Repairs, repair, weld};
+pub use repair::{Repairs, part_fans, repair, weld};
 pub use smooth::{SmoothError, SmoothParams, Smoothed, smooth};
 pub use soup::check;
 pub use tags::{FEATURE, FeatureKind, FeatureTags};

@@ -11,7 +11,7 @@
 
 use super::diagnose::sorted_triple;
 use super::soup::{check, fans, keyed_edges, mates, orient, origin, repeats};
-use super::{MeshError, NONE, TriMesh, next, sets::Sets};
+use super::{Attribute, MeshError, NONE, TriMesh, next, sets::Sets};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -98,6 +98,25 @@ pub fn weld(mesh: &TriMesh) -> (TriMesh, usize) {
         mesh.triangles.iter().map(|t| t.map(|v| first[v as usize])).filter(|t| !repeats(t)).collect();
     let source: Vec<u32> = (0..mesh.points.len() as u32).collect();
     (gather(mesh, &triangles, &source), merged)
+}
+
+/// Gives every fan of triangles around a vertex a vertex of its own: surfaces that touch in a point come apart. Returns the
+/// mesh and, for each of its vertices, the one of the input.
+pub fn part_fans(mesh: &TriMesh) -> (TriMesh, Vec<u32>) {
+    let mut triangles = mesh.triangles.clone();
+    let mut source: Vec<u32> = (0..mesh.points.len() as u32).collect();
+    let mate = mates(&keyed_edges(&triangles), 3 * triangles.len());
+    one_vertex_per_fan(&mut triangles, &mate, &mut source);
+    let points = source.iter().map(|&v| mesh.points[v as usize]).collect();
+    let attributes = mesh
+        .attributes
+        .iter()
+        .map(|a| {
+            let of = |&v: &u32| a.values[v as usize * a.width..(v as usize + 1) * a.width].iter().copied();
+            Attribute { name: a.name.clone(), width: a.width, values: source.iter().flat_map(of).collect() }
+        })
+        .collect();
+    (TriMesh { points, triangles, attributes }, source)
 }
 
 /// For each point the first one at the same place, and how many have an earlier one.

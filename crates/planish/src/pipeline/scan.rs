@@ -7,7 +7,7 @@ use crate::contour::{self, ContourParams, Meshed, MeshingError, Sampling};
 use crate::field::{SampleField, Spacing};
 use crate::geom::Bvh;
 use crate::mesh::sets::Sets;
-use crate::mesh::{FeatureTags, TriMesh};
+use crate::mesh::{FeatureTags, TriMesh, part_fans};
 use crate::observe::Observer;
 use crate::surface::{FitParams, Resolution};
 use rayon::prelude::*;
@@ -90,6 +90,9 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
     };
     let sampling = Sampling { spacing, memory: params.memory };
     let mut meshed = contour::from_field(&field, sampling, &params.contour, &Share { observer, from: 0.6, to: 0.95 })?;
+    if !closed {
+        part(&mut meshed.extracted.mesh, &mut meshed.extracted.tags);
+    }
     let mut reached = reach(scan, &meshed.extracted.mesh);
     let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags, &reached);
     if specks > 0 {
@@ -134,6 +137,24 @@ impl Observer for Share<'_> {
     fn cancelled(&self) -> bool {
         self.observer.cancelled()
     }
+}
+
+/// Parts surfaces that touch in a point, as they do where what is known of a scan ends.
+fn part(mesh: &mut TriMesh, tags: &mut FeatureTags) {
+    let (parted, source) = part_fans(mesh);
+    if parted.points.len() == mesh.points.len() {
+        return;
+    }
+    let sharp = |[a, b]: [u32; 2]| {
+        let (a, b) = (source[a as usize], source[b as usize]);
+        tags.edges.binary_search(&[a.min(b), a.max(b)]).is_ok()
+    };
+    let sides = parted.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let mut edges: Vec<[u32; 2]> = sides.filter(|s| sharp(*s)).map(|[a, b]| [a.min(b), a.max(b)]).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    *tags = FeatureTags { vertices: source.iter().map(|&v| tags.vertices[v as usize]).collect(), edges };
+    *mesh = parted;
 }
 
 /// Leaves out the components whose area is next to nothing, or which hardly any point stands for; returns how many.
