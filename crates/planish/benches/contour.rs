@@ -1,6 +1,7 @@
 //! Extraction against the figures that it is to reach: quality on measured meshes, and times.
 //!
 //! * `contour/plain|sharp/<mesh>_<n>` - field and extraction, with the zone around sharp edges
+//! * `guarantee/<mesh>_<n>` - every closed mesh at 65, 129 and 257 cells, plain and sharp: what is not as promised
 //! * `contour/grid_plain/sphere_257` - a dense scalar grid, cells per second
 //! * `decimate/ratio_0.1/<mesh>`, `smooth/noise_0.1%/fandisk`
 //! * `milling/513/10000_moves`
@@ -22,7 +23,7 @@ use planish::field::{GridParams, Lattice, MeshField, Milling, Move, ScalarGrid, 
 use planish::geom::Aabb;
 use planish::geom::random;
 use planish::mesh::{
-    CompareParams, DecimateParams, SmoothParams, compare, decimate, diagnose, self_intersections, smooth,
+    CompareParams, DecimateParams, SmoothParams, TriMesh, compare, decimate, diagnose, self_intersections, smooth,
 };
 use planish::{DVec3, Silent};
 use std::collections::BTreeMap;
@@ -51,11 +52,19 @@ fn main() {
             mesh(name, n, &mut figures);
         }
     }
+    for name in CLOSED {
+        for n in [65, 129, 257].into_iter().filter(|n| wanted(&format!("guarantee/{name}_{n}"))) {
+            guarantee(name, n, &mut figures);
+        }
+    }
     if wanted("contour/grid_plain/sphere_257") {
         grid(&mut figures);
     }
-    if wanted("decimate") {
-        decimation("turbine_blade", &mut figures);
+    if wanted("decimate/ratio_0.1/turbine_blade") {
+        decimation("turbine_blade", common::data_mesh("turbine_blade.ply"), &mut figures);
+    }
+    if wanted("decimate/ratio_0.1/armadillo_346k") {
+        decimation("armadillo_346k", dense_armadillo(), &mut figures);
     }
     if wanted("smooth") {
         smoothing(&mut figures);
@@ -124,6 +133,46 @@ fn mesh(name: &str, n: usize, figures: &mut Figures) {
     }
 }
 
+/// The measured meshes that are closed.
+const CLOSED: [&str; 13] = [
+    "acute_wedge_15",
+    "armadillo",
+    "casting",
+    "fandisk",
+    "gargoyle",
+    "goathead",
+    "horse",
+    "joint",
+    "rocker_arm",
+    "sharp_sphere",
+    "sword",
+    "thin_sheet",
+    "turbine_blade",
+];
+
+/// Counts what must not be: open, unmanifold, turned, without area, meeting. Pieces and genus tell of thin walls.
+fn guarantee(name: &str, n: usize, figures: &mut Figures) {
+    let Some(mesh) = common::data_mesh(&format!("{name}.ply")) else { return };
+    let sampling = contour::Sampling { spacing: Spacing::Resolution(n), memory: 8 << 30 };
+    let whole = diagnose(&mesh);
+    for plain in [true, false] {
+        let params = ContourParams { plain, ..Default::default() };
+        let made = contour::from_mesh(&mesh, sampling, &params, &Silent).expect("a surface").extracted.mesh;
+        let d = diagnose(&made);
+        let meeting = self_intersections(&made).len();
+        let wrong = [!d.watertight, !d.manifold, d.flipped_faces > 0, d.degenerate_faces > 0, meeting > 0];
+        let wrong = wrong.into_iter().filter(|w| *w).count();
+        let kind = if plain { "plain" } else { "sharp" };
+        eprintln!(
+            "guarantee/{name}_{n} {kind}: {wrong} wrong; watertight {} manifold {} degenerate {} meeting {meeting}; \
+             pieces {} of {}, genus {:?} of {:?}",
+            d.watertight, d.manifold, d.degenerate_faces, d.components, whole.components, d.genus, whole.genus
+        );
+        let own = [("wrong", wrong as f64), ("triangles", d.triangles as f64), ("pieces", d.components as f64)];
+        figures.insert(format!("guarantee/{name}_{n}/{kind}"), own.into());
+    }
+}
+
 fn grid(figures: &mut Figures) {
     let n = 258;
     let at = |i: usize| i as f64 / (n - 1) as f64 * 2.4 - 1.2;
@@ -153,8 +202,16 @@ fn grid(figures: &mut Figures) {
     }
 }
 
-fn decimation(name: &str, figures: &mut Figures) {
-    let Some(mesh) = common::data_mesh(&format!("{name}.ply")) else { return };
+/// The Armadillo, extracted plain with so many cells that it has 346 742 triangles.
+fn dense_armadillo() -> Option<TriMesh> {
+    let mesh = common::data_mesh("armadillo.ply")?;
+    let sampling = contour::Sampling { spacing: Spacing::Resolution(266), memory: 8 << 30 };
+    let params = ContourParams { plain: true, ..Default::default() };
+    Some(contour::from_mesh(&mesh, sampling, &params, &Silent).expect("a surface").extracted.mesh)
+}
+
+fn decimation(name: &str, mesh: Option<TriMesh>, figures: &mut Figures) {
+    let Some(mesh) = mesh else { return };
     let start = Instant::now();
     let found = decimate(&mesh, None, &DecimateParams::default(), &Silent).expect("a manifold");
     let seconds = start.elapsed().as_secs_f64();

@@ -8,7 +8,6 @@ use crate::field::Directed;
 use crate::geom::predicates::triangles_meet;
 use crate::mesh::{DEGENERATE_AREA, TriMesh};
 use glam::DVec3;
-use std::collections::BTreeMap;
 
 /// A cell with the numbers of its first triangle and of that after the last.
 pub type CellRange = ([u32; 3], u32, u32);
@@ -21,6 +20,10 @@ const NONE: u32 = u32::MAX;
 const LEAN: f64 = 0.5;
 /// Changed triangles within so many cells are compared with the same others.
 const CLOSE: f64 = 5.0;
+/// Rounding may put a place into the next cell if it is this near, in cells.
+const SLACK: f64 = 1e-6;
+/// A vertex reaches over so many triangles at most.
+const FLIPS: usize = 4;
 
 /// A mesh in the cells of its field, around some vertices.
 pub struct Local<'a> {
@@ -29,14 +32,42 @@ pub struct Local<'a> {
     field: &'a Directed,
     /// First name of the hits of each axis.
     base: [u32; 3],
+    /// Cells along the axes.
+    size: [usize; 3],
     /// Cells in the order of z, y, x.
     cells: Vec<CellRange>,
+    /// First of `cells` in each row (z, y).
+    rows: Vec<u32>,
     /// Number of each vertex's star.
     which: Vec<u32>,
     stars: Vec<Vec<u32>>,
-    /// Triangles that may have left their cell, by the cells (z, y, x) of their boxes.
-    strays: BTreeMap<[i64; 3], Vec<u32>>,
+    /// Triangles that may have left their cell, as lists of rows: the last of each row, counted from 1.
+    last: Vec<u32>,
+    strays: Vec<Stray>,
+    /// Boxes of all changes, in their order.
+    changes: Vec<[DVec3; 2]>,
+    /// Triangles that were looked at in the search of this number.
+    seen: Vec<u32>,
+    search: u32,
     least: f64,
+}
+
+/// A triangle that may reach into the cells `from..=to` of a row.
+struct Stray {
+    triangle: u32,
+    from: i32,
+    to: i32,
+    /// The one before in its row, counted from 1.
+    before: u32,
+}
+
+/// Two triangles whose common edge turns.
+struct Flip {
+    triangles: [u32; 2],
+    /// The edge that they share.
+    edge: [u32; 2],
+    before: [[u32; 3]; 2],
+    after: [[u32; 3]; 2],
 }
 
 /// A triangle with its box.
@@ -89,7 +120,44 @@ impl<'a> Local<'a> {
             }
         }
         let least = 2.0 * DEGENERATE_AREA * mesh.bounds().diagonal().powi(2);
-        Local { mesh, field, base, cells, which, stars, strays: BTreeMap::new(), least }
+        // Merged cells may reach beyond the lattice.
+        let mut size = field.lattice.cells;
+        for (c, ..) in &cells {
+            size = [0, 1, 2].map(|a| size[a].max(c[a] as usize + 1));
+        }
+        let [_, ny, nz] = size;
+        let mut rows = vec![0; ny * nz + 1];
+        for (c, ..) in &cells {
+            rows[c[2] as usize * ny + c[1] as usize + 1] += 1;
+        }
+        for r in 0..ny * nz {
+            rows[r + 1] += rows[r];
+        }
+        let (last, seen) = (vec![0; ny * nz], vec![0; mesh.triangles.len()]);
+        let (strays, changes) = (Vec::new(), Vec::new());
+        Local { mesh, field, base, size, cells, rows, which, stars, last, strays, changes, seen, search: 0, least }
+    }
+
+    /// Number of changes so far.
+    pub fn changes(&self) -> usize {
+        self.changes.len()
+    }
+
+    /// True if something changed in the box of `points` and the triangles around the neighbours of `v` after the first
+    /// `since` changes.
+    pub fn changed(&self, since: usize, v: u32, points: impl Iterator<Item = DVec3>) -> bool {
+        if since == self.changes.len() {
+            return false;
+        }
+        let (mut low, mut high) = (self.position(v), self.position(v));
+        let mut with = |p: DVec3| (low, high) = (low.min(p), high.max(p));
+        points.for_each(&mut with);
+        for &t in self.star(v) {
+            for &w in self.mesh.triangles[t as usize].iter().filter(|&&w| w != v) {
+                self.star(w).iter().flat_map(|&t| self.mesh.corners(t as usize)).for_each(&mut with);
+            }
+        }
+        self.changes[since..].iter().any(|[l, h]| !(l.cmpgt(high).any() || h.cmplt(low).any()))
     }
 
     /// Triangles around a vertex near the seeds.
@@ -126,9 +194,12 @@ impl<'a> Local<'a> {
         if moves.iter().any(|m| self.star(m.0).is_empty()) {
             return false;
         }
-        let mut changed: Vec<u32> = moves.iter().flat_map(|m| self.star(m.0)).copied().collect();
-        changed.sort_unstable();
-        changed.dedup();
+        let mut changed: Vec<u32> = Vec::with_capacity(8 * moves.len());
+        moves.iter().for_each(|m| changed.extend(self.star(m.0)));
+        if moves.len() > 1 {
+            changed.sort_unstable();
+            changed.dedup();
+        }
         let leaning = self.leaning(&changed);
         let areas: Vec<f64> = changed.iter().map(|&t| self.mesh.area(t as usize)).collect();
         let before: Vec<DVec3> = moves.iter().map(|m| self.position(m.0)).collect();
@@ -139,7 +210,7 @@ impl<'a> Local<'a> {
             && (!upright || self.leaning(&changed) <= leaning)
             && self.is_embedded(&changed);
         if kept {
-            self.stray(&changed);
+            self.stray(&changed, before.into_iter());
         } else {
             for (m, p) in moves.iter().zip(before) {
                 self.mesh.points[m.0 as usize] = p;
@@ -165,7 +236,7 @@ impl<'a> Local<'a> {
         {
             return false;
         }
-        let from = self.position(w);
+        let (from, lost) = (self.position(w), self.position(v));
         let all: Vec<u32> = {
             let mut all = [of_v.as_slice(), of_w.as_slice()].concat();
             all.sort_unstable();
@@ -206,7 +277,7 @@ impl<'a> Local<'a> {
         if let Some(star) = self.stars.get_mut(self.which[v as usize] as usize) {
             star.clear();
         }
-        self.stray(&changed);
+        self.stray(&changed, [from, lost].into_iter());
         true
     }
 
@@ -221,22 +292,109 @@ impl<'a> Local<'a> {
         self.flip_if(v, w, true).is_some()
     }
 
-    /// [`Local::flip_to`] of the edge to some vertex opposite of `v`, and then [`Local::shift`] of `v`: a vertex may have
-    /// to reach over the next triangle to find its place. All or nothing.
-    pub fn flip_and_shift(&mut self, v: u32, to: DVec3) -> bool {
-        let from = self.position(v);
-        self.beyond(v).into_iter().any(|w| {
-            let leaning = self.leaning(self.star(v)) + self.leaning_between(v, w);
-            let Some([a, b]) = self.flip_if(v, w, false) else { return false };
-            if self.shift_leaning(&[(v, to)]) {
-                if self.leaning(self.star(v)) <= leaning {
-                    return true;
-                }
-                self.shift_leaning(&[(v, from)]);
-            }
-            self.flip_if(a, b, false);
-            false
+    /// [`Local::shift`] of `v` over triangles that are in its way: a vertex may have to reach over the next ones to find
+    /// its place. All or nothing.
+    /// * `fixed` - edges that may not be flipped
+    pub fn flip_and_shift(&mut self, v: u32, to: DVec3, fixed: impl Fn(u32, u32) -> bool) -> bool {
+        self.reach_over(v, to, &fixed) || {
+            let beyond = self.beyond(v);
+            beyond.into_iter().any(|w| match self.flip_between(v, w) {
+                Some(flip) if !fixed(flip.edge[0], flip.edge[1]) => self.flipped_and_shifted(v, to, vec![flip]),
+                _ => false,
+            })
+        }
+    }
+
+    /// Makes `v` and `w` neighbours by one flip or two, if the mesh stays embedded and no more triangles lean than before;
+    /// returns whether.
+    /// * `fixed` - edges that may not be flipped
+    pub fn connect(&mut self, v: u32, w: u32, fixed: impl Fn(u32, u32) -> bool) -> bool {
+        let at = self.position(v);
+        let free = |f: &Flip| !fixed(f.edge[0], f.edge[1]);
+        if let Some(flip) = self.flip_between(v, w).filter(free)
+            && self.flipped_and_shifted(v, at, vec![flip])
+        {
+            return true;
+        }
+        self.beyond(v).into_iter().any(|x| {
+            let Some(first) = self.flip_between(v, x).filter(free) else { return false };
+            // The second goes over one of the two edges that the first lays open.
+            let second = [0, 1].into_iter().find_map(|k| {
+                let (s, a) = (first.after[k], first.edge[k]);
+                let own = first.triangles[k];
+                let shares = |t: &&u32| {
+                    let names = self.mesh.triangles[**t as usize];
+                    !first.triangles.contains(t) && [a, x, w].iter().all(|n| names.contains(n))
+                };
+                let t = *self.star(w).iter().find(shares)?;
+                // v a x and w x a become v a w and w x v, or with a and x exchanged.
+                let i = s.iter().position(|&n| n == v)?;
+                let edge = [s[(i + 1) % 3], s[(i + 2) % 3]];
+                let before = [s, self.mesh.triangles[t as usize]];
+                Some(Flip { triangles: [own, t], edge, before, after: [[v, edge[0], w], [w, edge[1], v]] })
+            });
+            second.filter(free).is_some_and(|second| self.flipped_and_shifted(v, at, vec![first, second]))
         })
+    }
+
+    /// Flips away what is in the way of `v`, one after another.
+    fn reach_over(&mut self, v: u32, to: DVec3, fixed: &impl Fn(u32, u32) -> bool) -> bool {
+        let from = self.position(v);
+        let mut flips: Vec<Flip> = Vec::new();
+        let mut star = self.star(v).to_vec();
+        let mut clear = false;
+        while flips.len() < FLIPS {
+            self.mesh.points[v as usize] = to;
+            let bars = self.in_the_way(&star);
+            self.mesh.points[v as usize] = from;
+            if bars.is_empty() {
+                clear = true;
+                break;
+            }
+            let next = bars.iter().find_map(|&t| {
+                let own = self.mesh.triangles[t as usize];
+                let beside = |s: &&u32| {
+                    let shared = |x: &&u32| **x != v && own.contains(x);
+                    self.mesh.triangles[**s as usize].iter().filter(shared).count() == 2
+                };
+                let s = *star.iter().find(beside)?;
+                let before = [self.mesh.triangles[s as usize], own];
+                let w = *own.iter().find(|x| !before[0].contains(x))?;
+                let at = before[0].iter().position(|&x| x == v)?;
+                let edge = [before[0][(at + 1) % 3], before[0][(at + 2) % 3]];
+                let new = !star.iter().any(|&s| self.mesh.triangles[s as usize].contains(&w));
+                let after = [[v, edge[0], w], [w, edge[1], v]];
+                (new && !fixed(edge[0], edge[1])).then_some(Flip { triangles: [s, t], edge, before, after })
+            });
+            let Some(flip) = next else { break };
+            self.set(&flip, flip.after);
+            star.push(flip.triangles[1]);
+            flips.push(flip);
+        }
+        for flip in flips.iter().rev() {
+            self.set(flip, flip.before);
+        }
+        clear && !flips.is_empty() && self.flipped_and_shifted(v, to, flips)
+    }
+
+    /// Flips, one after another, and then a shift of `v`, if all is well in the end.
+    fn flipped_and_shifted(&mut self, v: u32, to: DVec3, flips: Vec<Flip>) -> bool {
+        let from = self.position(v);
+        let mut changed = self.star(v).to_vec();
+        changed.extend(flips.iter().map(|f| f.triangles[1]));
+        let leaning = self.leaning(&changed);
+        let areas: Vec<f64> = changed.iter().map(|&t| self.mesh.area(t as usize)).collect();
+        self.mesh.points[v as usize] = to;
+        flips.iter().for_each(|f| self.set(f, f.after));
+        let kept = self.is_wide(&changed, &areas) && self.leaning(&changed) <= leaning && self.is_embedded(&changed);
+        if kept {
+            flips.iter().for_each(|f| self.adopt(f));
+            self.stray(&changed, [from].into_iter());
+        } else {
+            self.mesh.points[v as usize] = from;
+            flips.iter().rev().for_each(|f| self.set(f, f.before));
+        }
+        kept
     }
 
     /// Makes `v` and `w` neighbours by a flip if need be and merges them at the place of `w`. All or nothing.
@@ -268,43 +426,33 @@ impl<'a> Local<'a> {
         beyond
     }
 
-    /// Leaning triangles at `w` that a flip towards `v` would take.
-    fn leaning_between(&self, v: u32, w: u32) -> usize {
-        let ring = self.neighbours(v);
-        let opposite =
-            |t: &&u32| self.mesh.triangles[**t as usize].iter().filter(|x| ring.binary_search(x).is_ok()).count() == 2;
-        let found: Vec<u32> = self.star(w).iter().filter(opposite).copied().collect();
-        self.leaning(&found)
-    }
-
-    /// Returns the edge that was flipped.
-    fn flip_if(&mut self, v: u32, w: u32, upright: bool) -> Option<[u32; 2]> {
+    /// The flip that makes `v` and `w` neighbours, if there is one.
+    fn flip_between(&self, v: u32, w: u32) -> Option<Flip> {
         let shared = |s: &[u32; 3], t: &[u32; 3]| s.iter().filter(|x| t.contains(x)).count() == 2;
-        let found = self.star(v).iter().find_map(|&s| {
+        let (s, t) = self.star(v).iter().find_map(|&s| {
             let own = self.mesh.triangles[s as usize];
             let other = self.star(w).iter().find(|&&t| shared(&own, &self.mesh.triangles[t as usize]));
             other.map(|&t| (s, t))
-        });
-        let (s, t) = found?;
-        let (one, two) = (self.mesh.triangles[s as usize], self.mesh.triangles[t as usize]);
+        })?;
         if self.are_neighbours(v, w) {
             return None;
         }
+        let before = [self.mesh.triangles[s as usize], self.mesh.triangles[t as usize]];
         // v a b and w b a become v a w and w b v.
-        let at = one.iter().position(|&x| x == v).unwrap_or(0);
-        let (a, b) = (one[(at + 1) % 3], one[(at + 2) % 3]);
-        let leaning = self.leaning(&[s, t]);
-        let areas = [s, t].map(|t| self.mesh.area(t as usize));
-        self.mesh.triangles[s as usize] = [v, a, w];
-        self.mesh.triangles[t as usize] = [w, b, v];
-        let kept = self.is_wide(&[s, t], &areas)
-            && (!upright || self.leaning(&[s, t]) <= leaning)
-            && self.is_embedded(&[s, t]);
-        if !kept {
-            self.mesh.triangles[s as usize] = one;
-            self.mesh.triangles[t as usize] = two;
-            return None;
+        let at = before[0].iter().position(|&x| x == v).unwrap_or(0);
+        let edge = [before[0][(at + 1) % 3], before[0][(at + 2) % 3]];
+        Some(Flip { triangles: [s, t], edge, before, after: [[v, edge[0], w], [w, edge[1], v]] })
+    }
+
+    fn set(&mut self, flip: &Flip, to: [[u32; 3]; 2]) {
+        for (t, names) in flip.triangles.into_iter().zip(to) {
+            self.mesh.triangles[t as usize] = names;
         }
+    }
+
+    /// Stars after a flip.
+    fn adopt(&mut self, flip: &Flip) {
+        let ([s, t], [a, b], [v, _, w]) = (flip.triangles, flip.edge, flip.after[0]);
         let mut change = |x: u32, lost: Option<u32>, won: Option<u32>| {
             if let Some(star) = self.stars.get_mut(self.which[x as usize] as usize) {
                 star.retain(|t| Some(*t) != lost);
@@ -315,8 +463,25 @@ impl<'a> Local<'a> {
         change(w, None, Some(s));
         change(a, Some(t), None);
         change(b, Some(s), None);
-        self.stray(&[s, t]);
-        Some([a, b])
+    }
+
+    /// Returns the edge that was flipped.
+    fn flip_if(&mut self, v: u32, w: u32, upright: bool) -> Option<[u32; 2]> {
+        let flip = self.flip_between(v, w)?;
+        let changed = flip.triangles;
+        let leaning = self.leaning(&changed);
+        let areas = changed.map(|t| self.mesh.area(t as usize));
+        self.set(&flip, flip.after);
+        let kept = self.is_wide(&changed, &areas)
+            && (!upright || self.leaning(&changed) <= leaning)
+            && self.is_embedded(&changed);
+        if !kept {
+            self.set(&flip, flip.before);
+            return None;
+        }
+        self.adopt(&flip);
+        self.stray(&changed, std::iter::empty());
+        Some(flip.edge)
     }
 
     /// True if the triangles beside the edge from `v` to `w` turn by more than `cosine`.
@@ -372,30 +537,30 @@ impl<'a> Local<'a> {
     }
 
     /// True if the changed triangles, as they are now, meet nothing and not each other.
-    fn is_embedded(&self, changed: &[u32]) -> bool {
-        let placed = |t: u32| {
-            let names = self.mesh.triangles[t as usize];
-            let p = [self.position(names[0]), self.position(names[1]), self.position(names[2])];
-            Placed { names, p, low: p[0].min(p[1]).min(p[2]), high: p[0].max(p[1]).max(p[2]) }
-        };
-        let own: Vec<Placed> = changed.iter().map(|&t| placed(t)).collect();
-        let mut sorted = changed.to_vec();
-        sorted.sort_unstable();
-        let others = |low: DVec3, high: DVec3| -> Vec<Placed> {
-            let near = self.near(low, high).into_iter().filter(|t| sorted.binary_search(t).is_err());
-            near.map(placed).filter(|t| !(t.low.cmpgt(high).any() || t.high.cmplt(low).any())).collect()
-        };
+    fn is_embedded(&mut self, changed: &[u32]) -> bool {
+        self.search += 1;
+        changed.iter().for_each(|&t| self.seen[t as usize] = self.search);
+        let own: Vec<Placed> = changed.iter().map(|&t| self.placed(t)).collect();
         // One look at the cells around all of them, unless they reach far.
         let low = own.iter().fold(DVec3::INFINITY, |low, t| low.min(t.low));
         let high = own.iter().fold(DVec3::NEG_INFINITY, |high, t| high.max(t.high));
-        let near = (high - low).cmple(self.field.lattice.step * CLOSE).all().then(|| others(low, high));
-        own.iter().enumerate().all(|(n, s)| {
-            own[..n].iter().all(|t| !s.meets(t))
-                && match &near {
-                    Some(near) => near.iter().all(|t| !s.meets(t)),
-                    None => others(s.low, s.high).iter().all(|t| !s.meets(t)),
-                }
-        })
+        let free = if (high - low).cmple(self.field.lattice.step * CLOSE).all() {
+            self.is_free(&own, low, high)
+        } else {
+            own.iter().all(|t| {
+                // What was seen at another triangle has to be seen again.
+                self.search += 1;
+                changed.iter().for_each(|&t| self.seen[t as usize] = self.search);
+                self.is_free(std::slice::from_ref(t), t.low, t.high)
+            })
+        };
+        free && own.iter().enumerate().all(|(n, s)| own[..n].iter().all(|t| !s.meets(t)))
+    }
+
+    fn placed(&self, t: u32) -> Placed {
+        let names = self.mesh.triangles[t as usize];
+        let p = [self.position(names[0]), self.position(names[1]), self.position(names[2])];
+        Placed { names, p, low: p[0].min(p[1]).min(p[2]), high: p[0].max(p[1]).max(p[2]) }
     }
 
     fn cell(&self, p: DVec3) -> [i64; 3] {
@@ -403,47 +568,104 @@ impl<'a> Local<'a> {
         ((p - l.origin) / l.step).floor().to_array().map(|x| x as i64)
     }
 
-    fn stray(&mut self, changed: &[u32]) {
-        for &t in changed {
-            let [a, b, c] = self.mesh.corners(t as usize);
-            let (low, high) = (self.cell(a.min(b).min(c)), self.cell(a.max(b).max(c)));
-            for z in low[2]..=high[2] {
-                for y in low[1]..=high[1] {
-                    for x in low[0]..=high[0] {
-                        let list = self.strays.entry([z, y, x]).or_default();
-                        if !list.contains(&t) {
-                            list.push(t);
-                        }
-                    }
-                }
-            }
-        }
+    /// First and last cells of the lattice that a box reaches into; a vertex may lie on the very face of its cell.
+    fn reach(&self, low: DVec3, high: DVec3) -> [[i64; 2]; 3] {
+        let l = &self.field.lattice;
+        let (low, high) = (self.cell(low - l.step * SLACK), self.cell(high + l.step * SLACK));
+        [0, 1, 2].map(|a| [low[a].max(0), high[a].min(self.size[a] as i64 - 1)])
     }
 
-    /// Triangles that may reach into a box.
-    fn near(&self, low: DVec3, high: DVec3) -> Vec<u32> {
-        // A vertex may lie on the very face of its cell.
-        let (a, b) = (self.cell(low).map(|x| x - 1), self.cell(high).map(|x| x + 1));
-        let clamp = |x: i64| x.max(0) as u32;
-        let mut found = Vec::new();
-        for z in clamp(a[2])..=clamp(b[2]) {
-            for y in clamp(a[1])..=clamp(b[1]) {
-                let (x0, x1) = (clamp(a[0]), clamp(b[0]));
-                let first = self.cells.partition_point(|(c, ..)| [c[2], c[1], c[0]] < [z, y, x0]);
-                for &(c, first, end) in &self.cells[first..] {
-                    if c[2] != z || c[1] != y || c[0] > x1 {
-                        break;
-                    }
-                    found.extend(first..end);
+    /// Notes a change: triangles as they are now, and where their vertices were before.
+    fn stray(&mut self, changed: &[u32], before: impl Iterator<Item = DVec3>) {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for &t in changed {
+            let [a, b, c] = self.mesh.corners(t as usize);
+            let (l, h) = (a.min(b).min(c), a.max(b).max(c));
+            (low, high) = (low.min(l), high.max(h));
+            let [[x0, x1], [y0, y1], [z0, z1]] = self.reach(l, h);
+            for z in z0..=z1 {
+                for y in y0..=y1 {
+                    self.put(z as usize * self.size[1] + y as usize, t, x0 as i32, x1 as i32);
                 }
-                let row = |x: u32| [z as i64, y as i64, x as i64];
-                found.extend(self.strays.range(row(x0)..=row(x1)).flat_map(|(_, list)| list));
             }
         }
-        // Merged cells name their triangles in each of their parts.
-        found.sort_unstable();
-        found.dedup();
-        found.retain(|&t| self.mesh.triangles[t as usize] != GONE);
+        before.for_each(|p| (low, high) = (low.min(p), high.max(p)));
+        self.changes.push([low, high]);
+    }
+
+    fn put(&mut self, row: usize, triangle: u32, from: i32, to: i32) {
+        let mut at = self.last[row];
+        while at != 0 {
+            let stray = &mut self.strays[at as usize - 1];
+            if stray.triangle == triangle {
+                (stray.from, stray.to) = (stray.from.min(from), stray.to.max(to));
+                return;
+            }
+            at = stray.before;
+        }
+        self.strays.push(Stray { triangle, from, to, before: self.last[row] });
+        self.last[row] = self.strays.len() as u32;
+    }
+
+    /// True if no triangle that reaches into a box and was not seen in this search meets one of `own`.
+    fn is_free(&mut self, own: &[Placed], low: DVec3, high: DVec3) -> bool {
+        self.search(own, low, high, |_| true)
+    }
+
+    /// Triangles that meet those given.
+    fn in_the_way(&mut self, changed: &[u32]) -> Vec<u32> {
+        self.search += 1;
+        changed.iter().for_each(|&t| self.seen[t as usize] = self.search);
+        let own: Vec<Placed> = changed.iter().map(|&t| self.placed(t)).collect();
+        let low = own.iter().fold(DVec3::INFINITY, |low, t| low.min(t.low));
+        let high = own.iter().fold(DVec3::NEG_INFINITY, |high, t| high.max(t.high));
+        let mut found = Vec::new();
+        self.search(&own, low, high, |t| {
+            found.push(t);
+            false
+        });
         found
+    }
+
+    /// Calls `enough` for triangles that reach into a box, were not seen in this search and meet one of `own`; false if
+    /// it was enough.
+    fn search(&mut self, own: &[Placed], low: DVec3, high: DVec3, mut enough: impl FnMut(u32) -> bool) -> bool {
+        let [[x0, x1], [y0, y1], [z0, z1]] = self.reach(low, high);
+        for z in z0..=z1 {
+            for y in y0..=y1 {
+                let row = z as usize * self.size[1] + y as usize;
+                let mut at = self.rows[row] as usize;
+                let end = self.rows[row + 1] as usize;
+                at += self.cells[at..end].partition_point(|(c, ..)| (c[0] as i64) < x0);
+                while at < end && self.cells[at].0[0] as i64 <= x1 {
+                    let (_, first, last) = self.cells[at];
+                    if (first..last).any(|t| self.bars(t, own, low, high) && enough(t)) {
+                        return false;
+                    }
+                    at += 1;
+                }
+                let mut at = self.last[row];
+                while at != 0 {
+                    let Stray { triangle, from, to, before } = self.strays[at as usize - 1];
+                    let near = from as i64 <= x1 && to as i64 >= x0;
+                    if near && self.bars(triangle, own, low, high) && enough(triangle) {
+                        return false;
+                    }
+                    at = before;
+                }
+            }
+        }
+        true
+    }
+
+    /// True if triangle `t`, not seen before, meets one of `own`, all of which lie in a box.
+    fn bars(&mut self, t: u32, own: &[Placed], low: DVec3, high: DVec3) -> bool {
+        if std::mem::replace(&mut self.seen[t as usize], self.search) == self.search
+            || self.mesh.triangles[t as usize] == GONE
+        {
+            return false;
+        }
+        let other = self.placed(t);
+        !(other.low.cmpgt(high).any() || other.high.cmplt(low).any()) && own.iter().any(|s| s.meets(&other))
     }
 }

@@ -18,6 +18,7 @@ mod cell;
 mod certificate;
 mod face;
 mod feature;
+mod lines;
 mod local;
 mod octree;
 mod patch;

@@ -7,15 +7,17 @@
 //! Each step is kept only if the mesh stays embedded ([`Local`]), so the certificate holds.
 //!
 //! 1. corners of the source that no vertex took     2. vertices that were clamped: together, one by one, merged
-//! 3. what is left: a part of the way     4. loose ends of lines joined, by a flip if need be
+//! 3. what is left: a part of the way     4. lines that follow those of the source, loose ends joined ([`super::lines`])
 //! 5. triangles without area: merged away
 
+use super::lines::{Lines, TAKEN, follow, join_ends};
 use super::local::{CellRange, GONE, Local};
 use super::patch::Wish;
 use crate::field::{Creases, Directed};
+use crate::geom::KdTree;
 use crate::mesh::{DEGENERATE_AREA, FeatureKind, TriMesh};
 use glam::DVec3;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap};
 
 /// Parts of the way that are tried in the end.
 const WAYS: [f64; 3] = [1.0, 0.6, 0.3];
@@ -23,11 +25,11 @@ const WAYS: [f64; 3] = [1.0, 0.6, 0.3];
 const ROUNDS: usize = 8;
 /// So many vertices move together at most.
 const TOGETHER: usize = 24;
-/// A corner that a vertex is this near to is taken, in cells.
-const TAKEN: f64 = 1e-6;
 /// A corner calls vertices of lines from this distance, in cells, and so many of them at most.
 const CALL: f64 = 0.9;
 const CALLED: usize = 4;
+/// In the end a corner calls any vertex from this distance, in cells.
+const CALL_ANY: f64 = 0.5;
 
 /// What was done.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,40 +38,6 @@ pub struct Polished {
     pub moved: usize,
     /// Feature vertices that did not.
     pub kept: usize,
-}
-
-/// Where lines run: for each feature vertex those beside it on its lines.
-struct Lines(BTreeMap<u32, Vec<u32>>);
-
-impl Lines {
-    fn join(&mut self, v: u32, w: u32) {
-        for (a, b) in [(v, w), (w, v)] {
-            let list = self.0.entry(a).or_default();
-            if !list.contains(&b) {
-                list.push(b);
-            }
-        }
-    }
-
-    fn beside(&self, v: u32) -> Vec<u32> {
-        self.0.get(&v).cloned().unwrap_or_default()
-    }
-
-    fn merge(&mut self, v: u32, w: u32) {
-        for x in self.0.remove(&v).unwrap_or_default() {
-            let list = self.0.entry(x).or_default();
-            list.retain(|&y| y != v);
-            if x != w {
-                if !list.contains(&w) {
-                    list.push(w);
-                }
-                let own = self.0.entry(w).or_default();
-                if !own.contains(&x) {
-                    own.push(x);
-                }
-            }
-        }
-    }
 }
 
 /// Brings the vertices of `wishes` to their places, and merges triangles without area away.
@@ -86,20 +54,26 @@ pub fn polish(
     edges: &mut Vec<[u32; 2]>,
     sharp: f64,
 ) -> Polished {
-    let calls = calls(mesh, field, creases, kinds);
+    let source = creases.map(|c| c.corners()).unwrap_or_default();
+    let size = field.lattice.step.max_element();
+    let tagged = (0..kinds.len()).filter(|&v| kinds[v] != FeatureKind::None).map(|v| (v as u32, mesh.points[v]));
+    let (calls, untaken) = calls(&source, size, CALL, tagged);
     let thin = thin(mesh);
     let mut seeds: Vec<u32> = wishes.iter().map(|w| w.0).collect();
     seeds.extend(calls.iter().flat_map(|c| &c.1));
     seeds.extend(thin.iter().flat_map(|&t| mesh.triangles[t as usize]));
-    let mut lines = Lines(BTreeMap::new());
-    for &[a, b] in edges.iter() {
-        lines.join(a, b);
+    if !untaken.is_empty() {
+        // Any vertex near by may be needed there.
+        let tree = KdTree::new(&untaken);
+        let near = |p: &DVec3| tree.closest(*p).is_some_and(|c| untaken[c as usize].distance(*p) < size);
+        seeds.extend((0..mesh.points.len()).filter(|&v| near(&mesh.points[v])).map(|v| v as u32));
     }
+    let mut lines = Lines::new(edges);
     let special = |v: u32, beside: &[u32]| beside.len() != 2 || kinds[v as usize] == FeatureKind::Corner;
-    for (&v, beside) in lines.0.iter().filter(|(v, beside)| special(**v, beside)) {
+    for (v, beside) in lines.vertices().filter(|(v, beside)| special(*v, beside)) {
         // A corner may call the next vertices of the lines.
         seeds.push(v);
-        seeds.extend(beside.iter().flat_map(|&w| lines.beside(w)).chain(beside.iter().copied()));
+        seeds.extend(beside.iter().flat_map(|&w| lines.beside(w)).chain(beside));
     }
     if seeds.is_empty() {
         return Polished::default();
@@ -128,71 +102,123 @@ pub fn polish(
             }
         }
     }
+    let mut tried = [(); 3].map(|()| Tried { names: open.clone(), at: vec![None; open.len()] });
     for _ in 0..ROUNDS {
         let before = open.len();
         together(&mut local, &lines, &targets, &mut open);
-        open.retain(|&v| !local.shift(&[(v, targets[&v])]));
-        merge_along(&mut local, &mut lines, kinds, &targets, &mut open);
-        open.retain(|&v| !local.flip_and_shift(v, targets[&v]));
+        let [single, merged, flipped] = &mut tried;
+        open.retain(|&v| !single.again(&local, &lines, &targets, v) || !local.shift(&[(v, targets[&v])]));
+        merge_along(&mut local, &mut lines, kinds, &targets, &mut open, merged);
+        open.retain(|&v| {
+            let fixed = |a: u32, b: u32| lines.beside(a).contains(&b);
+            !flipped.again(&local, &lines, &targets, v) || !local.flip_and_shift(v, targets[&v], fixed)
+        });
         if open.is_empty() || open.len() == before {
             break;
         }
     }
-    let mut corners = creases.map(|c| c.corners()).unwrap_or_default();
-    if let Some(creases) = creases.filter(|_| corners.is_empty()) {
-        corners = ask_corners(&mut local, &lines, kinds, creases, &mut open, field.lattice.step.max_element());
+    let (mut corners, mut came) = (source, Vec::new());
+    if corners.is_empty() {
+        if let Some(creases) = creases {
+            corners = ask_corners(&mut local, &lines, kinds, creases, &mut open, size);
+        }
+    } else {
+        came = call_again(&mut local, &lines, kinds, &untaken, &mut open, size);
     }
     approach(&mut local, &targets, &mut open);
     let kept = open.len();
-    gather(&mut local, &mut lines, kinds, &corners, field.lattice.step.max_element());
+    gather(&mut local, &mut lines, kinds, &corners, size);
+    if let Some(creases) = creases.filter(|c| !c.corners().is_empty()) {
+        follow(&mut local, &mut lines, kinds, creases, &corners, &came, size, sharp);
+    }
     join_ends(&mut local, &mut lines, kinds, sharp);
     merge_thin(&mut local, &mut lines, kinds, thin);
 
     mesh.triangles.retain(|t| *t != GONE);
     *edges =
-        lines.0.iter().flat_map(|(&v, beside)| beside.iter().filter(move |&&w| v < w).map(move |&w| [v, w])).collect();
+        lines.vertices().flat_map(|(v, beside)| beside.iter().filter(move |&&w| v < w).map(move |&w| [v, w])).collect();
     Polished { moved: count.saturating_sub(kept), kept }
 }
 
-/// Corners of the source that no vertex is at, each with the nearest vertices of lines.
+/// Corners of the source that no vertex is at, each with the nearest of some vertices; and also those that have none of
+/// them within `reach` cells.
 fn calls(
-    mesh: &TriMesh,
-    field: &Directed,
-    creases: Option<&dyn Creases>,
-    kinds: &[FeatureKind],
-) -> Vec<(DVec3, Vec<u32>)> {
-    let corners = creases.map(|c| c.corners()).unwrap_or_default();
+    corners: &[DVec3],
+    size: f64,
+    reach: f64,
+    vertices: impl Iterator<Item = (u32, DVec3)>,
+) -> (Vec<(DVec3, Vec<u32>)>, Vec<DVec3>) {
     if corners.is_empty() {
-        return Vec::new();
+        return Default::default();
     }
-    let l = &field.lattice;
-    let cell = |p: DVec3| ((p - l.origin) / l.step).floor().to_array().map(|x| x as i64);
-    let mut vertices: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
-    for v in (0..kinds.len()).filter(|&v| kinds[v] != FeatureKind::None) {
-        vertices.entry(cell(mesh.points[v])).or_default().push(v as u32);
+    let tree = KdTree::new(corners);
+    let mut near: Vec<Vec<(f64, u32)>> = vec![Vec::new(); corners.len()];
+    for (v, at) in vertices {
+        tree.within(at, reach * size, |c, p, _| near[c as usize].push((at.distance(p), v)));
     }
-    let size = l.step.max_element();
-    let around = |p: DVec3| {
-        let [x, y, z] = cell(p);
-        let cells = (0..27).map(|n| [x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]);
-        let mut near: Vec<(f64, u32)> = cells
-            .filter_map(|c| vertices.get(&c))
-            .flatten()
-            .map(|&v| (mesh.points[v as usize].distance(p), v))
-            .filter(|n| n.0 < CALL * size)
-            .collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        near
-    };
-    let near: Vec<_> = corners.iter().map(|&p| around(p)).collect();
+    near.iter_mut().for_each(|near| near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))));
     let taken: BTreeSet<u32> = near.iter().flatten().filter(|n| n.0 <= TAKEN * size).map(|n| n.1).collect();
-    let mut calls = Vec::new();
-    for (p, near) in corners.into_iter().zip(near) {
+    let (mut calls, mut untaken) = (Vec::new(), Vec::new());
+    for (&p, near) in corners.iter().zip(near) {
+        if near.first().is_none_or(|n| n.0 > TAKEN * size) {
+            untaken.push(p);
+        }
         if near.first().is_some_and(|n| n.0 > TAKEN * size) {
             calls.push((p, near.iter().map(|n| n.1).filter(|v| !taken.contains(v)).take(CALLED).collect()));
         }
     }
-    calls
+    (calls, untaken)
+}
+
+/// Corners of the source that no vertex is at yet call once more: first vertices of lines, which have come nearer since,
+/// then any. Returns those that came.
+fn call_again(
+    local: &mut Local,
+    lines: &Lines,
+    kinds: &mut [FeatureKind],
+    corners: &[DVec3],
+    open: &mut Vec<u32>,
+    size: f64,
+) -> Vec<u32> {
+    let mut came = Vec::new();
+    let mut ask = |local: &mut Local, calls: Vec<(DVec3, Vec<u32>)>| {
+        for (p, vertices) in calls {
+            let fixed = |a: u32, b: u32| lines.beside(a).contains(&b);
+            let first = vertices.into_iter().find(|&v| local.shift(&[(v, p)]) || local.flip_and_shift(v, p, fixed));
+            if let Some(v) = first {
+                kinds[v as usize] = FeatureKind::Corner;
+                open.retain(|&o| o != v);
+                came.push(v);
+            }
+        }
+    };
+    let on_lines = lines.vertices().map(|(v, _)| (v, local.position(v)));
+    let (again, untaken) = calls(corners, size, CALL, on_lines);
+    ask(local, again);
+    if !untaken.is_empty() {
+        let all = (0..local.mesh.points.len() as u32).filter(|&v| !local.star(v).is_empty());
+        let (again, _) = calls(&untaken, size, CALL_ANY, all.map(|v| (v, local.position(v))));
+        ask(local, again);
+    }
+    came
+}
+
+/// When vertices were tried in vain: only what changes near a vertex can make room for it.
+struct Tried {
+    names: Vec<u32>,
+    /// For each the number of changes that there were.
+    at: Vec<Option<usize>>,
+}
+
+impl Tried {
+    /// True if `v` was not tried yet, or something changed near it since; it counts as tried now.
+    fn again(&mut self, local: &Local, lines: &Lines, targets: &HashMap<u32, DVec3>, v: u32) -> bool {
+        let Ok(n) = self.names.binary_search(&v) else { return true };
+        let places = lines.beside(v).iter().chain([&v]).filter_map(|w| targets.get(w).copied());
+        let again = self.at[n].is_none_or(|since| local.changed(since, v, places));
+        self.at[n] = Some(local.changes());
+        again
+    }
 }
 
 /// Neighbours on a line move together.
@@ -206,7 +232,7 @@ fn together(local: &mut Local, lines: &Lines, targets: &HashMap<u32, DVec3>, ope
         let mut group = vec![first];
         let mut at = 0;
         while at < group.len() {
-            for w in lines.beside(group[at]) {
+            for &w in lines.beside(group[at]) {
                 if open.binary_search(&w).is_ok() && !group.contains(&w) && !seen.contains(&w) && group.len() < TOGETHER
                 {
                     group.push(w);
@@ -232,14 +258,19 @@ fn merge_along(
     kinds: &[FeatureKind],
     targets: &HashMap<u32, DVec3>,
     open: &mut Vec<u32>,
+    tried: &mut Tried,
 ) {
     let mut at = 0;
     while at < open.len() {
         let v = open[at];
+        if !tried.again(local, lines, targets, v) {
+            at += 1;
+            continue;
+        }
         let is_corner = |v: u32| kinds[v as usize] == FeatureKind::Corner;
         let is_open = |v: u32, open: &[u32]| open.binary_search(&v).is_ok();
         let mut done = false;
-        for w in lines.beside(v) {
+        for w in lines.beside(v).to_vec() {
             if is_corner(v) {
                 // Others make room for a corner.
                 if !is_corner(w) && local.merge(w, v, targets[&v]) {
@@ -288,6 +319,7 @@ fn approach(local: &mut Local, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32
         }
     }
     for _ in 0..ROUNDS {
+        let mut back = false;
         for &(v, start) in &starts {
             let here = local.position(v);
             let turned = local.turned(v);
@@ -297,10 +329,16 @@ fn approach(local: &mut Local, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32
             if local.shift_leaning(&[(v, start)]) {
                 if local.turned(v) >= turned {
                     local.shift_leaning(&[(v, here)]);
-                } else if !open.contains(&v) {
+                    continue;
+                }
+                back = true;
+                if !open.contains(&v) {
                     open.push(v);
                 }
             }
+        }
+        if !back {
+            break;
         }
     }
 }
@@ -316,10 +354,9 @@ fn ask_corners(
     size: f64,
 ) -> Vec<DVec3> {
     let special: Vec<u32> = lines
-        .0
-        .iter()
-        .filter(|(v, beside)| beside.len() != 2 || kinds[**v as usize] == FeatureKind::Corner)
-        .map(|(v, _)| *v)
+        .vertices()
+        .filter(|(v, beside)| beside.len() != 2 || kinds[*v as usize] == FeatureKind::Corner)
+        .map(|(v, _)| v)
         .collect();
     let mut corners: Vec<DVec3> = Vec::new();
     for v in special {
@@ -342,7 +379,7 @@ fn ask_corners(
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let taken = near.first().is_some_and(|n| n.0 < TAKEN * size);
         for &(_, w) in near.iter().take(CALLED).filter(|_| !taken) {
-            if local.shift(&[(w, corner)]) || local.flip_and_shift(w, corner) {
+            if local.shift(&[(w, corner)]) || local.flip_and_shift(w, corner, |a, b| lines.beside(a).contains(&b)) {
                 kinds[w as usize] = FeatureKind::Corner;
                 open.retain(|&o| o != w);
                 break;
@@ -357,34 +394,24 @@ fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corne
     if corners.is_empty() {
         return;
     }
-    let key = |p: DVec3| (p / size).floor().to_array().map(|x| x as i64);
-    let mut places: HashMap<[i64; 3], Vec<DVec3>> = HashMap::new();
-    for &p in corners {
-        places.entry(key(p)).or_default().push(p);
-    }
-    let near = |p: DVec3| {
-        let [x, y, z] = key(p);
-        (0..27)
-            .filter_map(|n| places.get(&[x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]))
-            .flatten()
-            .copied()
-            .collect::<Vec<DVec3>>()
+    let tree = KdTree::new(corners);
+    // Distance of the nearest corner within reach.
+    let off = |p: DVec3| {
+        let mut least = f64::INFINITY;
+        tree.within(p, (CALL + TAKEN) * size, |_, c, _| least = least.min(c.distance(p)));
+        least
     };
-    let vertices: Vec<u32> = lines.0.keys().copied().collect();
+    let mut vertices: Vec<u32> = Vec::new();
+    for (v, _) in lines.vertices() {
+        let off = off(local.position(v));
+        if off < TAKEN * size {
+            kinds[v as usize] = FeatureKind::Corner;
+        } else if off.is_finite() && kinds[v as usize] == FeatureKind::Corner {
+            vertices.push(v);
+        }
+    }
     for v in vertices {
         let p = local.position(v);
-        let around = near(p);
-        if around.iter().any(|c| c.distance(p) < TAKEN * size) {
-            kinds[v as usize] = FeatureKind::Corner;
-        }
-    }
-    let vertices: Vec<u32> = lines.0.keys().copied().filter(|&v| kinds[v as usize] == FeatureKind::Corner).collect();
-    for &v in &vertices {
-        let p = local.position(v);
-        let around = near(p);
-        if around.is_empty() || around.iter().any(|c| c.distance(p) < TAKEN * size) {
-            continue;
-        }
         // The vertex at the nearest corner, if there is one within reach of a flip.
         let mut ring = local.neighbours(v);
         ring.extend(
@@ -398,10 +425,7 @@ fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corne
         );
         ring.sort_unstable();
         ring.dedup();
-        let taken = |w: u32| {
-            kinds[w as usize] == FeatureKind::Corner
-                && near(local.position(w)).iter().any(|c| c.distance(local.position(w)) < TAKEN * size)
-        };
+        let taken = |w: u32| kinds[w as usize] == FeatureKind::Corner && off(local.position(w)) < TAKEN * size;
         let goal = ring
             .into_iter()
             .filter(|&w| w != v && taken(w) && local.position(w).distance(p) < CALL * size)
@@ -410,36 +434,6 @@ fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corne
             && local.flip_and_merge(v, w)
         {
             lines.merge(v, w);
-        }
-    }
-}
-
-/// Joins loose ends of lines with what they end beside: over an edge that is there, or that a flip makes.
-fn join_ends(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], sharp: f64) {
-    let ends: Vec<u32> = lines.0.iter().filter(|(_, beside)| beside.len() == 1).map(|(v, _)| *v).collect();
-    for v in ends {
-        if lines.beside(v).len() != 1 || local.star(v).is_empty() {
-            continue;
-        }
-        let joins = |w: u32, lines: &Lines| {
-            let beside = lines.beside(w);
-            w != v
-                && !beside.contains(&v)
-                && (beside.len() == 1 || (kinds[w as usize] == FeatureKind::Corner && !beside.is_empty()))
-        };
-        let ring = local.neighbours(v);
-        if let Some(&w) = ring.iter().find(|&&w| joins(w, lines) && local.is_sharp(v, w, sharp)) {
-            lines.join(v, w);
-            continue;
-        }
-        // Vertices opposite over an edge of the star.
-        for w in local.beyond(v) {
-            if joins(w, lines) && local.flip_to(v, w) {
-                if local.is_sharp(v, w, sharp) {
-                    lines.join(v, w);
-                }
-                break;
-            }
         }
     }
 }

@@ -42,6 +42,10 @@ pub fn triangles_meet(p: [DVec3; 3], p_names: [u32; 3], q: [DVec3; 3], q_names: 
             let (i, j) = shared[0];
             let (a, b) = (p[(i + 1) % 3], p[(i + 2) % 3]);
             let (c, d) = (q[(j + 1) % 3], q[(j + 2) % 3]);
+            // All but the common corner strictly on one side of the other's plane: they meet there alone.
+            if one_side(a, b, q) || one_side(c, d, p) {
+                return false;
+            }
             segment_meets(a, b, q) || segment_meets(c, d, p) || same_ray(p[i], [a, b], [c, d])
         }
         2 => {
@@ -51,6 +55,12 @@ pub fn triangles_meet(p: [DVec3; 3], p_names: [u32; 3], q: [DVec3; 3], q_names: 
         }
         _ => true,
     }
+}
+
+/// True if `a` and `b` lie strictly on the same side of the plane of `t`.
+fn one_side(a: DVec3, b: DVec3, t: [DVec3; 3]) -> bool {
+    let (a, b) = (orient3d(t[0], t[1], t[2], a), orient3d(t[0], t[1], t[2], b));
+    (a > 0.0 && b > 0.0) || (a < 0.0 && b < 0.0)
 }
 
 /// Two triangles that share the corner `v`: an edge of one may lie along an edge of the other.

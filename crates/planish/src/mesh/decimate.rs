@@ -9,6 +9,7 @@
 //! what meets locked.
 
 mod collapse;
+mod queue;
 
 use super::{FeatureTags, MeshError, TriMesh, check, self_intersections};
 use crate::geom::Bvh;
@@ -129,9 +130,11 @@ pub fn decimate(
     };
     let mut locked = vec![false; mesh.points.len()];
     let mut before = None;
+    let mut log = Vec::new();
     for round in 0..=ROUNDS {
-        let mut collapse = Collapse::new(mesh, tags, &locked)?;
+        let mut collapse = Collapse::new(mesh, tags, &locked, &log)?;
         collapse.run(count, tolerance, observer)?;
+        let done = collapse.take_log();
         let (result, result_tags, source) = collapse.finish();
         let distance = allowed.map(|_| farthest(mesh, &result));
         if let (Some(t), Some(d)) = (allowed, distance)
@@ -139,6 +142,7 @@ pub fn decimate(
             && round < ROUNDS
         {
             tolerance *= TIGHTEN;
+            log.clear();
             continue;
         }
         let meeting = self_intersections(&result);
@@ -146,6 +150,8 @@ pub fn decimate(
             // What the input has already is not ours to mend.
             let own = *before.get_or_insert_with(|| self_intersections(mesh).len());
             if meeting.len() > own {
+                // What a locked vertex rules out is left out; all else is done again, and more of it.
+                log = done;
                 lock(mesh, &result, &source, &meeting, &mut locked);
                 continue;
             }

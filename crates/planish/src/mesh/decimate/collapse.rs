@@ -1,11 +1,10 @@
 //! The collapsing itself, on half-edges.
 
 use super::DecimateError;
+use super::queue::{Entry, Queue};
 use crate::mesh::{Adjacency, Attribute, FeatureKind, FeatureTags, NONE, TriMesh, next, previous};
 use crate::observe::Observer;
 use glam::{DMat3, DVec3};
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 
 /// A sum of squared distances from planes, by area, relative to the middle of the mesh.
 #[derive(Clone, Copy, Default)]
@@ -72,6 +71,8 @@ const LINE: f64 = 4.0;
 /// A triangle may turn so far (cosine), and its height shrink to this share of its longest edge.
 const TURN: f64 = 0.2;
 const SLIVER: f64 = 0.01;
+/// The normal of a triangle whose height is below this share of its longest edge tells nothing.
+const THIN: f64 = 0.1;
 /// Collapses between two looks at the observer.
 const LOOK: usize = 1 << 12;
 
@@ -91,7 +92,19 @@ pub struct Collapse<'a> {
     kind: Vec<Kind>,
     quadrics: Vec<Quadric>,
     stamp: Vec<u32>,
-    heap: BinaryHeap<Reverse<(u64, u32, u32)>>,
+    queue: Queue,
+    /// All collapses, in their order.
+    log: Vec<Step>,
+    /// Neighbours of the ends of an edge.
+    rings: [Vec<u32>; 2],
+    spokes: Vec<u32>,
+}
+
+/// A collapse: the half-edge whose start is merged into its end, and where.
+#[derive(Clone, Copy)]
+pub struct Step {
+    half_edge: u32,
+    p: DVec3,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -102,8 +115,13 @@ enum Kind {
 }
 
 impl<'a> Collapse<'a> {
-    /// Prepares a mesh; vertices that are `locked` stay.
-    pub fn new(mesh: &'a TriMesh, tags: &FeatureTags, locked: &[bool]) -> Result<Collapse<'a>, DecimateError> {
+    /// Prepares a mesh; vertices that are `locked` stay. What was done `before` is done again as far as it can be.
+    pub fn new(
+        mesh: &'a TriMesh,
+        tags: &FeatureTags,
+        locked: &[bool],
+        before: &[Step],
+    ) -> Result<Collapse<'a>, DecimateError> {
         let adjacency = Adjacency::new(mesh);
         let unsound = unsound_edges(mesh, &adjacency);
         if unsound > 0 {
@@ -165,11 +183,36 @@ impl<'a> Collapse<'a> {
             kind,
             quadrics,
             stamp: vec![0; points.len()],
-            heap: BinaryHeap::new(),
+            queue: Queue::new(0.0),
+            log: Vec::new(),
+            rings: Default::default(),
+            spokes: Vec::new(),
             points,
         };
+        collapse.replay(before);
         collapse.queue();
         Ok(collapse)
+    }
+
+    /// Does what an earlier round did, but for vertices that are fixed now and what would have come of them.
+    fn replay(&mut self, before: &[Step]) {
+        let mut other = vec![false; self.points.len()];
+        for step in before {
+            let h = step.half_edge;
+            if !self.alive[h as usize / 3] {
+                continue;
+            }
+            let (a, b) = self.ends(h);
+            let changed = other[a as usize] || other[b as usize];
+            let fixed = self.kind[a as usize] == Kind::Fixed && self.points[a as usize] != step.p
+                || self.kind[b as usize] == Kind::Fixed && self.points[b as usize] != step.p;
+            if changed || fixed || !self.allowed(h, step.p) {
+                (other[a as usize], other[b as usize]) = (true, true);
+            } else {
+                self.collapse(h, step.p);
+                self.log.push(*step);
+            }
+        }
     }
 
     /// Puts all edges into the queue.
@@ -179,8 +222,11 @@ impl<'a> Collapse<'a> {
             self.alive[h as usize / 3] && (g == NONE || h < g)
         };
         let half_edges = self.opposite.len() as u32;
-        let all: Vec<_> = (0..half_edges).filter(edge).filter_map(|h| self.entry(h).map(Reverse)).collect();
-        self.heap = BinaryHeap::from(all);
+        let all: Vec<(f64, Entry)> = (0..half_edges).filter(edge).filter_map(|h| self.entry(h)).collect();
+        // No quadric is ever worse than all planes together, seen from the farthest place.
+        let greatest = all.iter().map(|e| e.0).fold(0.0, f64::max) * all.len() as f64;
+        self.queue = Queue::new(greatest);
+        all.into_iter().for_each(|(cost, entry)| self.queue.push(cost, entry));
     }
 
     /// Collapses until `count` triangles are left or the next collapse is farther than `tolerance`.
@@ -189,7 +235,7 @@ impl<'a> Collapse<'a> {
         let mut steps = 0;
         let mut before = self.count;
         while self.count > count {
-            let Some(Reverse((_, h, stamp))) = self.heap.pop() else {
+            let Some(Entry { half_edge: h, stamp }) = self.queue.pop() else {
                 // What was not allowed once may be now.
                 if self.count == before {
                     break;
@@ -212,6 +258,8 @@ impl<'a> Collapse<'a> {
             }
             if self.allowed(h, p) {
                 self.collapse(h, p);
+                self.log.push(Step { half_edge: h, p });
+                self.queue_around(b);
             }
             steps += 1;
             if steps % LOOK == 0 {
@@ -222,6 +270,11 @@ impl<'a> Collapse<'a> {
             }
         }
         Ok(())
+    }
+
+    /// The collapses so far.
+    pub fn take_log(&mut self) -> Vec<Step> {
+        std::mem::take(&mut self.log)
     }
 
     /// The mesh, its tags, and for each vertex the one of the input that it comes from.
@@ -283,11 +336,10 @@ impl<'a> Collapse<'a> {
     }
 
     /// The entry of an edge in the queue.
-    fn entry(&self, h: u32) -> Option<(u64, u32, u32)> {
+    fn entry(&self, h: u32) -> Option<(f64, Entry)> {
         let (_, cost) = self.place(h)?;
         let (a, b) = self.ends(h);
-        // Costs are not negative: their bits are in order.
-        Some((cost.to_bits(), h, self.stamp[a as usize].wrapping_add(self.stamp[b as usize])))
+        Some((cost, Entry { half_edge: h, stamp: self.stamp[a as usize].wrapping_add(self.stamp[b as usize]) }))
     }
 
     /// Where the two ends of an edge would meet, and the error there; `None` if they must not.
@@ -348,11 +400,17 @@ impl<'a> Collapse<'a> {
         }
     }
 
-    fn allowed(&self, h: u32, p: DVec3) -> bool {
+    fn allowed(&mut self, h: u32, p: DVec3) -> bool {
+        let mut rings = std::mem::take(&mut self.rings);
+        let allowed = self.allows(h, p, &mut rings);
+        self.rings = rings;
+        allowed
+    }
+
+    fn allows(&self, h: u32, p: DVec3, [na, nb]: &mut [Vec<u32>; 2]) -> bool {
         let (a, b) = self.ends(h);
         let g = self.opposite[h as usize];
         let sides = [Some(h), (g != NONE).then_some(g)];
-        let apex: Vec<u32> = sides.into_iter().flatten().map(|h| self.from(previous(h))).collect();
         let on_rim = |v: u32| {
             self.fan(v).any(|h| self.opposite[h as usize] == NONE || self.opposite[previous(h) as usize] == NONE)
         };
@@ -361,10 +419,9 @@ impl<'a> Collapse<'a> {
             return false;
         }
         // Common neighbours are the two apices and no others.
-        let (mut na, mut nb) = (Vec::with_capacity(16), Vec::with_capacity(16));
-        self.neighbours(a, &mut na);
-        self.neighbours(b, &mut nb);
-        if na.iter().filter(|v| nb.contains(v)).count() != apex.len() {
+        self.neighbours(a, na);
+        self.neighbours(b, nb);
+        if na.iter().filter(|v| nb.contains(v)).count() != sides.iter().flatten().count() {
             return false;
         }
         // A tetrahedron has nothing to lose.
@@ -381,6 +438,11 @@ impl<'a> Collapse<'a> {
                 return false;
             }
         }
+        let mut around = DVec3::ZERO;
+        for h in self.fan(a).chain(self.fan(b)) {
+            let [x, y, z] = self.triangles[h as usize / 3].map(|v| self.points[v as usize]);
+            around += (y - x).cross(z - x);
+        }
         for (v, other) in [(a, b), (b, a)] {
             for h in self.fan(v) {
                 let (x, y) = (self.from(next(h)), self.from(previous(h)));
@@ -391,11 +453,13 @@ impl<'a> Collapse<'a> {
                 let pv = self.points[v as usize];
                 let (old, new) = ((px - pv).cross(py - pv), (px - p).cross(py - p));
                 let (lo, ln) = (old.length(), new.length());
-                if old.dot(new) < TURN * lo * ln || ln == 0.0 {
-                    return false;
-                }
                 let longest = (px - p).length_squared().max((py - p).length_squared()).max((px - py).length_squared());
                 let before = (px - pv).length_squared().max((py - pv).length_squared()).max((px - py).length_squared());
+                // The normal of a sliver tells nothing; what is around does.
+                let (facing, length) = if lo < THIN * before { (around, around.length()) } else { (old, lo) };
+                if facing.dot(new) < TURN * length * ln || ln == 0.0 {
+                    return false;
+                }
                 // Slivers may stay, but not arise.
                 if ln < SLIVER * longest && ln / longest < lo / before {
                     return false;
@@ -423,8 +487,10 @@ impl<'a> Collapse<'a> {
         self.points[b as usize] = p;
         self.quadrics[b as usize] = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
         let g = self.opposite[h as usize];
-        let fan: Vec<u32> = self.fan(a).collect();
-        for f in fan {
+        let mut spokes = std::mem::take(&mut self.spokes);
+        spokes.clear();
+        spokes.extend(self.fan(a));
+        for &f in &spokes {
             self.triangles[f as usize / 3][f as usize % 3] = b;
         }
         let mut rest = NONE;
@@ -455,15 +521,23 @@ impl<'a> Collapse<'a> {
         self.outgoing[b as usize] = self.settled(rest);
         self.stamp[b as usize] += 1;
         self.outgoing[a as usize] = NONE;
-        let fan: Vec<u32> = self.fan(b).collect();
-        for f in fan {
+        self.spokes = spokes;
+    }
+
+    /// Puts all edges at `v` into the queue.
+    fn queue_around(&mut self, v: u32) {
+        let mut spokes = std::mem::take(&mut self.spokes);
+        spokes.clear();
+        spokes.extend(self.fan(v));
+        for &f in &spokes {
             let edges = [Some(f), (self.opposite[previous(f) as usize] == NONE).then(|| previous(f))];
             for e in edges.into_iter().flatten() {
-                if let Some(entry) = self.entry(e) {
-                    self.heap.push(Reverse(entry));
+                if let Some((cost, entry)) = self.entry(e) {
+                    self.queue.push(cost, entry);
                 }
             }
         }
+        self.spokes = spokes;
     }
 
     /// The half-edge of the triangle of `h` that leaves `v`.

@@ -1,0 +1,173 @@
+//! Where lines of features run in an extracted mesh, and how their ends come together.
+
+use super::local::Local;
+use crate::field::Creases;
+use crate::geom::KdTree;
+use crate::mesh::FeatureKind;
+use glam::DVec3;
+
+/// A vertex that is this near to a corner of the source is there, in cells.
+pub const TAKEN: f64 = 1e-6;
+/// An edge follows a line of the source if it is nowhere farther from one, in cells.
+const ALONG: f64 = 0.1;
+/// Places on an edge at which that is asked.
+const PLACES: [f64; 3] = [0.25, 0.5, 0.75];
+
+/// Where lines run: for each feature vertex those beside it on its lines.
+pub struct Lines {
+    /// All vertices of lines, ascending.
+    names: Vec<u32>,
+    beside: Vec<Vec<u32>>,
+}
+
+impl Lines {
+    pub fn new(edges: &[[u32; 2]]) -> Lines {
+        let mut names: Vec<u32> = edges.iter().flatten().copied().collect();
+        names.sort_unstable();
+        names.dedup();
+        let mut lines = Lines { beside: vec![Vec::new(); names.len()], names };
+        edges.iter().for_each(|&[a, b]| lines.join(a, b));
+        lines
+    }
+
+    /// Vertices with others beside them, ascending.
+    pub fn vertices(&self) -> impl Iterator<Item = (u32, &[u32])> {
+        let all = self.names.iter().zip(&self.beside).map(|(&v, beside)| (v, beside.as_slice()));
+        all.filter(|(_, beside)| !beside.is_empty())
+    }
+
+    pub fn beside(&self, v: u32) -> &[u32] {
+        self.names.binary_search(&v).map_or(&[], |n| &self.beside[n])
+    }
+
+    pub fn join(&mut self, v: u32, w: u32) {
+        for (a, b) in [(v, w), (w, v)] {
+            let n = self.names.binary_search(&a).unwrap_or_else(|n| {
+                self.names.insert(n, a);
+                self.beside.insert(n, Vec::new());
+                n
+            });
+            if !self.beside[n].contains(&b) {
+                self.beside[n].push(b);
+            }
+        }
+    }
+
+    pub fn part(&mut self, v: u32, w: u32) {
+        for (a, b) in [(v, w), (w, v)] {
+            if let Ok(n) = self.names.binary_search(&a) {
+                self.beside[n].retain(|&x| x != b);
+            }
+        }
+    }
+
+    /// `v` becomes `w`.
+    pub fn merge(&mut self, v: u32, w: u32) {
+        let Ok(n) = self.names.binary_search(&v) else { return };
+        for x in std::mem::take(&mut self.beside[n]) {
+            if let Ok(n) = self.names.binary_search(&x) {
+                self.beside[n].retain(|&y| y != v);
+            }
+            if x != w {
+                self.join(x, w);
+            }
+        }
+    }
+}
+
+/// Lets lines follow those of a source that lists its corners: two lines that share a cell may have been taken for one.
+/// Edges that follow none are lines no more, and vertices where lines meet or end are joined with the next along a line
+/// of the source, over an edge that is there or that flips make.
+/// * `came` - vertices at corners that no line meets yet
+pub fn follow(
+    local: &mut Local,
+    lines: &mut Lines,
+    kinds: &mut [FeatureKind],
+    creases: &dyn Creases,
+    corners: &[DVec3],
+    came: &[u32],
+    size: f64,
+    sharp: f64,
+) {
+    let tree = KdTree::new(corners);
+    let is_corner = |p: DVec3| {
+        let mut found = false;
+        tree.within(p, TAKEN * size, |_, _, _| found = true);
+        found
+    };
+    let along = |a: DVec3, b: DVec3| PLACES.iter().all(|&s| creases.nearest(a.lerp(b, s), ALONG * size, &[]).is_some());
+    let mut nodes: Vec<u32> = lines
+        .vertices()
+        .filter(|(v, beside)| beside.len() == 1 || kinds[*v as usize] == FeatureKind::Corner)
+        .map(|(v, _)| v)
+        .filter(|&v| !local.star(v).is_empty())
+        .collect();
+    nodes.extend(came);
+    for &v in &nodes {
+        for w in lines.beside(v).to_vec() {
+            let (a, b) = (local.position(v), local.position(w));
+            let between = |x: &u32| {
+                let p = local.position(*x);
+                let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+                lines.beside(w).contains(x) && p.distance(a.lerp(b, t)) < ALONG * size
+            };
+            if lines.beside(v).iter().any(between) || !(along(a, b) || is_corner(a) && is_corner(b)) {
+                lines.part(v, w);
+            }
+        }
+    }
+    for v in nodes {
+        let mut near = local.neighbours(v);
+        near.extend(near.clone().into_iter().flat_map(|w| local.neighbours(w)));
+        near.sort_unstable();
+        near.dedup();
+        for w in near {
+            let own = lines.beside(v);
+            let joins = kinds[w as usize] != FeatureKind::None
+                && !own.contains(&w)
+                && !own.iter().any(|x| lines.beside(w).contains(x))
+                && along(local.position(v), local.position(w));
+            let fixed = |a: u32, b: u32| lines.beside(a).contains(&b);
+            if w != v
+                && joins
+                && (local.are_neighbours(v, w) || local.connect(v, w, fixed))
+                && local.is_sharp(v, w, sharp)
+            {
+                lines.join(v, w);
+            }
+        }
+        if lines.beside(v).len() == 2 && !is_corner(local.position(v)) {
+            kinds[v as usize] = FeatureKind::Edge;
+        }
+    }
+}
+
+/// Joins loose ends of lines with what they end beside: over an edge that is there, or that a flip makes.
+pub fn join_ends(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], sharp: f64) {
+    let ends: Vec<u32> = lines.vertices().filter(|(_, beside)| beside.len() == 1).map(|(v, _)| v).collect();
+    for v in ends {
+        if lines.beside(v).len() != 1 || local.star(v).is_empty() {
+            continue;
+        }
+        let joins = |w: u32, lines: &Lines| {
+            let beside = lines.beside(w);
+            w != v
+                && !beside.contains(&v)
+                && (beside.len() == 1 || (kinds[w as usize] == FeatureKind::Corner && !beside.is_empty()))
+        };
+        let ring = local.neighbours(v);
+        if let Some(&w) = ring.iter().find(|&&w| joins(w, lines) && local.is_sharp(v, w, sharp)) {
+            lines.join(v, w);
+            continue;
+        }
+        // Vertices opposite over an edge of the star.
+        for w in local.beyond(v) {
+            if joins(w, lines) && local.flip_to(v, w) {
+                if local.is_sharp(v, w, sharp) {
+                    lines.join(v, w);
+                }
+                break;
+            }
+        }
+    }
+}
