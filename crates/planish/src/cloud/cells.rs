@@ -322,8 +322,10 @@ fn find(
     let mut worth = spread(&sheets, concave).1;
     let mut widths = WIDTHS.to_vec();
     for _ in 0..rounds {
+        let widest = widths.iter().copied().fold(0.0, f64::max) * HEARD * support;
+        let owned = owned(&sheets, concave, place, widest, tree);
         let tried = widths.iter().map(|width| {
-            let better = refined(&sheets, concave, place, width * HEARD * support, tree);
+            let better = refined(&sheets, place, width * HEARD * support, &owned);
             let (cost, worth) = spread(&better, concave);
             (better, cost, worth, *width)
         });
@@ -347,10 +349,10 @@ fn find(
     let found = sheets.len();
     while found > 1 && sheets.len() < MOST {
         let bare: Vec<Quadric> = sheets.iter().map(|s| s.0).collect();
-        let Some((normal, at)) = rim(&bare, concave, center, HEARD * support, &ball, noise) else { break };
-        let gap = concave >> (found - 1) & 1 == 1;
-        concave |= u8::from(gap) << sheets.len();
-        sheets.push((Quadric::plane(at, support, if gap { -normal } else { normal }), at, sheets[0].2));
+        let Some(end) = rim(&bare, concave, center, HEARD * support, &ball, noise) else { break };
+        concave |= u8::from(end.groove) << sheets.len();
+        let normal = if end.groove { -end.normal } else { end.normal };
+        sheets.push((Quadric::plane(end.at, support, normal), end.at, sheets[0].2));
     }
     let plain = sheets.len() == 1 && spent < PLAIN * count + count.sqrt();
     let total = spent + prices.iter().sum::<f64>();
@@ -370,21 +372,35 @@ fn joined(sheets: &[(Quadric, DVec3, f64)], concave: u8, p: DVec3) -> (usize, f6
     nest::joined(sheets.iter().map(|s| s.0.distance(p).0), concave)
 }
 
-/// Every sheet fitted again to the points of a ball at which it decides.
-fn refined(
+/// The points of a ball that lie on the nesting, with the sheet that decides at each.
+fn owned(
     sheets: &[(Quadric, DVec3, f64)],
     concave: u8,
     place: &Place,
     radius: f64,
     tree: &KdTree,
-) -> Vec<(Quadric, DVec3, f64)> {
-    let mut points: Vec<Vec<Weighted>> = vec![Vec::new(); sheets.len()];
+) -> Vec<(DVec3, usize)> {
+    let mut points = Vec::new();
     tree.within(place.center, radius, |_, q, _| {
         let (k, d) = joined(sheets, concave, q);
         if d.abs() < LIMIT * place.noise {
-            points[k].push(Weighted { y: (q - place.center) / radius, weight: 1.0 });
+            points.push((q - place.center, k));
         }
     });
+    points
+}
+
+/// Every sheet fitted again to those of its points that lie in a ball.
+fn refined(
+    sheets: &[(Quadric, DVec3, f64)],
+    place: &Place,
+    radius: f64,
+    owned: &[(DVec3, usize)],
+) -> Vec<(Quadric, DVec3, f64)> {
+    let mut points: Vec<Vec<Weighted>> = vec![Vec::new(); sheets.len()];
+    for &(q, k) in owned.iter().filter(|o| o.0.length_squared() <= radius * radius) {
+        points[k].push(Weighted { y: q / radius, weight: 1.0 });
+    }
     sheets
         .iter()
         .zip(&points)

@@ -26,7 +26,18 @@ const ON: f64 = 0.25;
 /// The density is that of what lies deeper than this many noise levels below the last point.
 const DEEP: f64 = 5.0;
 
-/// The plane that ends the sheets in the ball of `radius` around `center`: unit normal out of the data, and a point.
+/// Where two sheets end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Rim {
+    /// Unit normal of the plane, out of the data.
+    pub normal: DVec3,
+    /// A point of the plane, world units.
+    pub at: DVec3,
+    /// What lies between the sheets is outside.
+    pub groove: bool,
+}
+
+/// The plane that ends the sheets in the ball of `radius` around `center`.
 ///
 /// * `sheets`, `concave` - the nesting
 /// * `points` - those of the ball
@@ -38,7 +49,7 @@ pub(super) fn rim(
     radius: f64,
     points: &[DVec3],
     noise: f64,
-) -> Option<(DVec3, DVec3)> {
+) -> Option<Rim> {
     let normals: Vec<DVec3> = sheets.iter().map(|s| s.distance(center).1).collect();
     let facing = (1..sheets.len()).flat_map(|k| (0..k).map(move |j| (j, k)));
     let (a, b) = facing.min_by(|p, q| normals[p.0].dot(normals[p.1]).total_cmp(&normals[q.0].dot(normals[q.1])))?;
@@ -92,7 +103,7 @@ pub(super) fn rim(
     }
     let needed = (last * area / inside).round() as usize;
     let at = beyond.get(needed).copied().unwrap_or(end).min(end);
-    Some((w, center + (at - w.dot(center)) * w))
+    Some(Rim { normal: w, at: center + (at - w.dot(center)) * w, groove: concave >> b & 1 == 1 })
 }
 
 #[cfg(test)]
@@ -100,17 +111,17 @@ mod tests {
     use super::*;
     use crate::geom::random;
 
-    /// Both sides of a plate `thick` noise levels thick that ends at x = 0, in a ball of radius 40 levels.
+    /// Both sides of a plate `thick` noise levels thick that ends at x = `end`, in a ball of radius 40 levels.
     fn plate(thick: f64, end: f64, seed: u64) -> (Vec<Quadric>, Vec<DVec3>) {
-        let n = |k: u64| random::normal(random::unit(seed, 2 * k), random::unit(seed, 2 * k + 1));
-        let points = (0..600u64)
+        let normal = |k: u64| random::normal(random::unit(seed, 2 * k), random::unit(seed, 2 * k + 1));
+        let points = (0..800u64)
             .map(|i| {
-                let r = |k: u64| random::unit(seed + 1, 4 * i + k);
-                let side = if i % 2 == 0 { 0.0 } else { -thick };
-                let p = DVec3::new(80.0 * r(0) - 40.0, 80.0 * r(1) - 40.0, side);
-                p + DVec3::new(n(3 * i), n(3 * i + 1), n(3 * i + 2))
+                let r = |k: u64| 80.0 * random::unit(seed + 1, 4 * i + k) - 40.0;
+                (i, DVec3::new(r(0), r(1), if i % 2 == 0 { 0.0 } else { -thick }))
             })
-            .filter(|p| p.x < end + 40.0 && p.length() < 40.0 && p.x - end < n(p.x.to_bits() % 9973).abs())
+            .filter(|(_, p)| p.x < end)
+            .map(|(i, p)| p + DVec3::new(normal(3 * i), normal(3 * i + 1), normal(3 * i + 2)))
+            .filter(|p| p.length() < 40.0)
             .collect();
         let side = |z: f64, up: f64| Quadric::plane(DVec3::new(0.0, 0.0, z), 40.0, DVec3::new(0.0, 0.0, up));
         (vec![side(0.0, 1.0), side(-thick, -1.0)], points)
@@ -120,9 +131,9 @@ mod tests {
     fn a_plate_of_four_noise_levels_ends_within_two_levels_of_where_its_points_stop() {
         for seed in 0..10 {
             let (sheets, points) = plate(4.0, 5.0, 100 * seed);
-            let (normal, at) = rim(&sheets, 0, DVec3::ZERO, 40.0, &points, 1.0).unwrap();
-            assert!(normal.x > 0.98, "{normal}");
-            assert!((at.x - 5.0).abs() < 2.0, "{at}");
+            let end = rim(&sheets, 0, DVec3::ZERO, 40.0, &points, 1.0).unwrap();
+            assert!(end.normal.x > 0.98 && !end.groove, "{end:?}");
+            assert!((end.at.dot(end.normal) - 5.0 * end.normal.x).abs() < 2.0, "{end:?}");
         }
     }
 
