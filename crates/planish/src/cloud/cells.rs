@@ -1,7 +1,8 @@
 //! What the surface looks like around every site: one sheet, or a body cut out of several.
 //!
 //! Every site asks which nested maxima and minima (`nest`) of the oriented samples around explain its points. The blend of
-//! these functions keeps edges sharp, and where one site errs its neighbours outvote it.
+//! these functions keeps edges sharp, and where one site errs its neighbours outvote it. A plate ends where its points do
+//! (`rim`), and a cell that faces the wrong way beside cells of several sheets is left hardly a say.
 
 use super::fit::{Weighted, sheet};
 use super::front::{PRICE, VARIATION_PRICE};

@@ -109,7 +109,7 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
 const FIT_NOISE: f64 = 0.5;
 const FIT_CLOSEST: f64 = 2e-4;
 /// Smoothing at noise of a thousandth of the diagonal; it goes with the square of the noise, as in Wiener's filter. On the
-/// fandisk with such noise 81 % of its sharp edges keep their angle within 3 degrees, and 75 % with that of a mesh.
+/// fandisk with such noise 81 % of its sharp edges kept their angle within 3 degrees, and 75 % with that of a mesh.
 const FIT_SMOOTHING: f64 = 0.1;
 
 /// How surfaces are fitted to the mesh of a scan.
