@@ -3,6 +3,7 @@
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, fig. 1.3: curves, grids, surfaces,
 //! displacement maps; before it the repair of the mesh and an automatic network, after it the measuring.
 
+mod finish;
 mod quality;
 mod record;
 mod scan;

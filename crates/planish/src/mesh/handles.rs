@@ -6,8 +6,7 @@
 //! 2. in such a piece shortest paths from one vertex make a tree; a spanning tree of the dual graph takes of the other
 //!    edges those that close the longest loops, and the shortest loop of those left over goes around a handle (Erickson
 //!    and Whittlesey 2005, *Greedy Optimal Homotopy and Homology Generators*)
-//! 3. the surface is cut along it, and both rims are filled with the triangles of least area (Barequet and Sharir 1995,
-//!    *Filling Gaps in the Boundary of a Polyhedron*)
+//! 3. the surface is cut along it, and both rims are filled with the triangles of least area (`lids`)
 
 use super::sets::Sets;
 use super::{Adjacency, NONE, TriMesh, next, previous};
@@ -320,8 +319,7 @@ impl Search<'_> {
     }
 }
 
-/// Triangles of least area over a loop, as places in it, counter-clockwise as the loop runs. `None` where all would use
-/// an edge that the surface has already.
+/// Triangles of least area over a loop. `None` where all would use an edge that the surface has already.
 fn cap(around: &[u32], search: &Search) -> Option<Vec<[usize; 3]>> {
     let n = around.len();
     let points: Vec<DVec3> = around.iter().map(|&v| search.at(v)).collect();
@@ -330,36 +328,7 @@ fn cap(around: &[u32], search: &Search) -> Option<Vec<[usize; 3]>> {
         let ring = |v: u32| search.adjacency.fan(v).flat_map(|h| search.triangles[h as usize / 3]);
         !beside && ring(around[i]).any(|w| w == around[j])
     };
-    let mut cost = vec![vec![(0.0, 0usize); n]; n];
-    for gap in 2..n {
-        for i in 0..n - gap {
-            let k = i + gap;
-            let mut best = (f64::INFINITY, 0);
-            if !taken(i, k) {
-                for j in i + 1..k {
-                    let area = (points[j] - points[i]).cross(points[k] - points[i]).length() / 2.0;
-                    let sum = cost[i][j].0 + cost[j][k].0 + area;
-                    if sum < best.0 {
-                        best = (sum, j);
-                    }
-                }
-            }
-            cost[i][k] = best;
-        }
-    }
-    if !cost[0][n - 1].0.is_finite() {
-        return None;
-    }
-    let mut out = Vec::new();
-    let mut open = vec![(0, n - 1)];
-    while let Some((i, k)) = open.pop() {
-        if k > i + 1 {
-            let j = cost[i][k].1;
-            out.push([i, j, k]);
-            open.extend([(i, j), (j, k)]);
-        }
-    }
-    Some(out)
+    super::lids::least_area(&points, taken)
 }
 
 /// Parts the surface along a loop and fills both rims.

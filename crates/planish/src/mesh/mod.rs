@@ -8,7 +8,9 @@ mod diagnose;
 mod face_point;
 mod features;
 mod handles;
+mod holes;
 mod intersect;
+mod lids;
 pub mod path;
 mod repair;
 mod rings;
@@ -18,6 +20,7 @@ mod slivers;
 pub mod smooth;
 mod soup;
 mod tags;
+mod trim;
 mod walk;
 
 pub use adjacency::{Adjacency, Fan, NONE, next, previous};
@@ -26,11 +29,13 @@ pub use decimate::{DecimateError, DecimateParams, DecimateTarget, Decimated, dec
 pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
 pub use face_point::FacePoint;
 pub use features::{boundary_loops, components, sharp_edges};
+pub use holes::close_holes;
 pub use intersect::self_intersections;
 pub use repair::{Repairs, part_fans, repair, weld};
 pub use smooth::{SmoothError, SmoothParams, Smoothed, smooth};
 pub use soup::check;
 pub use tags::{FEATURE, FeatureKind, FeatureTags};
+pub use trim::trim;
 pub use walk::{CurvePlace, move_point_on_curve, move_point_on_surface};
 
 use crate::geom::Aabb;

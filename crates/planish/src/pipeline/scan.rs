@@ -1,5 +1,6 @@
 //! From a scan to a mesh: samples, their field, its surface.
 
+use super::finish::finish;
 use super::record::Figure;
 use super::{Quality, Warning};
 use crate::cloud::{self, CleanParams, Cloud, CloudError, Samples};
@@ -7,9 +8,10 @@ use crate::contour::{self, ContourParams, Meshed, MeshingError, Sampling};
 use crate::field::{SampleField, Spacing};
 use crate::geom::Bvh;
 use crate::mesh::sets::Sets;
-use crate::mesh::{FeatureTags, TriMesh, part_fans};
+use crate::mesh::{FeatureTags, TriMesh};
 use crate::observe::Observer;
 use crate::surface::{FitParams, Resolution};
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// Why a scan gives no mesh.
@@ -36,7 +38,8 @@ pub struct ScanParams {
     pub resolution: Option<usize>,
     /// Bytes that may be used.
     pub memory: u64,
-    /// Close holes (`Some(true)`), leave them open (`Some(false)`), or as the scan is.
+    /// Close holes (`Some(true)`), leave them open (`Some(false)`), or as the scan is: those of a closed one are closed, of
+    /// an open one the small ones.
     pub close: Option<bool>,
 }
 
@@ -51,6 +54,8 @@ pub struct ScanMeshed {
     pub specks: usize,
     /// Whether holes were closed.
     pub closed: bool,
+    /// Small holes of an open scan that got a lid.
+    pub lids: usize,
     /// Root mean square and mean distance of the raw points to the mesh, world units.
     pub to_points: (f64, f64),
 }
@@ -61,6 +66,8 @@ const CELL_SPACINGS: f64 = 1.6;
 const CELL_NOISE: f64 = 1.0;
 /// Cells are at most this many gaps between close sheets wide: walls thinner than a cell break.
 const CELL_GAPS: f64 = 0.6;
+/// Sheets closer than this many noise levels cannot be told from one that was scanned twice and misplaced.
+const TOLD_NOISE: f64 = 4.0;
 /// But not finer than this share of what suits the points: 16 times as many cells.
 const FINEST: f64 = 0.25;
 /// Components below this share of the area of the largest are specks of noise.
@@ -73,7 +80,7 @@ const MEASURED: usize = 50_000;
 /// The edge of a cell that suits the samples.
 pub fn voxel_for(samples: &Samples) -> f64 {
     let usual = (CELL_SPACINGS * samples.spacing).max(CELL_NOISE * samples.noise);
-    usual.min(CELL_GAPS * samples.gap).max(FINEST * usual)
+    usual.min(CELL_GAPS * samples.gap.max(TOLD_NOISE * samples.noise)).max(FINEST * usual)
 }
 
 /// Meshes a scan.
@@ -90,8 +97,11 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
     };
     let sampling = Sampling { spacing, memory: params.memory };
     let mut meshed = contour::from_field(&field, sampling, &params.contour, &Share { observer, from: 0.6, to: 0.95 })?;
+    let mut lids = 0;
     if !closed {
-        part(&mut meshed.extracted.mesh, &mut meshed.extracted.tags);
+        let points: Vec<DVec3> = scan.points.iter().copied().filter(|p| p.is_finite()).collect();
+        let contour::Extracted { mesh, tags, .. } = &mut meshed.extracted;
+        lids = finish(mesh, tags, &points, meshed.lattice.step.x, params.close.is_none());
     }
     let mut reached = reach(scan, &meshed.extracted.mesh);
     let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags, &reached);
@@ -102,7 +112,7 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
     let squares = reached.iter().map(|r| r.0 * r.0).sum::<f64>();
     let to_points = ((squares / n).sqrt(), reached.iter().map(|r| r.0).sum::<f64>() / n);
     observer.progress(1.0);
-    Ok(ScanMeshed { samples, meshed, specks, closed, to_points })
+    Ok(ScanMeshed { samples, meshed, specks, closed, lids, to_points })
 }
 
 /// A surface fitted to a scan follows its mesh to this share of the noise, within these shares of the diagonal.
@@ -137,24 +147,6 @@ impl Observer for Share<'_> {
     fn cancelled(&self) -> bool {
         self.observer.cancelled()
     }
-}
-
-/// Parts surfaces that touch in a point, as they do where what is known of a scan ends.
-fn part(mesh: &mut TriMesh, tags: &mut FeatureTags) {
-    let (parted, source) = part_fans(mesh);
-    if parted.points.len() == mesh.points.len() {
-        return;
-    }
-    let sharp = |[a, b]: [u32; 2]| {
-        let (a, b) = (source[a as usize], source[b as usize]);
-        tags.edges.binary_search(&[a.min(b), a.max(b)]).is_ok()
-    };
-    let sides = parted.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-    let mut edges: Vec<[u32; 2]> = sides.filter(|s| sharp(*s)).map(|[a, b]| [a.min(b), a.max(b)]).collect();
-    edges.sort_unstable();
-    edges.dedup();
-    *tags = FeatureTags { vertices: source.iter().map(|&v| tags.vertices[v as usize]).collect(), edges };
-    *mesh = parted;
 }
 
 /// Leaves out the components whose area is next to nothing, or which hardly any point stands for; returns how many.
@@ -218,6 +210,7 @@ pub fn scan_figures(made: &ScanMeshed, quality: &mut Quality, warnings: &mut Vec
     sample_figures(&made.samples, quality, warnings);
     quality.insert("scan.specks".into(), Figure::Count(made.specks as u64));
     quality.insert("scan.closed".into(), Figure::Flag(made.closed));
+    quality.insert("scan.lids".into(), Figure::Count(made.lids as u64));
     for (key, x) in [("rms", made.to_points.0), ("mean", made.to_points.1)] {
         quality.insert(format!("scan.to_mesh_{key}"), Figure::Number(x));
         quality.insert(format!("scan.to_mesh_{key}_rel"), Figure::Number(x / made.samples.diagonal));

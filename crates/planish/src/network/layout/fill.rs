@@ -72,7 +72,9 @@ impl<'a> Scale<'a> {
         let mut cost: f64 = change.cells.iter().map(|&c| self.costs[c as usize]).sum();
         cost += self.another * change.cells.len() as f64;
         if let Some(node) = change.center {
-            let half = complex.star(node)[0];
+            // All arcs at the node are smooth and go: it has one sector.
+            let arc = change.removed[0];
+            let half = if complex.from(2 * arc) == node { 2 * arc } else { 2 * arc + 1 };
             cost += self.sectors.cost(self.sectors.of[half as usize], 0.0);
         }
         cost

@@ -41,7 +41,7 @@ pub(super) fn relax(bench: &mut Bench, observer: &dyn Observer) -> Result<(), La
     let cancelled = || if observer.cancelled() { Err(LayoutError::Cancelled) } else { Ok(()) };
     let nodes: Vec<u32> = (0..bench.complex.nodes.len() as u32).collect();
     cancelled()?;
-    bench.sweep(&nodes, |complex, n| star_change(complex, &complex.star(n)));
+    bench.sweep(&nodes, |complex, stars, n| star_change(complex, &stars[n as usize]));
     straighten(bench, observer)?;
     cancelled()?;
     slide::slide(bench, &nodes);
@@ -54,7 +54,7 @@ pub(super) fn straighten(bench: &mut Bench, observer: &dyn Observer) -> Result<(
         return Err(LayoutError::Cancelled);
     }
     let arcs: Vec<u32> = bench.complex.live_arcs().collect();
-    bench.sweep(&arcs, arc_change);
+    bench.sweep(&arcs, |complex, _, a| arc_change(complex, a));
     Ok(())
 }
 

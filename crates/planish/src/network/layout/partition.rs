@@ -304,8 +304,9 @@ impl<'a> Ground<'a> {
         }
         wanted.extend(self.meetings(label, distance, &barrier, &bad));
         if eager {
-            let bad: Vec<u32> = wanted.iter().map(|&f| label[f as usize]).collect();
-            wanted.extend((0..label.len() as u32).filter(|&f| f % 7 == 0 && bad.contains(&label[f as usize])));
+            let mut bad = vec![false; count];
+            wanted.iter().for_each(|&f| bad[label[f as usize] as usize] = true);
+            wanted.extend((0..label.len() as u32).filter(|&f| f % 7 == 0 && bad[label[f as usize] as usize]));
         }
         wanted.sort_unstable();
         wanted.dedup();
@@ -330,12 +331,14 @@ pub(super) fn partition(
         sites = ground.middles(&label, sites.len());
     }
     let (mut label, mut distance) = ground.cells(&sites);
+    let mut is_site = vec![false; label.len()];
+    sites.iter().for_each(|&f| is_site[f as usize] = true);
     for round in 0.. {
         if observer.cancelled() {
             return Err(LayoutError::Cancelled);
         }
         let mut wanted = ground.wanted(&label, &distance, sites.len(), round >= GENTLE_ROUNDS);
-        wanted.retain(|f| !sites.contains(f));
+        wanted.retain(|&f| !std::mem::replace(&mut is_site[f as usize], true));
         if wanted.is_empty() {
             return Ok((label, sites.len()));
         }

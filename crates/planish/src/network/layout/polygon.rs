@@ -14,7 +14,7 @@ use crate::network::CurveKind;
 use crate::network::imprint::{Place, half_edge};
 use glam::DVec3;
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 
 /// Cost of a cell too many or too few around a node, against a quad whose corners are all 45 degrees off.
 pub(super) const VALENCE_COST: f64 = 1.5;
@@ -168,6 +168,7 @@ pub(super) struct Sectors {
 impl Sectors {
     pub fn new(mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex) -> Sectors {
         let mut sectors = Sectors { of: vec![NONE; 2 * complex.arcs.len()], ideal: Vec::new(), count: Vec::new() };
+        let beside = fixed_neighbours(complex);
         for star in complex.stars() {
             if star.is_empty() {
                 continue;
@@ -187,7 +188,7 @@ impl Sectors {
                     for i in 0..s {
                         let h = star[(begin + i) % s];
                         if fixed(h) && complex.cell(h) != NONE {
-                            let angle = sector_angle(mesh, adjacency, complex, h);
+                            let angle = sector_angle(mesh, adjacency, complex, &beside, h);
                             sectors.ideal.push((angle / std::f64::consts::FRAC_PI_2).round().max(1.0));
                             sectors.count.push(0.0);
                         }
@@ -211,13 +212,19 @@ impl Sectors {
 }
 
 /// Surface angle (radians) at the start of fixed half-arc `h`, to its left up to the next fixed edge.
-fn sector_angle(mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex, h: u32) -> f64 {
+fn sector_angle(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    complex: &Complex,
+    beside: &BTreeMap<u32, Vec<u32>>,
+    h: u32,
+) -> f64 {
     let arc = complex.arc(h);
     let chain = &arc.chain;
     let (first, second) =
         if h.is_multiple_of(2) { (chain[0], chain[1]) } else { (chain[chain.len() - 1], chain[chain.len() - 2]) };
     let (Place::Vertex(v), Place::Vertex(w)) = (first, second) else { return std::f64::consts::PI };
-    let fixed = fixed_neighbours(complex, v);
+    let fixed = beside.get(&v).map_or(&[][..], |f| f);
     let Some(mut e) = half_edge(&mesh.triangles, adjacency, v, w) else { return std::f64::consts::PI };
     let p = mesh.points[v as usize];
     let mut angle = 0.0;
@@ -235,16 +242,14 @@ fn sector_angle(mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex, h: u32
     }
 }
 
-/// Vertices next to vertex `v` along fixed arcs that end there.
-fn fixed_neighbours(complex: &Complex, v: u32) -> Vec<u32> {
-    let mut found = Vec::new();
+/// For each vertex where fixed arcs end the vertices next to it along them.
+fn fixed_neighbours(complex: &Complex) -> BTreeMap<u32, Vec<u32>> {
+    let mut found: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for arc in complex.arcs.iter().flatten().filter(|a| a.kind != CurveKind::Smooth) {
         let n = arc.chain.len();
         for (end, beside) in [(arc.chain[0], arc.chain[1]), (arc.chain[n - 1], arc.chain[n - 2])] {
-            if let (Place::Vertex(x), Place::Vertex(w)) = (end, beside)
-                && x == v
-            {
-                found.push(w);
+            if let (Place::Vertex(v), Place::Vertex(w)) = (end, beside) {
+                found.entry(v).or_default().push(w);
             }
         }
     }

@@ -557,15 +557,16 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Makes the changes that `plan` builds for `items`, in batches of disjoint ones.
-    pub fn sweep(&mut self, items: &[u32], plan: impl Fn(&Complex, u32) -> Option<Change>) -> usize {
+    /// Makes the changes that `plan` builds for `items`, given the stars of all nodes, in batches of disjoint ones.
+    pub fn sweep(&mut self, items: &[u32], plan: impl Fn(&Complex, &[Vec<u32>], u32) -> Option<Change>) -> usize {
         let mut waiting = items.to_vec();
         let mut made = 0;
         while !waiting.is_empty() {
             let mut taken = vec![false; self.complex.cells.len()];
             let (mut now, mut later) = (Vec::new(), Vec::new());
+            let stars = self.complex.stars();
             for &item in &waiting {
-                let Some(change) = plan(&self.complex, item) else { continue };
+                let Some(change) = plan(&self.complex, &stars, item) else { continue };
                 if change.cells.iter().any(|&c| taken[c as usize]) {
                     later.push(item);
                     continue;

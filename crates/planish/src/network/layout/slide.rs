@@ -35,16 +35,17 @@ pub(super) fn slide(bench: &mut Bench, nodes: &[u32]) -> usize {
     while !waiting.is_empty() {
         let mut taken = vec![false; bench.complex.cells.len()];
         let (mut now, mut later) = (Vec::new(), Vec::new());
+        let stars = bench.complex.stars();
         for &node in &waiting {
-            let star = bench.complex.star(node);
+            let star = &stars[node as usize];
             if star.iter().any(|&h| {
                 [h, h ^ 1].iter().any(|&g| taken.get(bench.complex.cell(g) as usize).copied().unwrap_or(false))
             }) {
                 later.push(node);
                 continue;
             }
-            let Some(slide) = plan(bench.mesh, &bench.complex, &star) else { continue };
-            for &h in &star {
+            let Some(slide) = plan(bench.mesh, &bench.complex, star) else { continue };
+            for &h in star {
                 for g in [h, h ^ 1] {
                     if let Some(t) = taken.get_mut(bench.complex.cell(g) as usize) {
                         *t = true;

@@ -1,0 +1,161 @@
+//! Small holes of a surface, closed with lids that go on as the surface does.
+//!
+//! A hole is told from the rim of a piece by what lies around it: more surface than fits within its rim, and a surface that
+//! looks the way a lid would. The end of a pipe is no hole, for its sides look away from its axis.
+
+use super::lids::{Lid, least_area, lid};
+use super::{Adjacency, FeatureKind, FeatureTags, TriMesh, boundary_loops, components, next};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// A piece has at least this many times the area of a disk with the rim of its hole.
+const PIECE: f64 = 4.0;
+/// Area vector of a lid, along the mean of the normals around, over the area of the lid; one for a hole in a plane.
+const FACING: f64 = 0.3;
+/// Holes of so few edges are cracks, whatever lies around them.
+const CRACK: usize = 6;
+/// The first triangles of a lid cost the third power of the edges around.
+const MOST_EDGES: usize = 400;
+
+/// Closes the holes of an oriented manifold that are at most `longest` around; returns their number.
+pub fn close_holes(mesh: &mut TriMesh, tags: &mut FeatureTags, longest: f64) -> usize {
+    let adjacency = Adjacency::new(mesh);
+    let (piece, pieces) = components(&adjacency);
+    let mut area = vec![0.0; pieces];
+    (0..mesh.triangles.len()).for_each(|t| area[piece[t] as usize] += mesh.area(t));
+    let loops = boundary_loops(&adjacency);
+    let made: Vec<Option<(Vec<u32>, Lid)>> = loops
+        .par_iter()
+        .map(|around| {
+            let length: f64 = around.iter().map(|&h| step(mesh, h).length()).sum();
+            let disk = length * length / (4.0 * std::f64::consts::PI);
+            if length > longest
+                || around.len() > MOST_EDGES
+                || area[piece[around[0] as usize / 3] as usize] < PIECE * disk
+            {
+                return None;
+            }
+            // A lid runs against the edges of its hole.
+            let rim: Vec<u32> = around.iter().rev().map(|&h| mesh.origin(h)).collect();
+            lid_over(mesh, &adjacency, around, &rim).map(|lid| (rim, lid))
+        })
+        .collect();
+    let mut count = 0;
+    for (rim, lid) in made.into_iter().flatten() {
+        let first = mesh.points.len() as u32;
+        let name = |v: u32| rim.get(v as usize).copied().unwrap_or_else(|| first + v - rim.len() as u32);
+        mesh.triangles.extend(lid.triangles.iter().map(|t| t.map(name)));
+        let own = &lid.points[rim.len()..];
+        mesh.points.extend(own);
+        tags.vertices.extend(own.iter().map(|_| FeatureKind::None));
+        for a in &mut mesh.attributes {
+            let at = |v: u32, k: usize| a.values[v as usize * a.width + k];
+            let mean = |k: usize| rim.iter().map(|&v| at(v, k)).sum::<f32>() / rim.len() as f32;
+            let value: Vec<f32> = (0..a.width).map(mean).collect();
+            own.iter().for_each(|_| a.values.extend(&value));
+        }
+        count += 1;
+    }
+    count
+}
+
+fn step(mesh: &TriMesh, h: u32) -> DVec3 {
+    mesh.points[mesh.origin(next(h)) as usize] - mesh.points[mesh.origin(h) as usize]
+}
+
+/// The lid over a rim, if that is a hole of the surface around.
+fn lid_over(mesh: &TriMesh, adjacency: &Adjacency, around: &[u32], rim: &[u32]) -> Option<Lid> {
+    let n = rim.len();
+    let points: Vec<DVec3> = rim.iter().map(|&v| mesh.points[v as usize]).collect();
+    let beside: Vec<Vec<u32>> = rim
+        .iter()
+        .map(|&v| {
+            let ring = adjacency.fan(v).flat_map(|h| mesh.triangles[h as usize / 3]);
+            let mut ring: Vec<u32> = ring.filter(|&w| w != v).collect();
+            ring.sort_unstable();
+            ring.dedup();
+            ring
+        })
+        .collect();
+    let taken = |i: usize, j: usize| {
+        let next_to = j == i + 1 || (i == 0 && j == n - 1);
+        !next_to && beside[i].binary_search(&rim[j]).is_ok()
+    };
+    let flat = least_area(&points, taken)?;
+    if n > CRACK {
+        let area: f64 = flat.iter().map(|t| cross(&points, t).length()).sum();
+        let lid: DVec3 = flat.iter().map(|t| cross(&points, t)).sum();
+        let sides: DVec3 = around.iter().map(|&h| mesh.area_vector(h as usize / 3)).sum();
+        let size: f64 = around.iter().map(|&h| mesh.area_vector(h as usize / 3).length()).sum();
+        if !(lid.dot(sides) > FACING * area * size) {
+            return None;
+        }
+    }
+    let beside: Vec<Vec<DVec3>> = (0..n)
+        .map(|k| {
+            let on_rim = [rim[(k + 1) % n], rim[(k + n - 1) % n]];
+            beside[k].iter().filter(|w| !on_rim.contains(w)).map(|&w| mesh.points[w as usize]).collect()
+        })
+        .collect();
+    Some(lid(&points, &beside, &flat))
+}
+
+/// Twice the area vector of a triangle of a lid.
+fn cross(points: &[DVec3], t: &[usize; 3]) -> DVec3 {
+    (points[t[1]] - points[t[0]]).cross(points[t[2]] - points[t[0]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{diagnose, shapes};
+
+    /// The sphere of radius 1 without the triangles that have a corner within `radius` of the north pole.
+    fn holed_sphere(radius: f64) -> TriMesh {
+        let mut mesh = shapes::sphere(1.0, 5);
+        let points = &mesh.points;
+        mesh.triangles.retain(|t| t.iter().all(|&v| points[v as usize].distance(DVec3::Z) > radius));
+        crate::mesh::repair(&mesh).unwrap().0
+    }
+
+    #[test]
+    fn the_lid_of_a_sphere_lies_within_2_percent_of_the_radius_and_is_as_fine_as_the_sphere() {
+        let mut mesh = holed_sphere(0.25);
+        let before = mesh.triangles.len();
+        let kept = mesh.points.clone();
+        let mut tags = FeatureTags::from_edges(mesh.points.len(), []);
+        assert_eq!(close_holes(&mut mesh, &mut tags, 2.0), 1);
+        let facts = diagnose(&mesh);
+        assert!(facts.watertight && facts.manifold && facts.genus == Some(0));
+        assert_eq!(tags.vertices.len(), mesh.points.len());
+        assert_eq!(mesh.points[..kept.len()], kept);
+        let off = mesh.points.iter().map(|p| (p.length() - 1.0).abs()).fold(0.0, f64::max);
+        assert!(off < 0.02, "{off}");
+        // As many triangles as the part of the sphere had, a third more or less.
+        let (made, gone) = (mesh.triangles.len() - before, shapes::sphere(1.0, 5).triangles.len() - before);
+        assert!(made * 3 > gone * 2 && made * 3 < gone * 4, "{made} for {gone}");
+        for t in before..mesh.triangles.len() {
+            let out = mesh.corners(t).into_iter().sum::<DVec3>().normalize();
+            assert!(mesh.normal(t).dot(out) > 0.9, "triangle {t}");
+        }
+    }
+
+    #[test]
+    fn long_holes_ends_of_pipes_and_the_rims_of_pieces_stay_open() {
+        let mut mesh = holed_sphere(0.25);
+        let mut tags = FeatureTags::from_edges(mesh.points.len(), []);
+        assert_eq!(close_holes(&mut mesh, &mut tags, 1.0), 0);
+        let mut sheet = shapes::rectangle(1.0, 1.0, 10, 10);
+        assert_eq!(close_holes(&mut sheet, &mut FeatureTags::from_edges(121, []), 100.0), 0);
+        let mut pipe = shapes::cylinder(0.1, 4.0, 48);
+        let caps = pipe.clone();
+        pipe.triangles.retain(|t| {
+            let z = t.map(|v| caps.points[v as usize].z);
+            z.iter().any(|&a| (a - z[0]).abs() > 1e-9)
+        });
+        let (mut pipe, _) = crate::mesh::repair(&pipe).unwrap();
+        let mut tags = FeatureTags::from_edges(pipe.points.len(), []);
+        assert_eq!(diagnose(&pipe).boundary_loops, 2);
+        assert_eq!(close_holes(&mut pipe, &mut tags, 100.0), 0);
+    }
+}

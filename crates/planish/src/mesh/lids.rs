@@ -1,0 +1,215 @@
+//! Lids over loops of a surface.
+//!
+//! 1. triangles of least area (Barequet and Sharir 1995, *Filling Gaps in the Boundary of a Polyhedron*)
+//! 2. edges longer than those around are split, and edges flipped to Delaunay's, until the lid is as fine as the surface
+//!    (Liepa 2003, *Filling Holes in Meshes*, §4)
+//! 3. new vertices go where the surface bends least (the same, §5): least squares of the umbrellas of all vertices of the
+//!    lid, those of the rim with their neighbours in the surface, so that the lid goes on as the surface comes in
+//!
+//! Departs from Liepa: edges are split in their middles, which needs no test of triangles; neighbours weigh by the inverse
+//! of their distance, as rims of scans have short and long edges.
+
+use super::{Adjacency, NONE, next, previous};
+use crate::linalg::SparseCholesky;
+use glam::DVec3;
+use std::collections::BTreeMap;
+
+/// An edge this many times the usual length is split: its halves are then as far below it.
+const LONG: f64 = 1.4;
+/// Rounds of splitting; each halves the longest edges.
+const ROUNDS: usize = 16;
+/// Rounds of flipping after each; most lids settle in three.
+const FLIPS: usize = 8;
+/// Neighbours closer than this share of the usual length weigh no more.
+const CLOSEST: f64 = 0.1;
+
+/// Triangles of least area over a loop of points, as places in it, counter-clockwise as the loop runs. `None` where all
+/// would use an edge that is `taken`. Cubic in the number of points.
+pub(super) fn least_area(points: &[DVec3], taken: impl Fn(usize, usize) -> bool) -> Option<Vec<[usize; 3]>> {
+    let n = points.len();
+    let mut cost = vec![vec![(0.0, 0usize); n]; n];
+    for gap in 2..n {
+        for i in 0..n - gap {
+            let k = i + gap;
+            let mut best = (f64::INFINITY, 0);
+            if !taken(i, k) {
+                for j in i + 1..k {
+                    let area = (points[j] - points[i]).cross(points[k] - points[i]).length() / 2.0;
+                    let sum = cost[i][j].0 + cost[j][k].0 + area;
+                    if sum < best.0 {
+                        best = (sum, j);
+                    }
+                }
+            }
+            cost[i][k] = best;
+        }
+    }
+    if !cost[0][n - 1].0.is_finite() {
+        return None;
+    }
+    let mut out = Vec::new();
+    let mut open = vec![(0, n - 1)];
+    while let Some((i, k)) = open.pop() {
+        if k > i + 1 {
+            let j = cost[i][k].1;
+            out.push([i, j, k]);
+            open.extend([(i, j), (j, k)]);
+        }
+    }
+    Some(out)
+}
+
+/// A lid: the points of its rim, then its own, and triangles over both.
+pub(super) struct Lid {
+    pub points: Vec<DVec3>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// The lid of the triangles `flat` over a rim, as fine and as smooth as the surface around.
+/// * `beside` - for each point of the rim its neighbours in the surface, without those of the rim
+pub(super) fn lid(rim: &[DVec3], beside: &[Vec<DVec3>], flat: &[[usize; 3]]) -> Lid {
+    let n = rim.len();
+    let mut lid = Lid { points: rim.to_vec(), triangles: flat.iter().map(|t| t.map(|v| v as u32)).collect() };
+    let around = (0..n).flat_map(|k| beside[k].iter().map(move |p| p.distance(rim[k])));
+    let (sum, count) = around.fold((0.0, 0.0), |(sum, count), d| (sum + d, count + 1.0));
+    let length = if sum > 0.0 { sum / count } else { return lid };
+    for _ in 0..ROUNDS {
+        let split = split(&mut lid, LONG * length);
+        for _ in 0..FLIPS {
+            if flip(&mut lid, n as u32) == 0 {
+                break;
+            }
+        }
+        if split == 0 {
+            break;
+        }
+    }
+    smooth(&mut lid, n, beside, length);
+    lid
+}
+
+/// Splits inner edges longer than `longest`, at most one of each triangle; returns their number.
+fn split(lid: &mut Lid, longest: f64) -> usize {
+    let adjacency = Adjacency::of(&lid.triangles, lid.points.len());
+    let from = |t: &[[u32; 3]], h: u32| t[h as usize / 3][h as usize % 3];
+    let length = |h: u32| {
+        let [a, b] = [from(&lid.triangles, h), from(&lid.triangles, next(h))];
+        lid.points[a as usize].distance(lid.points[b as usize])
+    };
+    let inner = (0..adjacency.opposite.len() as u32).filter(|&h| {
+        let g = adjacency.opposite[h as usize];
+        g != NONE && h < g && length(h) > longest
+    });
+    let mut long: Vec<u32> = inner.collect();
+    long.sort_by(|&g, &h| length(h).total_cmp(&length(g)).then(g.cmp(&h)));
+    let mut busy = vec![false; lid.triangles.len()];
+    let mut count = 0;
+    for h in long {
+        let g = adjacency.opposite[h as usize];
+        if busy[h as usize / 3] || busy[g as usize / 3] {
+            continue;
+        }
+        let [a, b] = [from(&lid.triangles, h), from(&lid.triangles, g)];
+        let [c, d] = [h, g].map(|e| from(&lid.triangles, previous(e)));
+        let middle = lid.points.len() as u32;
+        lid.points.push(lid.points[a as usize].midpoint(lid.points[b as usize]));
+        lid.triangles[h as usize / 3] = [a, middle, c];
+        lid.triangles[g as usize / 3] = [b, middle, d];
+        lid.triangles.extend([[middle, b, c], [middle, a, d]]);
+        busy[h as usize / 3] = true;
+        busy[g as usize / 3] = true;
+        count += 1;
+    }
+    count
+}
+
+/// Flips inner edges whose opposite angles are more than two right ones, at most one of each triangle; returns their
+/// number. No edge joins two of the first `n` points, the rim: the surface may have it.
+fn flip(lid: &mut Lid, n: u32) -> usize {
+    let adjacency = Adjacency::of(&lid.triangles, lid.points.len());
+    let Lid { points, triangles } = lid;
+    let mut busy = vec![false; triangles.len()];
+    let mut count = 0;
+    for h in 0..adjacency.opposite.len() as u32 {
+        let g = adjacency.opposite[h as usize];
+        if g == NONE || g < h || busy[h as usize / 3] || busy[g as usize / 3] {
+            continue;
+        }
+        let at = |h: u32| triangles[h as usize / 3][h as usize % 3];
+        let [a, b, c, d] = [at(h), at(g), at(previous(h)), at(previous(g))];
+        let [pa, pb, pc, pd] = [a, b, c, d].map(|v| points[v as usize]);
+        let angle = (pa - pc).angle_between(pb - pc) + (pa - pd).angle_between(pb - pd);
+        let joined = c.max(d) < n || adjacency.fan(c).any(|e| [at(next(e)), at(previous(e))].contains(&d));
+        if angle > std::f64::consts::PI * (1.0 + 1e-6) && !joined {
+            triangles[h as usize / 3] = [a, d, c];
+            triangles[g as usize / 3] = [d, b, c];
+            busy[h as usize / 3] = true;
+            busy[g as usize / 3] = true;
+            count += 1;
+        }
+    }
+    count
+}
+
+/// Moves the points of a lid behind its first `n`, its rim, where the umbrellas of all are least. They stay where they are
+/// if that is not decided.
+fn smooth(lid: &mut Lid, n: usize, beside: &[Vec<DVec3>], length: f64) {
+    let free = lid.points.len() - n;
+    if free == 0 {
+        return;
+    }
+    let mut edges: Vec<[u32; 2]> = lid
+        .triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+        .flat_map(|[a, b]| [[a, b], [b, a]])
+        .collect();
+    edges.sort_unstable();
+    edges.dedup();
+    let weight = |d: f64| length / d.max(CLOSEST * length);
+    // Rows of the least squares: what an umbrella takes from free points, and its fixed rest.
+    let mut lower: BTreeMap<(usize, usize), f64> = BTreeMap::new();
+    let mut right = vec![0.0; 3 * free];
+    for own in edges.chunk_by(|x, y| x[0] == y[0]) {
+        let v = own[0][0] as usize;
+        let p = lid.points[v];
+        let mut row: Vec<(usize, f64)> = Vec::new();
+        let (mut rest, mut total) = (DVec3::ZERO, 0.0);
+        for &[_, w] in own {
+            let q = lid.points[w as usize];
+            let share = weight(p.distance(q));
+            total += share;
+            match (w as usize).checked_sub(n) {
+                Some(free) => row.push((free, share)),
+                None => rest += share * q,
+            }
+        }
+        for q in beside.get(v).into_iter().flatten() {
+            let share = weight(p.distance(*q));
+            total += share;
+            rest += share * *q;
+        }
+        match v.checked_sub(n) {
+            Some(free) => row.push((free, -total)),
+            None => rest -= total * p,
+        }
+        let scale = 1.0 / total;
+        for &(i, a) in &row {
+            for &(j, b) in row.iter().filter(|x| x.0 <= i) {
+                *lower.entry((i, j)).or_default() += a * b * scale * scale;
+            }
+            for k in 0..3 {
+                right[k * free + i] -= a * rest[k] * scale * scale;
+            }
+        }
+    }
+    let lower: Vec<(usize, usize, f64)> = lower.into_iter().map(|((i, j), a)| (i, j, a)).collect();
+    if let Ok(factor) = SparseCholesky::factor(free, &lower) {
+        factor.solve(&mut right);
+        if right.iter().all(|x| x.is_finite()) {
+            for i in 0..free {
+                lid.points[n + i] = DVec3::new(right[i], right[free + i], right[2 * free + i]);
+            }
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! The mesh of an open scan, finished: without what no point stands for, without specks, its rims smooth and its small
+//! holes closed.
+//!
+//! A field is known as far as the widest support reaches, so the mesh of an open scan hangs over its data by several
+//! spacings and ends in the steps of cells.
+//! 1. cold comes in from the rim and from where no raw point is near, along the surface and for a while; what gets cold is cut
+//!    off along a line of one temperature ([`mesh::trim`]): the steps of the rim, its tongues and spikes
+//! 2. small holes are closed before, so that they do not grow, and after ([`mesh::close_holes`])
+
+use crate::geom::KdTree;
+use crate::mesh::{self, FEATURE, FeatureTags, TriMesh, part_fans};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// A hole is small if it is at most this share of the diagonal around: less than a thirtieth wide, half of a patch.
+pub const SMALL_HOLE: f64 = 0.1;
+/// The surface reaches so many times as far from a raw point as its eighth neighbour is: one and a half times as far as a
+/// surface between points has to.
+const REACH: f64 = 2.0;
+/// And so many cells, whatever the points: what they say of the next cell is sure.
+const CELLS: f64 = 1.5;
+/// Neighbours of a raw point that tell its density.
+const NEIGHBOURS: usize = 9;
+/// Rounds of warming each vertex by its neighbours: cold gets 2.8 cells far, and steps of cells are gone.
+const ROUNDS: usize = 32;
+/// What is colder than this is cut off, the surface being at one and the rim at zero: a cell of a straight rim, strips
+/// narrower than five.
+const COLD: f64 = 0.3;
+
+/// Trims the mesh of an open scan; with `lids` closes its small holes. Returns how many were closed.
+pub(super) fn finish(mesh: &mut TriMesh, tags: &mut FeatureTags, points: &[DVec3], voxel: f64, lids: bool) -> usize {
+    let longest = SMALL_HOLE * mesh.bounds().diagonal();
+    part(mesh, tags);
+    let seen = mesh.points.len();
+    let mut closed = if lids { mesh::close_holes(mesh, tags, longest) } else { 0 };
+    let warmth = warmth(mesh, seen, points, voxel);
+    mesh::trim(mesh, tags, &warmth.iter().map(|w| w - COLD).collect::<Vec<f64>>());
+    part(mesh, tags);
+    if lids {
+        closed += mesh::close_holes(mesh, tags, longest);
+    }
+    if let Some(a) = mesh.attributes.iter_mut().find(|a| a.name == FEATURE) {
+        *a = tags.attribute();
+    }
+    closed
+}
+
+/// How warm each vertex stays. Vertices from `seen` on belong to lids, which no points stand for.
+fn warmth(mesh: &TriMesh, seen: usize, points: &[DVec3], voxel: f64) -> Vec<f64> {
+    let adjacency = mesh::Adjacency::new(mesh);
+    let tree = KdTree::new(points);
+    let reach = reaches(&tree, points);
+    let cold: Vec<bool> = (0..mesh.points.len() as u32)
+        .into_par_iter()
+        .map(|v| {
+            let p = mesh.points[v as usize];
+            let far = |i: u32| p.distance(points[i as usize]) > (REACH * reach[i as usize]).max(CELLS * voxel);
+            adjacency.is_boundary_vertex(v) || ((v as usize) < seen && tree.closest(p).is_none_or(far))
+        })
+        .collect();
+    let mut warmth: Vec<f64> = cold.iter().map(|&c| if c { 0.0 } else { 1.0 }).collect();
+    let mut neighbours: Vec<[u32; 2]> =
+        mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, a], [b, c], [c, b], [c, a], [a, c]]).collect();
+    neighbours.par_sort_unstable();
+    neighbours.dedup();
+    let mut first = vec![0usize; mesh.points.len() + 1];
+    neighbours.iter().for_each(|n| first[n[0] as usize + 1] += 1);
+    (0..mesh.points.len()).for_each(|v| first[v + 1] += first[v]);
+    for _ in 0..ROUNDS {
+        warmth = (0..mesh.points.len())
+            .into_par_iter()
+            .map(|v| {
+                let around = &neighbours[first[v]..first[v + 1]];
+                if cold[v] || around.is_empty() {
+                    return warmth[v];
+                }
+                let sum: f64 = around.iter().map(|n| warmth[n[1] as usize]).sum();
+                0.5 * (warmth[v] + sum / around.len() as f64)
+            })
+            .collect();
+    }
+    warmth
+}
+
+/// For each raw point the distance of its eighth neighbour; the middle one of those of its neighbours, so that a point that
+/// lies alone does not count.
+fn reaches(tree: &KdTree, points: &[DVec3]) -> Vec<f64> {
+    let near = |p: DVec3, found: &mut Vec<(f64, u32)>| tree.nearest(p, NEIGHBOURS, found);
+    let own: Vec<f64> = points
+        .par_iter()
+        .map_init(Vec::new, |found, &p| {
+            near(p, found);
+            found.last().map_or(0.0, |f| f.0.sqrt())
+        })
+        .collect();
+    points
+        .par_iter()
+        .map_init(Vec::new, |found, &p| {
+            near(p, found);
+            let mut around: Vec<f64> = found.iter().map(|f| own[f.1 as usize]).collect();
+            around.sort_unstable_by(f64::total_cmp);
+            around.get(around.len() / 2).copied().unwrap_or(0.0)
+        })
+        .collect()
+}
+
+/// Parts surfaces that touch in a point, as they do where what is known of a scan ends.
+fn part(mesh: &mut TriMesh, tags: &mut FeatureTags) {
+    let (parted, source) = part_fans(mesh);
+    if parted.points.len() == mesh.points.len() {
+        return;
+    }
+    let sharp = |[a, b]: [u32; 2]| {
+        let (a, b) = (source[a as usize], source[b as usize]);
+        tags.edges.binary_search(&[a.min(b), a.max(b)]).is_ok()
+    };
+    let sides = parted.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let mut edges: Vec<[u32; 2]> = sides.filter(|s| sharp(*s)).map(|[a, b]| [a.min(b), a.max(b)]).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    *tags = FeatureTags { vertices: source.iter().map(|&v| tags.vertices[v as usize]).collect(), edges };
+    *mesh = parted;
+}
