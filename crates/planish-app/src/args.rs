@@ -182,10 +182,10 @@ pub struct ScanArgs {
 /// Holes of a scan.
 #[derive(Args, Clone, Debug, Default)]
 pub struct HoleArgs {
-    /// Leave holes of a scan open
+    /// Leave all holes of a scan open, also those that only noise and shadows made
     #[arg(long, conflicts_with = "close")]
     pub open: bool,
-    /// Close holes of a scan
+    /// Close all holes of a scan [default: all of a closed shape, the small ones of an open one]
     #[arg(long)]
     pub close: bool,
 }

@@ -267,6 +267,55 @@ fn a_hole_in_a_sphere_is_closed_within_a_tenth_of_the_radius_or_left_open() {
     assert!(!facts.watertight && facts.boundary_loops == 1, "{facts:?}");
 }
 
+/// Points of the sheet `z = .1 sin(4 x)` over the unit square, without those within `radius` of the middles of 25 squares.
+fn holed_sheet(radius: f64) -> Vec<DVec3> {
+    let points = (0..60_000u64).map(|i| {
+        let (x, y) = (random::unit(1, 2 * i), random::unit(1, 2 * i + 1));
+        DVec3::new(x, y, 0.1 * (4.0 * x).sin() + 0.0005 * normal(4, i))
+    });
+    let off = |x: f64| (5.0 * x).fract() - 0.5;
+    points.filter(|p| off(p.x).hypot(off(p.y)) > 5.0 * radius).collect()
+}
+
+#[test]
+fn small_holes_of_an_open_sheet_are_closed_within_a_hundredth_and_stay_when_asked_for() {
+    // 6 % of the diagonal around.
+    let points = holed_sheet(0.0135);
+    let params = ScanParams {
+        clean: CleanParams::default(),
+        contour: ContourParams::default(),
+        voxel: None,
+        resolution: None,
+        memory: 1 << 30,
+        close: None,
+    };
+    let made = mesh_scan(&Cloud::new(points.clone()), &params, &Silent).unwrap();
+    let mesh = made.meshed.extracted.mesh;
+    let facts = diagnose(&mesh);
+    assert!(!made.closed && facts.manifold, "{facts:?}");
+    assert_eq!((facts.components, facts.boundary_loops), (1, 1), "{} lids", made.lids);
+    let off = mesh.points.iter().map(|p| (p.z - 0.1 * (4.0 * p.x).sin()).abs()).fold(0.0, f64::max);
+    assert!(off < 0.01, "{off}");
+    assert_eq!(made.meshed.extracted.tags.vertices.len(), mesh.points.len());
+    assert_eq!(diagnose(&meshed(points, Some(false))).boundary_loops, 26);
+}
+
+#[test]
+fn an_open_sheet_ends_within_four_spacings_of_its_points_and_large_holes_stay() {
+    // 16 % of the diagonal around.
+    let points = holed_sheet(0.04);
+    let mesh = meshed(points.clone(), None);
+    assert_eq!(diagnose(&mesh).boundary_loops, 26);
+    let tree = planish::geom::KdTree::new(&points);
+    let far = planish::geom::nearest_distances(&tree, &mesh.points).into_iter().fold(0.0, f64::max);
+    // 48 000 points on a square of side 1.
+    assert!(far < 4.0 / 48_000f64.sqrt(), "{far}");
+    // And does not lose its rims: a spacing and a half of them on every side.
+    let area = 1.04 - 25.0 * std::f64::consts::PI * 0.04 * 0.04;
+    let found = diagnose(&mesh).area;
+    assert!((found / area - 1.0).abs() < 0.05, "{found} for {area}");
+}
+
 /// The mesh of a scan with default parameters.
 fn meshed(points: Vec<DVec3>, close: Option<bool>) -> TriMesh {
     let params = ScanParams {

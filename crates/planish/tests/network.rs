@@ -2,7 +2,7 @@
 
 mod common;
 
-use planish::mesh::{Adjacency, FacePoint, TriMesh, shapes, sharp_edges};
+use planish::mesh::{Adjacency, FacePoint, FeatureTags, TriMesh, close_holes, diagnose, shapes, sharp_edges};
 use planish::network::{
     Corner, Curve, CurveKind, ImprintError, LayoutError, LayoutParams, Network, Patch, Side, imprint, layout,
 };
@@ -135,6 +135,28 @@ fn a_pinhole_in_a_sphere_of_24_patches_adds_at_most_16() {
     mesh.triangles.remove(7);
     let pierced = layout(&mesh, &params(24), &Silent).unwrap().patches.len();
     assert!(pierced <= whole + 16, "{pierced} patches, {whole} without the hole");
+}
+
+#[test]
+fn a_sheet_of_24_patches_with_36_pinholes_has_at_most_8_more_once_they_are_closed_and_16_for_each_before() {
+    let whole = shapes::rectangle(6.0, 6.0, 60, 60);
+    let sheet = layout(&whole, &params(24), &Silent).unwrap().patches.len();
+    let low = whole.bounds().min;
+    let mut mesh = whole.clone();
+    // Two triangles around the middle of each of 36 squares of side 1.
+    mesh.triangles.retain(|t| {
+        let p = t.iter().map(|&v| whole.points[v as usize]).sum::<DVec3>() / 3.0 - low;
+        let off = |x: f64| (x.fract() - 0.45).abs();
+        off(p.x) > 0.05 || off(p.y) > 0.05
+    });
+    assert_eq!(whole.triangles.len() - mesh.triangles.len(), 72);
+    let pierced = layout(&mesh, &params(24), &Silent).unwrap().patches.len();
+    assert!(pierced <= sheet + 16 * 36, "{pierced} patches, {sheet} without holes");
+    let mut tags = FeatureTags::from_edges(mesh.points.len(), []);
+    assert_eq!(close_holes(&mut mesh, &mut tags, 1.0), 36);
+    assert_eq!(diagnose(&mesh).boundary_loops, 1);
+    let closed = layout(&mesh, &params(24), &Silent).unwrap().patches.len();
+    assert!(closed <= sheet + 8, "{closed} patches, {sheet} without holes");
 }
 
 #[test]

@@ -258,6 +258,9 @@ fn table(args: &Mesh, made: &Meshed, report: &Report) -> Summary {
     if let Some(noise) = report.figure("scan.noise") {
         table.row("noise", planish_io::report::distance(noise, report.input.diagonal, unit));
     }
+    if let Some(lids) = report.figure("scan.lids").filter(|&n| n > 0.0) {
+        table.row("holes", format!("{} small ones closed", count(lids as u64)));
+    }
     table.row("triangles", count(made.extracted.mesh.triangles.len() as u64));
     table.row("feature edges", count(made.extracted.tags.edges.len() as u64));
     table.row(

@@ -244,6 +244,9 @@ pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
             table.row("noise", length("scan.noise"));
             table.row("orientation", format!("{} of the evidence agrees", percent(figure("scan.confidence"))));
             table.row("points to mesh", format!("{} RMS", length("scan.to_mesh_rms")));
+            if figure("scan.lids") > 0.0 {
+                table.row("holes", format!("{} small ones closed", count(figure("scan.lids") as u64)));
+            }
             table.row("mesh", triangles);
         }
         None => {

@@ -34,7 +34,7 @@ pub struct Scale {
 }
 
 /// Figures of a scan in words: key, meaning, and how the value is read.
-const SCAN_FIGURES: [(&str, &str, Reading); 14] = [
+const SCAN_FIGURES: [(&str, &str, Reading); 15] = [
     ("scan.noise", "Noise of the points, standard deviation", Reading::Length),
     ("scan.spacing", "Distance of neighbouring points", Reading::Length),
     ("scan.samples", "Samples fitted to them", Reading::Plain),
@@ -44,6 +44,7 @@ const SCAN_FIGURES: [(&str, &str, Reading); 14] = [
     ("scan.outliers", "Outliers left out", Reading::Plain),
     ("scan.moved_rms", "Points moved onto the surface by, root mean square", Reading::Length),
     ("scan.closed", "Holes were closed", Reading::Plain),
+    ("scan.lids", "Small holes of an open scan that were closed", Reading::Plain),
     ("scan.specks", "Specks of noise left out", Reading::Plain),
     ("scan.to_mesh_rms", "Raw points to the mesh, root mean square", Reading::Length),
     ("scan.to_mesh_mean", "Raw points to the mesh, mean", Reading::Length),

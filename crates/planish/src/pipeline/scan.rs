@@ -66,8 +66,8 @@ const CELL_SPACINGS: f64 = 1.6;
 const CELL_NOISE: f64 = 1.0;
 /// Cells are at most this many gaps between close sheets wide: walls thinner than a cell break.
 const CELL_GAPS: f64 = 0.6;
-/// Sheets closer than this many noise levels cannot be told from one that was scanned twice and misplaced.
-const TOLD_NOISE: f64 = 4.0;
+/// Sheets closer than this many noise levels are one that was scanned twice, the scans a little apart.
+const TWICE: f64 = 2.5;
 /// But not finer than this share of what suits the points: 16 times as many cells.
 const FINEST: f64 = 0.25;
 /// Components below this share of the area of the largest are specks of noise.
@@ -80,7 +80,8 @@ const MEASURED: usize = 50_000;
 /// The edge of a cell that suits the samples.
 pub fn voxel_for(samples: &Samples) -> f64 {
     let usual = (CELL_SPACINGS * samples.spacing).max(CELL_NOISE * samples.noise);
-    usual.min(CELL_GAPS * samples.gap.max(TOLD_NOISE * samples.noise)).max(FINEST * usual)
+    let gap = if samples.gap < TWICE * samples.noise { f64::INFINITY } else { samples.gap };
+    usual.min(CELL_GAPS * gap).max(FINEST * usual)
 }
 
 /// Meshes a scan.
