@@ -11,6 +11,7 @@
 //! Belyaev and Seidel 2004, made symmetric) and moving single vertices into the kernel of their ring follow.
 
 use super::locate::orientation;
+use super::loosen::loosen;
 use super::{Fault, SideStops, side};
 use crate::geom::tolerance;
 use crate::linalg::SparseCholesky;
@@ -82,6 +83,9 @@ pub fn flatten(
         }
     }
     chart.solve_without_folds(&boundary, cancelled)?;
+    let length =
+        |k: usize| side::length(&patch.sides[k].iter().map(|&v| patch.mesh.points[v as usize]).collect::<Vec<_>>());
+    loosen(&mut chart, &boundary, DVec2::new(length(0) + length(2), length(1) + length(3)) / 2.0);
     Ok(chart)
 }
 

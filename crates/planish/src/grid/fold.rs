@@ -9,16 +9,26 @@ use super::Fault;
 use super::locate::Spot;
 use super::net::{Net, cell_corners, turns_over};
 use glam::DVec3;
+use std::collections::BTreeMap;
 
 /// Cells to each side over which the normal is averaged.
 const REACH: usize = 2;
-/// Sweeps over the folded cells.
-const SWEEPS: usize = 12;
-/// Moves that are tried, in cells, in each of [`DIRECTIONS`] directions.
-const STEPS: [f64; 4] = [0.6, 0.3, 0.15, 0.05];
-const DIRECTIONS: usize = 12;
-/// Sine of the corner up to which a fold is opened: clear of rounding, flat enough to be reached.
-const OPEN: f64 = 0.02;
+/// Folded cells, per point of the net, up to which they are opened one by one, and the part of those of a round
+/// that may be left for another.
+const FEW: f64 = 0.2;
+const WORTH: f64 = 0.75;
+/// Rounds of opening folds, each with a ring of cells more than the one before, and sweeps over the points in each.
+const ROUNDS: usize = 8;
+const RINGS: usize = 2;
+const SWEEPS: usize = 24;
+/// Moves that are tried, in cells; if all points moved by less than the last but one, they rest.
+const STEPS: [f64; 6] = [0.5, 0.25, 0.12, 0.06, 0.03, 0.01];
+const STILL: f64 = 0.03;
+/// Least area, in cells, that a corner is taken to have, and the part of the worst folded one's that it has besides.
+const LEAST_AREA: f64 = 1e-3;
+const FOLDED_SHARE: f64 = 0.2;
+/// Step of a finite difference, in cells.
+const DIFFERENCE: f64 = 1e-4;
 
 /// Grid points with the normal of the surface at each.
 pub struct Sheet<'a> {
@@ -31,23 +41,25 @@ pub struct Sheet<'a> {
 impl Sheet<'_> {
     /// Mean normals around cell `c`: of the cells, and of the surface at its corners.
     fn normals(&self, c: usize) -> [DVec3; 2] {
-        let (m, n) = (self.cols - 1, self.rows - 1);
-        let (i, j) = (c % m, c / m);
-        let mut sum = DVec3::ZERO;
-        for y in j.saturating_sub(REACH)..(j + REACH + 1).min(n) {
-            for x in i.saturating_sub(REACH)..(i + REACH + 1).min(m) {
-                let q = cell_corners(self.cols, y * m + x).map(|k| self.points[k]);
-                sum += (q[2] - q[0]).cross(q[3] - q[1]);
-            }
-        }
+        let sum = self.around(c).map(|q| (q[2] - q[0]).cross(q[3] - q[1])).sum::<DVec3>();
         let own = cell_corners(self.cols, c).into_iter().map(|k| (self.normal)(k)).sum::<DVec3>();
         [sum.normalize_or_zero(), own.normalize_or_zero()]
     }
 
+    /// Corners of the cells around cell `c`, itself among them.
+    fn around(&self, c: usize) -> impl Iterator<Item = [DVec3; 4]> {
+        let (m, n) = (self.cols - 1, self.rows - 1);
+        let (i, j) = (c % m, c / m);
+        let lines = j.saturating_sub(REACH)..(j + REACH + 1).min(n);
+        lines.flat_map(move |y| {
+            let places = i.saturating_sub(REACH)..(i + REACH + 1).min(m);
+            places.map(move |x| cell_corners(self.cols, y * m + x).map(|k| self.points[k]))
+        })
+    }
+
     /// Least sine of the corners of cell `c`, each seen along the better of `normals`: negative if the cell is folded.
     fn least_sine(&self, c: usize, normals: [DVec3; 2]) -> f64 {
-        let last = self.rows * self.cols - 1;
-        let ends = [0, self.cols - 1, last, last + 1 - self.cols];
+        let ends = ends(self.cols, self.rows);
         let k = cell_corners(self.cols, c);
         let sine = |n: usize| {
             let p = self.points[k[n]];
@@ -66,6 +78,11 @@ impl Sheet<'_> {
     }
 }
 
+/// Indices of the points at the corners of the patch.
+fn ends(cols: usize, rows: usize) -> [usize; 4] {
+    [0, cols - 1, rows * cols - 1, (rows - 1) * cols]
+}
+
 /// Indices of the folded cells of a net.
 pub fn folded_cells(net: &Net) -> Vec<usize> {
     sheet(net, &|k| net.chart.normal(net.spots[k])).folded_cells()
@@ -81,17 +98,50 @@ fn cells_around(cols: usize, k: usize) -> [usize; 4] {
     [first, first + 1, first + cols - 1, first + cols]
 }
 
-/// Opens folded cells: moves their points, one after the other, to where the worst corner around is best. True if there
-/// is none left for certain.
-pub fn open_folds(net: &mut Net, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<bool, Fault> {
-    let (cols, rows) = (net.cols, net.rows);
-    for sweep in 0..SWEEPS {
+/// Opens folded cells: lets the points around them move to where the cells keep their shape, as far as they do not turn
+/// over. `strictly`: nor turn over in the square, as nets that are made finer must not; a last net need not heed
+/// that where the chart bends what is straight. True if there is none left for certain.
+///
+/// Source: Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov 2021: the squares of the edges over twice the
+/// area, where an area that is not positive is taken for a small one; the smaller, the less is folded.
+pub fn open_folds(net: &mut Net, strictly: bool, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<bool, Fault> {
+    let mut before = (net.points.len() as f64 * FEW) as usize;
+    for round in 0..ROUNDS {
         let folded = folded_cells(net);
         if folded.is_empty() {
             return Ok(true);
         }
-        // A ring more every third sweep: where the folded cells are hemmed in, their neighbours must give way.
-        let ring = sweep / 3;
+        if folded.len() > before {
+            break;
+        }
+        before = before.min((folded.len() as f64 * WORTH) as usize);
+        let region = Region::new(net, &folded, RINGS + round);
+        for _ in 0..SWEEPS {
+            if cancelled() {
+                return Err(Fault::Cancelled);
+            }
+            if region.sweep(net, strictly) < STILL {
+                break;
+            }
+        }
+    }
+    Ok(false)
+}
+
+/// The points around folded cells, and how their cells are to be.
+struct Region {
+    nodes: Vec<usize>,
+    /// For each cell of the net around a node the normal that it is seen along.
+    normals: BTreeMap<usize, DVec3>,
+    /// Mean lengths of the edges along u and v: a cell is to have these.
+    size: [f64; 2],
+    /// What an area that is not positive is taken for, over that of such a cell.
+    least: f64,
+}
+
+impl Region {
+    fn new(net: &Net, folded: &[usize], ring: usize) -> Region {
+        let (cols, rows) = (net.cols, net.rows);
         let mut nodes: Vec<usize> = folded
             .iter()
             .flat_map(|&c| {
@@ -104,28 +154,94 @@ pub fn open_folds(net: &mut Net, cancelled: &(dyn Fn() -> bool + Sync)) -> Resul
             .collect();
         nodes.sort_unstable();
         nodes.dedup();
-        for k in nodes {
-            if cancelled() {
-                return Err(Fault::Cancelled);
-            }
-            open_around(net, k);
-        }
+        let normal = |k: usize| net.chart.normal(net.spots[k]);
+        let sheet = sheet(net, &normal);
+        let better = |c: usize| {
+            let [around, own] = sheet.normals(c);
+            let flat = sheet.least_sine(c, [around; 2]) >= sheet.least_sine(c, [own; 2]);
+            if flat { around } else { own }
+        };
+        let cells = nodes.iter().flat_map(|&k| cells_around(cols, k));
+        let normals = cells.map(|c| (c, better(c))).collect();
+        let mean = |stride: usize| {
+            let lengths = nodes.iter().map(|&k| net.points[k].distance(net.points[k + stride]));
+            (lengths.sum::<f64>() / nodes.len() as f64).max(f64::MIN_POSITIVE)
+        };
+        let mut region = Region { size: [mean(1), mean(cols)], nodes, normals, least: 0.0 };
+        let corners = region.normals.keys().flat_map(|&c| (0..4).map(move |k| (c, k)));
+        let worst = corners.filter_map(|(c, k)| region.corner(net, c, k)).map(|x| x.1).fold(0.0, f64::min);
+        region.least = LEAST_AREA.hypot(worst * FOLDED_SHARE);
+        region
     }
-    Ok(false)
+
+    /// Sum of the squares of both edges of corner `k` of cell `c`, and twice its area, in units of the
+    /// wanted; nothing at a corner of the patch.
+    fn corner(&self, net: &Net, c: usize, k: usize) -> Option<(f64, f64)> {
+        let q = cell_corners(net.cols, c);
+        if ends(net.cols, net.rows).contains(&q[k]) {
+            return None;
+        }
+        let at = |n: usize| net.points[q[n % 4]];
+        let (e, f) = (at(k + 1) - at(k), at(k + 3) - at(k));
+        let [a, b] = [self.size[k % 2], self.size[(k + 1) % 2]];
+        Some((e.length_squared() / (a * a) + f.length_squared() / (b * b), e.cross(f).dot(self.normals[&c]) / (a * b)))
+    }
+
+    /// Energy of the corners that the place of inner point `k` decides.
+    fn energy(&self, net: &Net, k: usize) -> f64 {
+        let mut sum = 0.0;
+        for (n, c) in cells_around(net.cols, k).into_iter().enumerate() {
+            // Corner of the cell at `k`; the one across does not see it.
+            let own = [2, 3, 1, 0][n];
+            for corner in (0..4).filter(|&x| x != (own + 2) % 4) {
+                if let Some((squares, area)) = self.corner(net, c, corner) {
+                    sum += squares / (area + area.hypot(self.least));
+                }
+            }
+        }
+        sum
+    }
+
+    /// Moves every node once; returns the longest move, in cells.
+    fn sweep(&self, net: &mut Net, strictly: bool) -> f64 {
+        let length = (self.size[0] * self.size[1]).sqrt();
+        let mut longest = 0.0f64;
+        for &k in &self.nodes {
+            let before = self.energy(net, k);
+            let start = net.points[k];
+            let normal = net.chart.normal(net.spots[k]);
+            let [s, t] = [normal.any_orthonormal_vector(), normal.cross(normal.any_orthonormal_vector())];
+            let slope = |net: &mut Net, direction: DVec3| {
+                let mut at = |h: f64| {
+                    net.points[k] = start + direction * (h * length);
+                    self.energy(net, k)
+                };
+                let slope = (at(DIFFERENCE) - at(-DIFFERENCE)) / (2.0 * DIFFERENCE);
+                net.points[k] = start;
+                slope
+            };
+            let gradient = s * slope(net, s) + t * slope(net, t);
+            let downhill = -gradient.normalize_or_zero() * length;
+            let spot = net.spots[k];
+            for step in STEPS {
+                place(net, k, net.chart.advance(spot, downhill * step));
+                if self.energy(net, k) < before && !(strictly && turns_around(net, k)) {
+                    longest = longest.max(step);
+                    break;
+                }
+                place(net, k, spot);
+            }
+        }
+        longest
+    }
 }
 
 /// Least sine of the corners of the four cells around inner point `k`.
 pub fn worst_corner(net: &Net, k: usize) -> f64 {
-    worst_along(net, k, None)
-}
-
-/// The same along given normals of the four cells.
-fn worst_along(net: &Net, k: usize, normals: Option<[[DVec3; 2]; 4]>) -> f64 {
     let normal = |k: usize| net.chart.normal(net.spots[k]);
     let sheet = sheet(net, &normal);
-    let cells = cells_around(net.cols, k).into_iter().enumerate();
-    let sine = |(n, c): (usize, usize)| sheet.least_sine(c, normals.map_or_else(|| sheet.normals(c), |all| all[n]));
-    cells.map(sine).fold(f64::INFINITY, f64::min)
+    let cells = cells_around(net.cols, k).into_iter();
+    cells.map(|c| sheet.least_sine(c, sheet.normals(c))).fold(f64::INFINITY, f64::min)
 }
 
 /// Moves inner point `k` to `spot`, and returns where it was.
@@ -138,32 +254,4 @@ pub fn place(net: &mut Net, k: usize, spot: Spot) -> Spot {
 /// True if one of the four cells around inner point `k` is not convex in the square.
 pub fn turns_around(net: &Net, k: usize) -> bool {
     cells_around(net.cols, k).into_iter().any(|c| turns_over(&net.uv, net.cols, c))
-}
-
-fn open_around(net: &mut Net, k: usize) {
-    let cols = net.cols;
-    let normals = {
-        let normal = |k: usize| net.chart.normal(net.spots[k]);
-        let sheet = sheet(net, &normal);
-        cells_around(cols, k).map(|c| sheet.normals(c))
-    };
-    let mut best = worst_along(net, k, Some(normals));
-    let tangents = [(net.points[k + 1] - net.points[k - 1]) / 2.0, (net.points[k + cols] - net.points[k - cols]) / 2.0];
-    for step in STEPS {
-        let start = net.spots[k];
-        let mut found = start;
-        for d in 0..DIRECTIONS {
-            if best >= OPEN {
-                return;
-            }
-            let (sin, cos) = (d as f64 / DIRECTIONS as f64 * std::f64::consts::TAU).sin_cos();
-            place(net, k, net.chart.advance(start, (tangents[0] * cos + tangents[1] * sin) * step));
-            let reached = worst_along(net, k, Some(normals));
-            if reached > best && !turns_around(net, k) {
-                best = reached;
-                found = net.spots[k];
-            }
-            place(net, k, found);
-        }
-    }
 }

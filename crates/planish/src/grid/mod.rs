@@ -22,6 +22,7 @@ mod feature_strand;
 mod fold;
 mod follow;
 mod locate;
+mod loosen;
 mod net;
 mod quality;
 mod resample;

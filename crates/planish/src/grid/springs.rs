@@ -52,8 +52,8 @@ pub fn relax(
         let rounds = LATER_ROUNDS[k.min(LATER_ROUNDS.len() - 1)];
         net = settle(net, (rounds, CG_STEPS), params, cancelled)?;
     }
-    open_folds(&mut net, cancelled)?;
     catch(&mut net, caught, cancelled)?;
+    open_folds(&mut net, false, cancelled)?;
     Ok(net.spots)
 }
 
@@ -70,7 +70,7 @@ fn coarsest<'a>(
     for rounds in EVEN_ROUNDS {
         let mut net = even(Net::regular(chart, cols, rows), rounds, cancelled)?;
         net = settle(net, (FIRST_ROUNDS, CG_STEPS), params, cancelled)?;
-        open_folds(&mut net, cancelled)?;
+        open_folds(&mut net, true, cancelled)?;
         let folded = folded_cells(&net).len() as f64 / (net.points.len() as f64);
         let score = unevenness(&net) + FOLD_COST * folded;
         if best.as_ref().is_none_or(|(b, _)| score < *b) {

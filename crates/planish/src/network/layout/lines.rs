@@ -6,7 +6,7 @@
 
 use super::LayoutParams;
 use crate::mesh::sets::Sets;
-use crate::mesh::{Adjacency, NONE, TriMesh, next, sharp_edges};
+use crate::mesh::{Adjacency, NONE, TriMesh, next, previous, sharp_edges};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,6 +20,11 @@ const WIDE_ANGLE: f64 = 0.75;
 
 /// A line without loose ends is kept from this part of the length asked for: a closed line is rarely an accident.
 const CLOSED_SHARE: f64 = 0.5;
+
+/// A line that comes back within this angle around a single face, shorter around than this part of the length asked
+/// for, is a spike.
+const SPIKE_ANGLE: f64 = 80.0 / 180.0 * std::f64::consts::PI;
+const SPIKE_SHARE: f64 = 0.25;
 
 /// Marks the half-edges on sharp edges that belong to a line worth keeping, and counts the sharp edges left out.
 /// Noise makes short lines with loose ends and small meshes of lines; a part's edges close or meet others.
@@ -98,10 +103,12 @@ fn mean_normal(mesh: &TriMesh, adjacency: &Adjacency, sharp: &[bool], h: u32, re
 }
 
 /// Clears what is surface detail: lines with a loose end that are shorter than `shortest`, the lines around regions
-/// smaller than a circle of half that length around, and connected lines shorter than half of it together.
+/// smaller than a circle of half that length around, spikes a quarter of it around, and connected lines shorter than
+/// half of it together.
 fn drop_detail(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut [bool]) {
     let around = CLOSED_SHARE * shortest;
     let smallest = around * around / (4.0 * std::f64::consts::PI);
+    cut_spikes(mesh, adjacency, SPIKE_SHARE * shortest, sharp);
     while drop_loose(mesh, adjacency, shortest, sharp) | drop_regions(mesh, adjacency, smallest, sharp) {}
     drop_short(mesh, adjacency, around, sharp);
 }
@@ -185,6 +192,44 @@ fn drop_regions(mesh: &TriMesh, adjacency: &Adjacency, smallest: f64, sharp: &mu
     !rims.is_empty()
 }
 
+/// Leads lines that turn back on themselves around a single face along its third edge instead, if the face is less
+/// than `longest` around: edges of noise zigzag.
+fn cut_spikes(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bool]) {
+    let mut degree = vec![0u32; mesh.points.len()];
+    (0..sharp.len() as u32).filter(|&h| sharp[h as usize]).for_each(|h| degree[mesh.origin(h) as usize] += 1);
+    let mut faces: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
+    while !faces.is_empty() {
+        let mut changed = Vec::new();
+        for f in faces {
+            for h in 3 * f..3 * f + 3 {
+                let (g, third) = (previous(h), next(h));
+                let across = adjacency.opposite[third as usize];
+                let [tip, a, b] = [h, third, g].map(|h| mesh.origin(h));
+                if !sharp[h as usize]
+                    || !sharp[g as usize]
+                    || sharp[third as usize]
+                    || across == NONE
+                    || degree[tip as usize] != 2
+                    || adjacency.is_boundary_vertex(tip)
+                {
+                    continue;
+                }
+                let [p, q, r] = [tip, a, b].map(|v| mesh.points[v as usize]);
+                if (q - p).angle_between(r - p) < SPIKE_ANGLE && p.distance(q) + q.distance(r) + r.distance(p) < longest
+                {
+                    clear(adjacency, sharp, h);
+                    clear(adjacency, sharp, g);
+                    sharp[third as usize] = true;
+                    sharp[across as usize] = true;
+                    degree[tip as usize] = 0;
+                    changed.push(across / 3);
+                }
+            }
+        }
+        faces = changed;
+    }
+}
+
 /// Clears connected lines shorter together than `shortest`.
 fn drop_short(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut [bool]) {
     let edges: Vec<u32> =
@@ -205,12 +250,12 @@ fn drop_short(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut 
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use crate::mesh::shapes;
 
     /// Marks the edges along a chain of places of a sheet.
-    fn mark(mesh: &TriMesh, adjacency: &Adjacency, sharp: &mut [bool], places: &[(f64, f64)]) {
+    pub fn mark(mesh: &TriMesh, adjacency: &Adjacency, sharp: &mut [bool], places: &[(f64, f64)]) {
         let near = |p: &DVec3, q: (f64, f64)| p.truncate().distance(glam::DVec2::new(q.0, q.1)) < 1e-9;
         let vertex = |q| mesh.points.iter().position(|p| near(p, q)).expect("a vertex there") as u32;
         for w in places.windows(2) {
@@ -241,6 +286,23 @@ mod tests {
             mark(&mesh, &adjacency, &mut sharp, &places);
             drop_detail(&mesh, &adjacency, shortest, &mut sharp);
             assert_eq!(sharp.iter().filter(|&&s| s).count() / 2, kept, "{places:?}");
+        }
+    }
+
+    #[test]
+    fn a_line_that_spikes_around_a_face_of_0_34_is_led_straight_if_that_is_less_than_asked_for() {
+        let mesh = shapes::rectangle(1.0, 1.0, 10, 10);
+        let corner = mesh.bounds().min;
+        let at = |i: usize, j: usize| (corner.x + i as f64 / 10.0, corner.y + j as f64 / 10.0);
+        let adjacency = Adjacency::new(&mesh);
+        let places =
+            [(0..=3).map(|i| at(i, 5)).collect(), vec![at(4, 6)], (4..=10).map(|i| at(i, 5)).collect()].concat();
+        for (longest, kept) in [(0.33, 11), (0.35, 10)] {
+            let mut sharp = vec![false; adjacency.opposite.len()];
+            mark(&mesh, &adjacency, &mut sharp, &places);
+            assert_eq!(sharp.iter().filter(|&&s| s).count() / 2, 11);
+            cut_spikes(&mesh, &adjacency, longest, &mut sharp);
+            assert_eq!(sharp.iter().filter(|&&s| s).count() / 2, kept);
         }
     }
 }

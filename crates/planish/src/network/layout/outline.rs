@@ -10,6 +10,9 @@ use std::collections::HashMap;
 /// A feature line or boundary that turns by more than this over a quarter of a patch side has a corner there.
 const CORNER_TURN_DEG: f64 = 50.0;
 
+/// One that turns by more than this has a corner there however near others end: no side of a patch follows it back.
+const SHARP_TURN_DEG: f64 = 100.0;
+
 /// Nodes put on a closed line that meets no other.
 const LOOP_NODES: usize = 4;
 
@@ -60,7 +63,7 @@ pub(super) fn corners(ground: &Ground, reach: f64) -> Vec<bool> {
         }
         let near = around[&v].iter().flat_map(|&w| walk(v, w).1);
         let beaten = near.filter(|&w| w != v).any(|w| {
-            corner[w as usize] && around[&w].len() != 2
+            corner[w as usize] && around[&w].len() != 2 && angle < SHARP_TURN_DEG
                 || turn.get(&w).is_some_and(|&other| (other, std::cmp::Reverse(w)) > (angle, std::cmp::Reverse(v)))
         });
         if !beaten {
@@ -193,4 +196,31 @@ pub(super) fn outline(ground: &Ground, label: &[u32], count: usize, corner: &[bo
         complex.cells[c] = Some(sides);
     }
     complex
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lines::tests::mark;
+    use super::*;
+    use crate::mesh::{Adjacency, shapes};
+
+    #[test]
+    fn a_line_that_turns_back_by_135_degrees_beside_a_fork_has_a_corner_and_one_of_90_has_none() {
+        let mesh = shapes::rectangle(1.0, 1.0, 10, 10);
+        let low = mesh.bounds().min;
+        let at = |i: usize, j: usize| (low.x + i as f64 / 10.0, low.y + j as f64 / 10.0);
+        let adjacency = Adjacency::new(&mesh);
+        let mut sharp = vec![false; adjacency.opposite.len()];
+        // Three lines from (5, 5): one turns back at (7, 5), one turns up and right at (5, 7).
+        mark(&mesh, &adjacency, &mut sharp, &[at(5, 5), at(6, 5), at(7, 5), at(6, 4), at(5, 3), at(4, 2)]);
+        mark(&mesh, &adjacency, &mut sharp, &[at(5, 5), at(5, 6), at(5, 7), at(6, 7), at(7, 7), at(8, 7)]);
+        mark(&mesh, &adjacency, &mut sharp, &[at(5, 5), at(4, 5), at(3, 5), at(2, 5)]);
+        let corner = corners(&Ground::new(&mesh, &adjacency, &sharp), 0.25);
+        let is = |i, j| {
+            let (x, y) = at(i, j);
+            let near = |p: &glam::DVec3| p.truncate().distance(glam::DVec2::new(x, y)) < 1e-9;
+            corner[mesh.points.iter().position(near).expect("a vertex there")]
+        };
+        assert!(is(5, 5) && is(7, 5) && !is(5, 7));
+    }
 }
