@@ -1,5 +1,7 @@
 """Scans that planish writes, as laspy and pye57 read them, and theirs as planish reads them."""
 
+import json
+
 import numpy as np
 import pytest
 from conftest import planish
@@ -60,6 +62,16 @@ def test_laz_is_read_by_laspy_and_is_smaller_than_las(text, tmp_path):
     # And by planish again.
     planish("clean", tmp_path / "out.laz", "-o", tmp_path / "again.xyz")
     check(np.loadtxt(tmp_path / "again.xyz", usecols=(0, 1, 2)))
+
+
+def test_meshes_of_scans_far_from_the_origin_lie_in_their_place_or_tell_how_far_it_is(text, tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    for name, middle in [("a.ply", [1000.0, 2000.0, 50.0]), ("a.obj", [1000.0, 2000.0, 50.0]), ("a.stl", [0.0] * 3)]:
+        planish("mesh", text, "-o", tmp_path / name, "--report", tmp_path / "report.json")
+        mesh = trimesh.load(tmp_path / name)
+        assert np.abs(mesh.bounds.mean(axis=0) - middle).max() < 0.6, name
+        told = [w for w in json.loads((tmp_path / "report.json").read_text())["warnings"] if w["code"] == "coordinates_moved"]
+        assert [("1000 2000 50" in w["message"]) for w in told] == ([True] if name == "a.stl" else []), name
 
 
 def test_only_the_wanted_classes_of_a_laz_are_read(tmp_path):

@@ -9,7 +9,7 @@ use crate::progress;
 use crate::summary::Summary;
 use planish::cloud::{self, Cleaned, Cloud, Samples};
 use planish::mesh::Attribute;
-use planish::pipeline::{self, Figure};
+use planish::pipeline::{self, Figure, Warning};
 use planish_io::report::{Input, Report, count, distance, number};
 use std::path::{Path, PathBuf};
 
@@ -22,6 +22,15 @@ pub fn scan_facts(path: &Path, scan: &Cloud, units: planish::model::Units) -> In
         units: units.symbol().into(),
         diagonal: scan.bounds().diagonal(),
     }
+}
+
+/// What to tell of products that stay where the scan was moved to, if it was.
+pub fn moved(scan: &Cloud) -> Option<Warning> {
+    let [x, y, z] = scan.shift.to_array();
+    let text = format!(
+        "The coordinates are large against the scan: products lie near the origin. Add {x} {y} {z} to be back in place."
+    );
+    (scan.shift != planish::DVec3::ZERO).then(|| Warning::new("coordinates_moved", text, ""))
 }
 
 pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {

@@ -80,10 +80,21 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
         Trouble::Meshing(e) => failure(args, &source, e),
         Trouble::Cloud(e) => Failure::input(&args.input, super::with_hint(&e.to_string())),
     })?;
-    let (mesh, tags) = (&made.extracted.mesh, &made.extracted.tags);
+    let (mut mesh, tags) = (std::borrow::Cow::Borrowed(&made.extracted.mesh), &made.extracted.tags);
+    let mut moved = None;
+    if let Source::Scan(scan) = &source {
+        match args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply") || e.eq_ignore_ascii_case("obj")) {
+            true if scan.shift != planish::DVec3::ZERO => {
+                mesh.to_mut().points.iter_mut().for_each(|p| *p += scan.shift)
+            }
+            true => {}
+            // Single precision: far from the origin it would lose the detail.
+            false => moved = super::clean::moved(scan),
+        }
+    }
     let options = WriteOptions { units, ..WriteOptions::default() };
     let (_, write) = session.step("write", || {
-        planish_io::write_tagged_mesh(staged.file_path(), mesh, tags, &options)
+        planish_io::write_tagged_mesh(staged.file_path(), &mesh, tags, &options)
             .map_err(|e| Failure::usage(&args.output, e))
     })?;
     let mut report = Report::new("mesh", input);
@@ -94,6 +105,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     }
     if let Some(scanned) = &scanned {
         pipeline::scan_figures(scanned, &mut report.quality, &mut report.warnings);
+        report.warnings.extend(moved);
     }
     staged.commit()?;
     commit_report(own_report, &report)?;

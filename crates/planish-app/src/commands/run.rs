@@ -107,7 +107,9 @@ pub fn from_scan(
     if crate::progress::interrupted() {
         return Err(Failure::interrupted());
     }
-    let points = points.map_err(|e| fault(&e))?;
+    let mut points = points.map_err(|e| fault(&e))?;
+    // All products lie in one place.
+    points.cloud.shift = DVec3::ZERO;
     planish_io::write_scan(staged.path("points.ply"), &points.cloud).map_err(|e| Failure::usage(path, e))?;
     let mut facts = ScanFacts {
         input: super::clean::scan_facts(path, scan, session.units()),
@@ -116,6 +118,7 @@ pub fn from_scan(
         points: Default::default(),
     };
     pipeline::scan_figures(&made, &mut facts.quality, &mut facts.warnings);
+    facts.warnings.extend(super::clean::moved(scan));
     facts.quality.insert("scan.outliers".into(), pipeline::Figure::Count(points.outliers as u64));
     facts.quality.insert("scan.moved_rms".into(), pipeline::Figure::Number(points.moved_rms));
     for (p, &off) in scan.points.iter().zip(&points.strays) {
