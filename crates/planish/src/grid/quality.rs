@@ -35,7 +35,7 @@ pub struct GridQuality {
 /// of its corner triangles points against the mean normal of the cells up to two away and against that of the patch at
 /// its corners (but not the triangle at a corner of the patch, whose angle is given): rough relief tilts single cells,
 /// only a fold turns a corner right over. That the grid is one-to-one on the patch is a matter of construction: every
-/// cell is convex in the chart, by exact predicates.
+/// cell is convex in the chart, by exact predicates, but for those around folds that were opened along the surface.
 pub fn measure(grid: &Grid, patch: &PatchMesh) -> GridQuality {
     let (rows, cols) = (grid.rows, grid.cols);
     let at = |i: usize, j: usize| grid.points[j * cols + i];
