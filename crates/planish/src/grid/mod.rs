@@ -3,6 +3,7 @@
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, ch. 5.
 //! 1. sides resampled by arc length      - §5.4, [`side`]
 //! 2. start grid                         - §5.4, [`chart`]: a convex map of the patch to the unit square
+//!    without the triangles that such a map squeezes flat - beyond the paper, [`loosen`]
 //! 3. relax, subdivide, relax            - §5.5 and 5.6, [`springs`]
 //! 4. points moved onto missed detail      - beyond the paper, [`catch`]
 //! 5. small edits of a patch's curves      - beyond the paper, [`follow`]
