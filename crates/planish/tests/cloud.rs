@@ -7,7 +7,7 @@ use planish::contour::ContourParams;
 use planish::field::{Field, SampleField};
 use planish::geom::random;
 use planish::mesh::{TriMesh, diagnose, shapes};
-use planish::pipeline::{ScanParams, mesh_scan};
+use planish::pipeline::{ScanMeshed, ScanParams, mesh_scan};
 
 /// A normally distributed number.
 fn normal(seed: u64, n: u64) -> f64 {
@@ -281,15 +281,7 @@ fn holed_sheet(radius: f64) -> Vec<DVec3> {
 fn small_holes_of_an_open_sheet_are_closed_within_a_hundredth_and_stay_when_asked_for() {
     // Eleven spacings wide, with their rims 8 % of the diagonal around.
     let points = holed_sheet(0.025);
-    let params = ScanParams {
-        clean: CleanParams::default(),
-        contour: ContourParams::default(),
-        voxel: None,
-        resolution: None,
-        memory: 1 << 30,
-        close: None,
-    };
-    let made = mesh_scan(&Cloud::new(points.clone()), &params, &Silent).unwrap();
+    let made = scanned(points.clone(), None);
     let mesh = made.meshed.extracted.mesh;
     let facts = diagnose(&mesh);
     assert!(!made.closed && facts.manifold, "{facts:?}");
@@ -319,6 +311,11 @@ fn an_open_sheet_ends_within_four_spacings_of_its_points_and_large_holes_stay() 
 
 /// The mesh of a scan with default parameters.
 fn meshed(points: Vec<DVec3>, close: Option<bool>) -> TriMesh {
+    scanned(points, close).meshed.extracted.mesh
+}
+
+/// The same with what was found on the way.
+fn scanned(points: Vec<DVec3>, close: Option<bool>) -> ScanMeshed {
     let params = ScanParams {
         clean: CleanParams::default(),
         contour: ContourParams::default(),
@@ -327,7 +324,7 @@ fn meshed(points: Vec<DVec3>, close: Option<bool>) -> TriMesh {
         memory: 1 << 30,
         close,
     };
-    mesh_scan(&Cloud::new(points), &params, &Silent).unwrap().meshed.extracted.mesh
+    mesh_scan(&Cloud::new(points), &params, &Silent).unwrap()
 }
 
 #[test]

@@ -81,16 +81,11 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
         Trouble::Cloud(e) => Failure::input(&args.input, super::with_hint(&e.to_string())),
     })?;
     let (mut mesh, tags) = (std::borrow::Cow::Borrowed(&made.extracted.mesh), &made.extracted.tags);
-    let mut moved = None;
-    if let Source::Scan(scan) = &source {
-        match args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply") || e.eq_ignore_ascii_case("obj")) {
-            true if scan.shift != planish::DVec3::ZERO => {
-                mesh.to_mut().points.iter_mut().for_each(|p| *p += scan.shift)
-            }
-            true => {}
-            // Single precision: far from the origin it would lose the detail.
-            false => moved = super::clean::moved(scan),
-        }
+    let scan = if let Source::Scan(scan) = &source { Some(scan) } else { None };
+    // Single precision would lose the detail far from the origin.
+    let exact = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply") || e.eq_ignore_ascii_case("obj"));
+    if let Some(scan) = scan.filter(|s| exact && s.shift != planish::DVec3::ZERO) {
+        mesh.to_mut().points.iter_mut().for_each(|p| *p += scan.shift);
     }
     let options = WriteOptions { units, ..WriteOptions::default() };
     let (_, write) = session.step("write", || {
@@ -105,7 +100,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     }
     if let Some(scanned) = &scanned {
         pipeline::scan_figures(scanned, &mut report.quality, &mut report.warnings);
-        report.warnings.extend(moved);
+        report.warnings.extend(scan.filter(|_| !exact).and_then(super::clean::moved));
     }
     staged.commit()?;
     commit_report(own_report, &report)?;

@@ -210,7 +210,7 @@ impl Region {
             let before = self.energy(net, k);
             let start = net.points[k];
             let normal = net.chart.normal(net.spots[k]);
-            let [s, t] = [normal.any_orthonormal_vector(), normal.cross(normal.any_orthonormal_vector())];
+            let (s, t) = normal.any_orthonormal_pair();
             let slope = |net: &mut Net, direction: DVec3| {
                 let mut at = |h: f64| {
                     net.points[k] = start + direction * (h * length);

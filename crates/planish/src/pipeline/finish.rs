@@ -13,7 +13,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// A hole is small if it is at most this share of the diagonal around: less than a thirtieth wide, half of a patch.
-pub const SMALL_HOLE: f64 = 0.1;
+const SMALL_HOLE: f64 = 0.1;
 /// The surface reaches so many times as far from a raw point as its eighth neighbour is: one and a half times as far as a
 /// surface between points has to.
 const REACH: f64 = 2.0;
