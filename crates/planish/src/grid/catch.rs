@@ -25,9 +25,8 @@ const CLEARLY: f64 = 1.0 - 1e-6;
 /// Least sine of the corners of cells around a moved point, unless they were worse before.
 const LEAST_SINE: f64 = 0.15;
 
-/// Moves points of `net` onto vertices of its chart that lie further than `allowed` from the grid's surface. True if
-/// any moved.
-pub fn catch(net: &mut Net, allowed: f64, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<bool, Fault> {
+/// Moves points of `net` onto vertices of its chart that lie further than `allowed` from the grid's surface.
+pub fn catch(net: &mut Net, allowed: f64, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<(), Fault> {
     let spots = vertex_spots(net.chart);
     let mut moved = vec![false; net.points.len()];
     for _ in 0..SWEEPS {
@@ -65,7 +64,7 @@ pub fn catch(net: &mut Net, allowed: f64, cancelled: &(dyn Fn() -> bool + Sync))
             break;
         }
     }
-    Ok(moved.contains(&true))
+    Ok(())
 }
 
 /// Vertices of the chart that may lie further than `allowed` from the grid's surface: those that the cells around the

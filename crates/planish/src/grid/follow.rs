@@ -94,9 +94,8 @@ fn follow_patch(
     let Some(net) = carried(&chart, patch, old) else { return from_nothing() };
     let net = settled_coarsely(net, params, &cancelled)?;
     let mut net = settle(net, FINE_EFFORT, params, &cancelled)?;
-    let is_open = open_folds(&mut net, false, &cancelled)?;
-    let has_moved = catch(&mut net, caught, &cancelled)?;
-    if (has_moved || !is_open) && !folded_cells(&net).is_empty() {
+    catch(&mut net, caught, &cancelled)?;
+    if !open_folds(&mut net, false, &cancelled)? && !folded_cells(&net).is_empty() {
         return from_nothing();
     }
     Ok(laid(&chart, &net.spots, patch, (cols, rows), &stops))
