@@ -248,6 +248,49 @@ fn repair_leaves_a_two_sided_sheet_open() {
 }
 
 #[test]
+fn repair_welds_a_crack_whose_triangles_are_slivers() {
+    // Two halves of a square; beside the crack each has a triangle a thousandth as high as long, and with its third
+    // corner beyond the end of the edge both seem to lie on the same side of it.
+    let mut sheet = TriMesh::new(
+        [[0., 0.], [0., 1.], [1., 1.002], [-1., 1.], [0.0002, 1.001], [0.0001, 1.0005]]
+            .map(|[x, y]: [f64; 2]| DVec3::new(x, y, 0.0))
+            .to_vec(),
+        vec![[0, 4, 1], [0, 2, 4], [0, 1, 5], [0, 5, 3]],
+    );
+    sheet.points[5].x = -1e-7;
+    sheet.points[4].z = 1e-3;
+    sheet.points[5].z = 1e-3;
+    let whole = repair(&sheet).unwrap().0;
+    let n = sheet.points.len() as u32;
+    let ends = [sheet.points[0], sheet.points[1]];
+    sheet.points.extend(ends);
+    sheet.triangles[2] = [n, n + 1, 5];
+    sheet.triangles[3] = [n, 5, 3];
+    let (mended, repairs) = repair(&sheet).unwrap();
+    assert_eq!((repairs.welded_vertices, mended.triangles.len()), (2, whole.triangles.len()));
+    assert_eq!(diagnose(&mended).boundary_loops, 1);
+}
+
+#[test]
+fn repair_closes_holes_that_are_less_than_a_hundredth_of_the_diagonal_around() {
+    let mut mesh = shapes::sphere(1.0, 4);
+    mesh.triangles.pop();
+    let edge = mesh.points[0].distance(mesh.points[mesh.triangles[0][1] as usize]);
+    let around = 3.0 * edge / mesh.bounds().diagonal();
+    assert!(around > 0.05);
+    let (mended, repairs) = repair(&mesh).unwrap();
+    assert_eq!((repairs.closed_holes, diagnose(&mended).boundary_loops), (0, 1));
+    // The same beside something large.
+    let n = mesh.points.len() as u32;
+    let large = shapes::sphere(30.0, 2);
+    mesh.points.extend(large.points.iter().map(|&p| p + DVec3::X * 40.0));
+    mesh.triangles.extend(large.triangles.iter().map(|t| t.map(|v| v + n)));
+    let (mended, repairs) = repair(&mesh).unwrap();
+    assert_eq!((repairs.closed_holes, diagnose(&mended).boundary_loops), (1, 0));
+    assert_eq!(mended.triangles.len(), mesh.triangles.len() + 1);
+}
+
+#[test]
 fn repair_tells_missing_vertices_infinite_ones_and_nothing() {
     let mut mesh = shapes::sphere(1.0, 0);
     mesh.triangles[3][1] = 99;

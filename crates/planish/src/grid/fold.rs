@@ -14,9 +14,10 @@ use std::collections::BTreeMap;
 /// Cells to each side over which the normal is averaged.
 const REACH: usize = 2;
 /// Folded cells, per point of the net, up to which they are opened one by one, and the part of those of a round
-/// that may be left for another.
+/// that may be left for another, which a handful is worth in any case.
 const FEW: f64 = 0.2;
 const WORTH: f64 = 0.75;
+const HANDFUL: usize = 8;
 /// Rounds of opening folds, each with a ring of cells more than the one before, and sweeps over the points in each.
 const ROUNDS: usize = 8;
 const RINGS: usize = 2;
@@ -114,7 +115,7 @@ pub fn open_folds(net: &mut Net, strictly: bool, cancelled: &(dyn Fn() -> bool +
         if folded.len() > before {
             break;
         }
-        before = before.min((folded.len() as f64 * WORTH) as usize);
+        before = before.min((folded.len() as f64 * WORTH) as usize).max(HANDFUL);
         let region = Region::new(net, &folded, RINGS + round);
         for _ in 0..SWEEPS {
             if cancelled() {

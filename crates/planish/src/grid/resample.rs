@@ -26,6 +26,12 @@ const GROWTH: f64 = 3.0;
 /// ... and where it would do more, a miss must be this much greater to count, as often as needed.
 const LESS: f64 = 1.4;
 
+/// A patch that finer cells leave with more than this part of its need is past help (a fourth is hoped for): none reach
+/// down a needle.
+const HELPED: f64 = 0.7;
+/// Patches are tried alone if that takes at most this part of the points that refinement would add.
+const TRIAL: f64 = 0.5;
+
 /// Both directions are refined if the greater bend is less than this part from the other.
 const EVEN_BEND: f64 = 0.7;
 
@@ -96,33 +102,50 @@ fn refined<E: From<GridError>>(
     let [_, most] = bounds(params);
     let budget = ((GROWTH * total(&sizes) as f64) as usize).min(params.max_points);
     let mut suspects = all;
+    let mut past_help = vec![false; patches.len()];
     for round in 0..ROUNDS {
         if observer.cancelled() {
             return Err(GridError::Cancelled.into());
         }
-        let need = |&p: &usize| {
-            let folded = folds(&grids[p], &patches[p]) > 0;
-            miss(&grids[p], &patches[p]).0.max(if folded { FOLDED * allowed } else { 0.0 })
+        let need = |p: usize, grid: &Grid| {
+            let folded = folds(grid, &patches[p]) > 0;
+            miss(grid, &patches[p]).0.max(if folded { FOLDED * allowed } else { 0.0 })
         };
-        let misses: Vec<f64> = suspects.par_iter().map(need).collect();
-        let wish = |limit: f64| -> Result<Vec<(usize, usize)>, E> {
-            let mut sizes = finer(network, &chords, &grids, &suspects, &misses, limit, most);
-            give(&mut sizes)?;
-            Ok(sizes)
-        };
+        suspects.retain(|&p| !past_help[p]);
+        let mut misses: Vec<f64> = suspects.par_iter().map(|&p| need(p, &grids[p])).collect();
         // Long chords carry one patch's need far: where that asks for too many points, only the worst are heeded.
-        let (mut limit, mut wanted) = (allowed, wish(allowed)?);
-        while total(&wanted) > budget && wanted != sizes {
-            limit *= LESS;
-            wanted = wish(limit)?;
+        let wish = |misses: &[f64]| -> Result<Vec<Size>, E> {
+            let mut limit = allowed;
+            loop {
+                let mut wanted = finer(network, &chords, &grids, &suspects, misses, limit, most);
+                give(&mut wanted)?;
+                if total(&wanted) <= budget || wanted == sizes {
+                    return Ok(wanted);
+                }
+                limit *= LESS;
+            }
+        };
+        let mut wanted = wish(&misses)?;
+        let share = (1.0 - FIRST_SHARE) / ROUNDS as f64;
+        let start = FIRST_SHARE + share * round as f64;
+        let needy: Vec<usize> = (0..suspects.len()).filter(|&k| misses[k] > allowed).collect();
+        let tried: Vec<usize> = needy.iter().map(|&k| suspects[k]).collect();
+        let added = total(&wanted).saturating_sub(total(&sizes));
+        let trial: usize = tried.iter().map(|&p| wanted[p].0 * wanted[p].1).sum();
+        if trial as f64 <= TRIAL * added as f64 {
+            for (&k, grid) in needy.iter().zip(make(&tried, &wanted, &Part::new(observer, start, 0.0))?) {
+                if need(suspects[k], &grid) > HELPED * misses[k] {
+                    past_help[suspects[k]] = true;
+                    misses[k] = 0.0;
+                }
+            }
+            wanted = wish(&misses)?;
         }
         suspects = (0..patches.len()).filter(|&p| wanted[p] != sizes[p]).collect();
         if suspects.is_empty() {
             break;
         }
-        let share = (1.0 - FIRST_SHARE) / ROUNDS as f64;
-        let part = Part::new(observer, FIRST_SHARE + share * round as f64, share);
-        for (&p, grid) in suspects.iter().zip(make(&suspects, &wanted, &part)?) {
+        for (&p, grid) in suspects.iter().zip(make(&suspects, &wanted, &Part::new(observer, start, share))?) {
             grids[p] = grid;
         }
         sizes = wanted;

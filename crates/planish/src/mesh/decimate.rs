@@ -1,7 +1,8 @@
 //! Fewer triangles: edges collapsed in the order of their quadric error, features kept.
 //!
 //! Garland and Heckbert 1997, *Surface Simplification Using Quadric Error Metrics* (area-weighted planes, the best place
-//! of the merged vertex); features as in Kobbelt et al. 2001, §5.3: a vertex on a feature line collapses along the line
+//! of the merged vertex), of the planes that are there now and not those of the input, as Lindstrom and Turk 1998, *Fast and
+//! Memory Efficient Polygonal Simplification*: a fifth less error; features as in Kobbelt et al. 2001, §5.3: a vertex on a feature line collapses along the line
 //! only, a corner stays.
 //!
 //! Refuses what would change the topology (link condition), turn a triangle, or leave a sliver; and as that does not
@@ -15,6 +16,7 @@ use super::{FeatureTags, MeshError, TriMesh, check, self_intersections};
 use crate::geom::Bvh;
 use crate::observe::Observer;
 use collapse::Collapse;
+use glam::DVec3;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -88,10 +90,10 @@ pub struct Decimated {
     pub distance: Option<f64>,
 }
 
-/// Rounds in which the neighbourhood of what meets is locked.
-const ROUNDS: usize = 6;
-/// Factor by which the inner tolerance shrinks while the result is too far.
-const TIGHTEN: f64 = 0.6;
+/// Rounds in which the neighbourhood of what meets is locked, and tolerances are tightened where the result is too far.
+const ROUNDS: usize = 12;
+/// Factor by which they are tightened.
+const TIGHTEN: f64 = 0.5;
 
 /// Decimates a manifold mesh.
 /// * `tags` - its features; found by the angle of the parameters if there are none
@@ -108,12 +110,12 @@ pub fn decimate(
         return Err(MeshError::Empty.into());
     }
     let wrong = |what, value, range| Err(DecimateError::Target { what, value, range });
-    let (count, mut tolerance) = match params.target {
-        DecimateTarget::Ratio(r) if r > 0.0 && r <= 1.0 => ((mesh.triangles.len() as f64 * r) as usize, f64::INFINITY),
+    let (count, allowed) = match params.target {
+        DecimateTarget::Ratio(r) if r > 0.0 && r <= 1.0 => ((mesh.triangles.len() as f64 * r) as usize, None),
         DecimateTarget::Ratio(r) => return wrong("ratio", r, "a number above 0 and at most 1"),
-        DecimateTarget::Triangles(n) if n >= 4 => (n, f64::INFINITY),
+        DecimateTarget::Triangles(n) if n >= 4 => (n, None),
         DecimateTarget::Triangles(n) => return wrong("number of triangles", n as f64, "at least 4"),
-        DecimateTarget::Tolerance(t) if t > 0.0 && t.is_finite() => (0, t),
+        DecimateTarget::Tolerance(t) if t > 0.0 && t.is_finite() => (0, Some(t)),
         DecimateTarget::Tolerance(t) => return wrong("tolerance", t, "a length above 0"),
     };
     let found;
@@ -124,26 +126,25 @@ pub fn decimate(
             &found
         }
     };
-    let allowed = match params.target {
-        DecimateTarget::Tolerance(t) => Some(t),
-        _ => None,
-    };
     let mut locked = vec![false; mesh.points.len()];
     let mut before = None;
     let mut log = Vec::new();
+    let mut tolerances = vec![allowed.unwrap_or(f64::INFINITY); mesh.points.len()];
     for round in 0..=ROUNDS {
-        let mut collapse = Collapse::new(mesh, tags, &locked, &log)?;
-        collapse.run(count, tolerance, observer)?;
+        let mut collapse = Collapse::new(mesh, tags, &locked, tolerances.clone(), &log)?;
+        collapse.run(count, observer)?;
         let done = collapse.take_log();
         let (result, result_tags, source) = collapse.finish();
-        let distance = allowed.map(|_| farthest(mesh, &result));
-        if let (Some(t), Some(d)) = (allowed, distance)
-            && d > t
-            && round < ROUNDS
-        {
-            tolerance *= TIGHTEN;
-            log.clear();
-            continue;
+        let mut distance = None;
+        if let Some(allowed) = allowed {
+            let nearest = nearest(mesh, &result);
+            let farthest = nearest.iter().map(|n| n.1).fold(0.0, f64::max);
+            if farthest > allowed && round < ROUNDS {
+                tighten(&result, &nearest, allowed, &mut tolerances);
+                log.clear();
+                continue;
+            }
+            distance = Some(farthest);
         }
         let meeting = self_intersections(&result);
         if !meeting.is_empty() && round < ROUNDS {
@@ -173,17 +174,30 @@ fn sharp_tags(mesh: &TriMesh, angle_deg: f64) -> FeatureTags {
     FeatureTags::from_edges(mesh.points.len(), edges)
 }
 
-/// Greatest distance from a vertex of `from` to `to`.
-fn farthest(from: &TriMesh, to: &TriMesh) -> f64 {
+/// For each vertex of `from` that is in use the triangle of `to` next to it, and how far that is.
+fn nearest(from: &TriMesh, to: &TriMesh) -> Vec<(Option<u32>, f64)> {
     let bvh = Bvh::new(to);
     let mut used = vec![false; from.points.len()];
     from.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
-    from.points
-        .par_iter()
-        .enumerate()
-        .filter(|(v, _)| used[*v])
-        .map(|(_, &p)| bvh.closest(p).distance)
-        .reduce(|| 0.0, f64::max)
+    let to = |(&p, used): (&DVec3, bool)| {
+        let hit = bvh.closest(p);
+        if used { (Some(hit.place.face), hit.distance) } else { (None, 0.0) }
+    };
+    from.points.par_iter().zip(used).map(to).collect()
+}
+
+/// Tightens the tolerances of what became the triangles that something is farther from than `allowed`, and of what became
+/// their neighbours.
+fn tighten(result: &TriMesh, nearest: &[(Option<u32>, f64)], allowed: f64, tolerances: &mut [f64]) {
+    let mut wrong = vec![false; result.points.len()];
+    for t in nearest.iter().filter(|n| n.1 > allowed).filter_map(|n| n.0) {
+        result.triangles[t as usize].iter().for_each(|&v| wrong[v as usize] = true);
+    }
+    for (tolerance, (triangle, _)) in tolerances.iter_mut().zip(nearest) {
+        if triangle.is_some_and(|t| result.triangles[t as usize].iter().any(|&v| wrong[v as usize])) {
+            *tolerance *= TIGHTEN;
+        }
+    }
 }
 
 /// Locks the vertices of the input around the corners of triangles that meet.
@@ -229,8 +243,21 @@ mod tests {
         let d = diagnose(&found.mesh);
         assert!(d.watertight && d.manifold && d.genus == Some(0) && d.flipped_faces == 0);
         assert!((found.mesh.triangles.len() as i64 - 2048).abs() <= 1, "{}", found.mesh.triangles.len());
-        assert!(farthest(&sphere, &found.mesh) < 0.005);
+        assert!(nearest(&sphere, &found.mesh).iter().all(|n| n.1 < 0.005));
         assert_eq!(found.self_intersections, 0);
+    }
+
+    #[test]
+    fn a_wavy_form_to_a_tenth_is_off_by_less_than_four_ten_thousandths_of_its_size_in_the_mean() {
+        let mut wavy = shapes::sphere(1.0, 5);
+        wavy.points
+            .iter_mut()
+            .for_each(|p| *p *= 1.0 + 0.15 * (5.0 * p.x).sin() * (4.0 * p.y).cos() * (6.0 * p.z).sin());
+        let found = decimate(&wavy, None, &to(DecimateTarget::Ratio(0.1)), &Silent).unwrap();
+        let off = nearest(&wavy, &found.mesh).iter().map(|n| n.1 * n.1).sum::<f64>() / wavy.points.len() as f64;
+        // .00047 with costs out of date, .00041 with the planes of the input.
+        let rms = off.sqrt() / wavy.bounds().diagonal();
+        assert!(rms < 0.00036, "{rms}");
     }
 
     #[test]

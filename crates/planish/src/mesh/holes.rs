@@ -81,6 +81,12 @@ fn lid_over(mesh: &TriMesh, adjacency: &Adjacency, around: &[u32], rim: &[u32]) 
         let next_to = j == i + 1 || (i == 0 && j == n - 1);
         !next_to && beside[i].binary_search(&rim[j]).is_ok()
     };
+    // The two sides of a cut are no hole.
+    let mut places: Vec<[u64; 3]> = points.iter().map(|p| p.to_array().map(f64::to_bits)).collect();
+    places.sort_unstable();
+    if places.windows(2).any(|w| w[0] == w[1]) {
+        return None;
+    }
     let flat = least_area(&points, taken)?;
     if n > CRACK {
         let area: f64 = flat.iter().map(|t| cross(&points, t).length()).sum();

@@ -5,13 +5,14 @@
 //!    contradicts itself (a one-sided piece) the edge is cut; turn closed pieces that are inside out
 //! 5. one vertex per fan, which cuts along all unpaired edges     6. triangles without height: collapse their
 //!    short edge or flip their long one, so that no hole is left     7. close tiny handles (`handles`)
-//! 8. drop unused vertices
+//! 8. drop unused vertices     9. close tiny holes (`holes`), but not the slits of 4 and 5
 //!
 //! Gueziec, Taubin, Lazarus, Horn, *Cutting and Stitching* (2001) is the source of step 5.
 
 use super::diagnose::sorted_triple;
+use super::handles::TINY_LOOP;
 use super::soup::{check, fans, keyed_edges, mates, orient, origin, repeats};
-use super::{Attribute, MeshError, NONE, TriMesh, next, sets::Sets};
+use super::{Attribute, FeatureTags, MeshError, NONE, TriMesh, next, sets::Sets};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +43,8 @@ pub struct Repairs {
     pub trimmed_faces: usize,
     /// Handles too small to be meant, cut and closed.
     pub closed_handles: usize,
+    /// Holes too small to be meant, closed.
+    pub closed_holes: usize,
     /// Triangles without height that could not be removed without tearing the surface.
     pub degenerate_left: usize,
     /// Vertices dropped because no triangle used them.
@@ -87,7 +90,11 @@ pub fn repair(mesh: &TriMesh) -> Result<(TriMesh, Repairs), MeshError> {
     let mut used = vec![false; mesh.points.len()];
     mesh.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
     done.unreferenced_vertices = used.iter().filter(|&&u| !u).count();
-    Ok((gather(mesh, &triangles, &source), done))
+    let mut mended = gather(mesh, &triangles, &source);
+    let longest = TINY_LOOP * mended.bounds().diagonal();
+    let mut tags = FeatureTags::from_edges(mended.points.len(), []);
+    done.closed_holes = super::close_holes(&mut mended, &mut tags, longest);
+    Ok((mended, done))
 }
 
 /// Merges all vertices at exactly the same place (those of a triangle soup, as STL files hold); triangles that
@@ -136,6 +143,8 @@ fn coincident(points: &[DVec3]) -> (Vec<u32>, usize) {
     (first, merged)
 }
 
+/// Triangles lower than this share of their edge do not tell to which side of it they lie.
+const THIN: f64 = 0.1;
 /// Open edges this nearly folded onto each other (cosine between their triangles) are the rim of a two-sided
 /// sheet, not a crack.
 const FOLDED: f64 = 0.999;
@@ -163,14 +172,8 @@ fn weld_cracks(mesh: &TriMesh, triangles: &mut [[u32; 3]]) -> usize {
     placed.sort_unstable();
     let mut sets = Sets::new(mesh.points.len());
     for run in placed.chunk_by(|x, y| x.0 == y.0) {
-        let [((a, b), g), (_, h)] = *run else { continue };
-        let (p, q) = (mesh.points[a as usize], mesh.points[b as usize]);
-        let axis = (q - p).normalize_or_zero();
-        let aside = |h: u32| {
-            let c = mesh.points[origin(triangles, super::previous(h)) as usize] - p;
-            (c - axis * c.dot(axis)).normalize_or_zero()
-        };
-        if aside(g).dot(aside(h)) > FOLDED {
+        let [(_, g), (_, h)] = *run else { continue };
+        if is_folded(mesh, triangles, g, h) {
             continue;
         }
         let (g0, g1) = (origin(triangles, g), origin(triangles, next(g)));
@@ -183,6 +186,21 @@ fn weld_cracks(mesh: &TriMesh, triangles: &mut [[u32; 3]]) -> usize {
         *v = sets.root(*v);
     }
     (0..mesh.points.len() as u32).filter(|&v| sets.root(v) != v).count()
+}
+
+/// True if the triangles of two edges at one place lie on each other, as far as triangles that are no slivers tell.
+fn is_folded(mesh: &TriMesh, triangles: &[[u32; 3]], g: u32, h: u32) -> bool {
+    let at = |v: u32| mesh.points[v as usize];
+    let p = at(origin(triangles, g));
+    let edge = at(origin(triangles, next(g))) - p;
+    let axis = edge.normalize_or_zero();
+    let aside = |h: u32| {
+        let c = at(origin(triangles, super::previous(h))) - p;
+        c - axis * c.dot(axis)
+    };
+    let [a, b] = [aside(g), aside(h)];
+    let told = a.length().min(b.length()) > THIN * edge.length();
+    told && a.dot(b) > FOLDED * a.length() * b.length()
 }
 
 fn drop_duplicates(triangles: &mut Vec<[u32; 3]>) -> usize {

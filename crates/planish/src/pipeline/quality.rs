@@ -212,6 +212,7 @@ fn in_words(repairs: &Repairs) -> String {
         (repairs.split_vertices, "vertices split"),
         (repairs.collapsed_edges + repairs.flipped_edges + repairs.trimmed_faces, "triangles without height removed"),
         (repairs.closed_handles, "tiny handles cut and closed"),
+        (repairs.closed_holes, "tiny holes closed"),
         (repairs.unreferenced_vertices, "unused vertices dropped"),
     ];
     let words: Vec<String> = done.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();

@@ -70,7 +70,7 @@ const PULL: f64 = 1e-4;
 const LINE: f64 = 4.0;
 /// A triangle may turn so far (cosine), and its height shrink to this share of its longest edge.
 const TURN: f64 = 0.2;
-const SLIVER: f64 = 0.01;
+const SLIVER: f64 = 0.001;
 /// The normal of a triangle whose height is below this share of its longest edge tells nothing.
 const THIN: f64 = 0.1;
 /// Collapses between two looks at the observer.
@@ -90,8 +90,12 @@ pub struct Collapse<'a> {
     /// For each half-edge whether it is a feature (or on the boundary).
     feature: Vec<bool>,
     kind: Vec<Kind>,
+    /// For each vertex the planes of what is around it now.
     quadrics: Vec<Quadric>,
+    /// For each vertex the collapse that made it what it is, counted from one.
     stamp: Vec<u32>,
+    changes: u32,
+    tolerances: Vec<f64>,
     queue: Queue,
     /// All collapses, in their order.
     log: Vec<Step>,
@@ -115,11 +119,15 @@ enum Kind {
 }
 
 impl<'a> Collapse<'a> {
-    /// Prepares a mesh; vertices that are `locked` stay. What was done `before` is done again as far as it can be.
+    /// Prepares a mesh.
+    /// * `locked` - these vertices stay
+    /// * `tolerances` - for each vertex the mean distance that it may be off the planes around it
+    /// * `before` - what was done once is done again as far as it can be
     pub fn new(
         mesh: &'a TriMesh,
         tags: &FeatureTags,
         locked: &[bool],
+        tolerances: Vec<f64>,
         before: &[Step],
     ) -> Result<Collapse<'a>, DecimateError> {
         let adjacency = Adjacency::new(mesh);
@@ -152,24 +160,6 @@ impl<'a> Collapse<'a> {
                 _ => Kind::Fixed,
             })
             .collect();
-        let mut quadrics = vec![Quadric::default(); points.len()];
-        for t in &mesh.triangles {
-            let [a, b, c] = t.map(|v| points[v as usize]);
-            let n = (b - a).cross(c - a);
-            let area = n.length();
-            if area > 0.0 {
-                let q = Quadric::plane(n / area, a, area / 6.0);
-                t.iter().for_each(|&v| quadrics[v as usize] = quadrics[v as usize].plus(&q));
-            }
-        }
-        for h in (0..half_edges as u32).filter(|&h| feature[h as usize]) {
-            // Planes through the edge, upright on its triangle.
-            let ends = [mesh.origin(h), mesh.origin(next(h))];
-            let [a, b] = ends.map(|v| points[v as usize]);
-            let n = mesh.area_vector(h as usize / 3).cross(b - a).normalize_or_zero();
-            let q = Quadric { weight: 0.0, ..Quadric::plane(n, a, LINE * (b - a).length_squared() / 6.0) };
-            ends.iter().for_each(|&v| quadrics[v as usize] = quadrics[v as usize].plus(&q));
-        }
         let mut collapse = Collapse {
             mesh,
             center,
@@ -181,14 +171,17 @@ impl<'a> Collapse<'a> {
             outgoing: adjacency.outgoing,
             feature,
             kind,
-            quadrics,
+            quadrics: vec![Quadric::default(); points.len()],
             stamp: vec![0; points.len()],
+            changes: 0,
+            tolerances,
             queue: Queue::new(0.0),
             log: Vec::new(),
             rings: Default::default(),
             spokes: Vec::new(),
             points,
         };
+        (0..collapse.points.len() as u32).for_each(|v| collapse.quadrics[v as usize] = collapse.quadric(v));
         collapse.replay(before);
         collapse.queue();
         Ok(collapse)
@@ -215,6 +208,28 @@ impl<'a> Collapse<'a> {
         }
     }
 
+    /// The planes of all triangles around `v`, and those upright on them that hold its lines.
+    fn quadric(&self, v: u32) -> Quadric {
+        let mut sum = Quadric::default();
+        for h in self.fan(v) {
+            let [a, b, c] = [h, next(h), previous(h)].map(|h| self.points[self.from(h) as usize]);
+            let n = (b - a).cross(c - a);
+            let area = n.length();
+            if area == 0.0 {
+                continue;
+            }
+            sum = sum.plus(&Quadric::plane(n / area, a, area / 6.0));
+            for (line, end) in [(h, b), (previous(h), c)] {
+                if self.feature[line as usize] {
+                    let upright = n.cross(end - a).normalize_or_zero();
+                    let plane = Quadric::plane(upright, a, LINE * (end - a).length_squared() / 6.0);
+                    sum = sum.plus(&Quadric { weight: 0.0, ..plane });
+                }
+            }
+        }
+        sum
+    }
+
     /// Puts all edges into the queue.
     fn queue(&mut self) {
         let edge = |&h: &u32| {
@@ -229,8 +244,8 @@ impl<'a> Collapse<'a> {
         all.into_iter().for_each(|(cost, entry)| self.queue.push(cost, entry));
     }
 
-    /// Collapses until `count` triangles are left or the next collapse is farther than `tolerance`.
-    pub fn run(&mut self, count: usize, tolerance: f64, observer: &dyn Observer) -> Result<(), DecimateError> {
+    /// Collapses until `count` triangles are left or all that could follow are farther than tolerated.
+    pub fn run(&mut self, count: usize, observer: &dyn Observer) -> Result<(), DecimateError> {
         let start = self.count;
         let mut steps = 0;
         let mut before = self.count;
@@ -248,11 +263,17 @@ impl<'a> Collapse<'a> {
                 continue;
             }
             let (a, b) = self.ends(h);
-            if self.stamp[a as usize].wrapping_add(self.stamp[b as usize]) != stamp {
+            if self.stamp[a as usize].max(self.stamp[b as usize]) != stamp {
                 continue;
             }
             let Some((p, cost)) = self.place(h) else { continue };
+            // The ends are as they were, but what lies around them is not.
+            if self.queue.passed(cost) {
+                self.queue_edge(h);
+                continue;
+            }
             let weight = self.quadrics[a as usize].weight + self.quadrics[b as usize].weight;
+            let tolerance = self.tolerances[a as usize].min(self.tolerances[b as usize]);
             if cost > tolerance * tolerance * weight {
                 continue;
             }
@@ -339,7 +360,7 @@ impl<'a> Collapse<'a> {
     fn entry(&self, h: u32) -> Option<(f64, Entry)> {
         let (_, cost) = self.place(h)?;
         let (a, b) = self.ends(h);
-        Some((cost, Entry { half_edge: h, stamp: self.stamp[a as usize].wrapping_add(self.stamp[b as usize]) }))
+        Some((cost, Entry { half_edge: h, stamp: self.stamp[a as usize].max(self.stamp[b as usize]) }))
     }
 
     /// Where the two ends of an edge would meet, and the error there; `None` if they must not.
@@ -485,7 +506,7 @@ impl<'a> Collapse<'a> {
             self.kind[b as usize] = self.kind[a as usize];
         }
         self.points[b as usize] = p;
-        self.quadrics[b as usize] = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
+        self.tolerances[b as usize] = self.tolerances[a as usize].min(self.tolerances[b as usize]);
         let g = self.opposite[h as usize];
         let mut spokes = std::mem::take(&mut self.spokes);
         spokes.clear();
@@ -519,9 +540,15 @@ impl<'a> Collapse<'a> {
             rest = pick(leaves_b, b, self);
         }
         self.outgoing[b as usize] = self.settled(rest);
-        self.stamp[b as usize] += 1;
+        self.changes += 1;
+        self.stamp[b as usize] = self.changes;
         self.outgoing[a as usize] = NONE;
         self.spokes = spokes;
+        let mut ring = std::mem::take(&mut self.rings[0]);
+        self.neighbours(b, &mut ring);
+        ring.push(b);
+        ring.iter().for_each(|&v| self.quadrics[v as usize] = self.quadric(v));
+        self.rings[0] = ring;
     }
 
     /// Puts all edges at `v` into the queue.
@@ -531,13 +558,15 @@ impl<'a> Collapse<'a> {
         spokes.extend(self.fan(v));
         for &f in &spokes {
             let edges = [Some(f), (self.opposite[previous(f) as usize] == NONE).then(|| previous(f))];
-            for e in edges.into_iter().flatten() {
-                if let Some((cost, entry)) = self.entry(e) {
-                    self.queue.push(cost, entry);
-                }
-            }
+            edges.into_iter().flatten().for_each(|e| self.queue_edge(e));
         }
         self.spokes = spokes;
+    }
+
+    fn queue_edge(&mut self, h: u32) {
+        if let Some((cost, entry)) = self.entry(h) {
+            self.queue.push(cost, entry);
+        }
     }
 
     /// The half-edge of the triangle of `h` that leaves `v`.

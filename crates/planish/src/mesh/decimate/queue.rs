@@ -41,9 +41,7 @@ impl Queue {
 
     /// Puts an edge in; costs are not negative.
     pub fn push(&mut self, cost: f64, entry: Entry) {
-        // The bits of numbers that are not negative are in their order.
-        let bits = cost.to_bits() >> (52 - MANTISSA);
-        let bucket = (bits.saturating_sub(self.floor) as usize).min(BUCKETS - 1);
+        let bucket = self.bucket(cost);
         let new = (entry, self.first[bucket]);
         self.first[bucket] = if self.free == NONE {
             self.entries.push(new);
@@ -55,6 +53,17 @@ impl Queue {
             at
         };
         self.least = self.least.min(bucket);
+    }
+
+    /// True if edges of lower costs, by more than a bucket, may be waiting.
+    pub fn passed(&self, cost: f64) -> bool {
+        self.bucket(cost) > self.least + 1
+    }
+
+    fn bucket(&self, cost: f64) -> usize {
+        // The bits of numbers that are not negative are in their order.
+        let bits = cost.to_bits() >> (52 - MANTISSA);
+        (bits.saturating_sub(self.floor) as usize).min(BUCKETS - 1)
     }
 
     /// Takes out an edge of the lowest bucket.
