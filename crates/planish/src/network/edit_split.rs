@@ -8,7 +8,6 @@
 use super::diagnose::{Regions, regions};
 use super::disk::{Disk, Met};
 use super::edit::{EditError, Editor};
-use super::imprint::Cut;
 use super::layout::layout_around;
 use super::{Corner, Curve, CurveKind, LayoutParams, Network};
 use crate::curve::without_repeats;
@@ -216,7 +215,7 @@ impl Editor<'_> {
         }
         let laid = layout_around(&drawn.cut.mesh, &drawn.barrier, &corner, &[], params, observer)?;
         let triangles = &drawn.cut.mesh.triangles;
-        let to_input = |p: &FacePoint| place_on_input(self, &drawn.cut, p.face, p.bary);
+        let to_input = |p: &FacePoint| drawn.cut.to_uncut(self.adjacency, &self.mesh.triangles, p.face, p.bary);
         let mut network = Network { patches: laid.patches.clone(), ..Network::default() };
         network.corners = laid.corners.iter().map(|c| Corner { place: to_input(&c.place) }).collect();
         for curve in &laid.curves {
@@ -255,25 +254,6 @@ fn line_of(
     let on = [a, b].map(|p| p.on_face(adjacency, triangles, face));
     let zero = (0..3).find(|&k| on.iter().flatten().all(|p| p.bary[k] == 0.0))?;
     kind[3 * face as usize + (zero + 1) % 3]
-}
-
-/// A place of the cut mesh on the input mesh.
-fn place_on_input(editor: &Editor, cut: &Cut, face: u32, bary: [f64; 3]) -> FacePoint {
-    let parent = cut.parent[face as usize];
-    let mut out = [0.0; 3];
-    for (k, &v) in cut.mesh.triangles[face as usize].iter().enumerate() {
-        if bary[k] == 0.0 {
-            continue;
-        }
-        let corner = cut.origin[v as usize].on_face(editor.adjacency, &editor.mesh.triangles, parent);
-        if let Some(corner) = corner {
-            for i in 0..3 {
-                out[i] += bary[k] * corner.bary[i];
-            }
-        }
-    }
-    let sum: f64 = out.iter().sum();
-    FacePoint { face: parent, bary: out.map(|b| b / sum) }
 }
 
 /// A region as a disk with its map.
@@ -361,7 +341,7 @@ impl Flat {
         let face = self.disk.faces[h as usize / 3];
         let mut bary = [0.0; 3];
         bary[h as usize % 3] = 1.0;
-        place_on_input(editor, &drawn.cut, face, bary)
+        drawn.cut.to_uncut(editor.adjacency, &editor.mesh.triangles, face, bary)
     }
 
     /// The straight line of the map between two vertices, as places of the input; neighbours share a face.
@@ -380,7 +360,8 @@ impl Flat {
                     let mut bary = [0.0; 3];
                     let (i, j) = (h as usize % 3, next(h) as usize % 3);
                     (bary[i], bary[j]) = if forward { (1.0 - t, t) } else { (t, 1.0 - t) };
-                    place_on_input(editor, &found.drawn.cut, self.disk.faces[h as usize / 3], bary)
+                    let face = self.disk.faces[h as usize / 3];
+                    found.drawn.cut.to_uncut(editor.adjacency, &editor.mesh.triangles, face, bary)
                 }
             });
         }

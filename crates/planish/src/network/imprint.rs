@@ -201,6 +201,33 @@ pub(crate) fn shared_face(adjacency: &Adjacency, triangles: &[[u32; 3]], a: &Pla
     Some(if along { Shared::Edge } else { Shared::Face(face) })
 }
 
+/// The place `t` of the way from `a` to `b` if both lie on one edge of the mesh.
+pub(crate) fn along_edge(
+    adjacency: &Adjacency,
+    triangles: &[[u32; 3]],
+    a: &Place,
+    b: &Place,
+    t: f64,
+) -> Option<Place> {
+    if shared_face(adjacency, triangles, a, b) != Some(Shared::Edge) {
+        return None;
+    }
+    let h = match (*a, *b) {
+        (Place::Edge(h, _), _) | (_, Place::Edge(h, _)) => h,
+        (Place::Vertex(v), Place::Vertex(w)) => {
+            let h = half_edge(triangles, adjacency, v, w).or_else(|| half_edge(triangles, adjacency, w, v))?;
+            h.min(adjacency.opposite[h as usize])
+        }
+        _ => return None,
+    };
+    let along = |place: &Place| match *place {
+        Place::Edge(_, t) => t,
+        Place::Vertex(v) if triangles[h as usize / 3][next(h) as usize % 3] == v => 1.0,
+        _ => 0.0,
+    };
+    Some(Place::Edge(h, along(a) + (along(b) - along(a)) * t))
+}
+
 /// What two neighbouring places of a curve have in common.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Shared {
@@ -460,6 +487,50 @@ struct Segment {
     curve: usize,
 }
 
+/// The place `t` of the way along side `k` of a face in its flat picture, where the sides bulge.
+fn on_side(k: usize, t: f64) -> Point2<f64> {
+    const CORNERS: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+    const OUT: [[f64; 2]; 3] = [[0.0, -1.0], [1.0, 1.0], [-1.0, 0.0]];
+    let (a, b) = (CORNERS[k], CORNERS[(k + 1) % 3]);
+    let bulge = BULGE * t * (1.0 - t);
+    Point2::new(a[0] + (b[0] - a[0]) * t + OUT[k][0] * bulge, a[1] + (b[1] - a[1]) * t + OUT[k][1] * bulge)
+}
+
+impl Cut {
+    /// A place of the cut mesh as one of the uncut mesh, by its weights in a face of the cut mesh: the same, bit for
+    /// bit, from all faces that it lies on. What does not cross on the cut mesh does not cross on the uncut one either:
+    /// inside a face places go by the flat picture, in which its pieces lie side by side.
+    pub fn to_uncut(&self, adjacency: &Adjacency, triangles: &[[u32; 3]], face: u32, bary: [f64; 3]) -> FacePoint {
+        let corners = self.mesh.triangles[face as usize];
+        let mut on: Vec<(u32, f64)> = (0..3).filter(|&k| bary[k] != 0.0).map(|k| (corners[k], bary[k])).collect();
+        on.sort_unstable_by_key(|x| x.0);
+        let origin = |v: u32| self.origin[v as usize];
+        let edge = match on[..] {
+            [(v, _)] => Some(origin(v)),
+            [(a, x), (b, y)] => along_edge(adjacency, triangles, &origin(a), &origin(b), y / (x + y)),
+            _ => None,
+        };
+        if let Some(place) = edge {
+            let on = place.on_face(adjacency, triangles, place.some_face(adjacency));
+            return on.expect("a place lies on its own face");
+        }
+        let parent = self.parent[face as usize];
+        let (mut sum, mut total) = ([0.0; 2], 0.0);
+        for (v, weight) in on {
+            let at = origin(v).on_face(adjacency, triangles, parent).expect("a corner lies on the uncut face");
+            let at = match (0..3).find(|&k| at.bary[k] == 0.0) {
+                Some(k) => on_side((k + 1) % 3, at.bary[(k + 2) % 3]),
+                None => Point2::new(at.bary[1], at.bary[2]),
+            };
+            sum = [sum[0] + weight * at.x, sum[1] + weight * at.y];
+            total += weight;
+        }
+        let [x, y] = sum.map(|s| s / total);
+        // Beside a side that bulges it may lie beyond it, or be taken for a place on it.
+        FacePoint { face: parent, bary: [1.0 - x - y, x, y].map(|b| b.max(2.0 * ON_EDGE)) }
+    }
+}
+
 /// Triangulates one face with its new vertices and curve pieces.
 fn split_face(
     f: u32,
@@ -470,25 +541,17 @@ fn split_face(
     segments: &HashMap<u32, Vec<Segment>>,
     points: &[DVec3],
 ) -> Result<Vec<[u32; 3]>, ImprintError> {
-    const CORNERS: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-    const OUT: [[f64; 2]; 3] = [[0.0, -1.0], [1.0, 1.0], [-1.0, 0.0]];
     let mut names = Vec::new();
     let mut flat = Vec::new();
     for k in 0..3 {
         names.push(mesh.triangles[f as usize][k]);
-        flat.push(Point2::new(CORNERS[k][0], CORNERS[k][1]));
+        flat.push(on_side(k, 0.0));
         let h = 3 * f + k as u32;
         let o = adjacency.opposite[h as usize];
         let mine = on_edge.get(&if o < h { o } else { h }).map_or(&[][..], |l| &l[..]);
-        let (a, b) = (CORNERS[k], CORNERS[(k + 1) % 3]);
         for &(t, v) in mine {
-            let t = if o < h { 1.0 - t } else { t };
-            let bulge = BULGE * t * (1.0 - t);
             names.push(v);
-            flat.push(Point2::new(
-                a[0] + (b[0] - a[0]) * t + OUT[k][0] * bulge,
-                a[1] + (b[1] - a[1]) * t + OUT[k][1] * bulge,
-            ));
+            flat.push(on_side(k, if o < h { 1.0 - t } else { t }));
         }
     }
     for (p, v) in in_face.get(&f).map_or(&[][..], |l| &l[..]) {
