@@ -9,11 +9,17 @@ use super::diagnose::{Regions, regions};
 use super::disk::{Disk, Met};
 use super::edit::{EditError, Editor};
 use super::layout::layout_around;
-use super::{Corner, Curve, CurveKind, LayoutParams, Network};
+use super::{Corner, Curve, CurveKind, ImprintError, LayoutParams, Network};
 use crate::curve::without_repeats;
 use crate::mesh::{Adjacency, FacePoint, NONE, next};
 use crate::observe::Observer;
+use glam::DVec3;
 use std::f64::consts::TAU;
+
+/// Layouts tried around the curves of a network until the mesh can hold one, ...
+const COMPLETIONS: usize = 3;
+/// ... each with this part more of the patches asked for.
+const OTHER_PATCHES: usize = 8;
 
 /// Patches that one split may run through: more than any chord of a network has.
 const LONGEST_CHORD: usize = 10_000;
@@ -47,22 +53,18 @@ impl Editor<'_> {
 
     /// Number of the region with curves around it that a place lies in, as [`super::diagnose()`] numbers them.
     /// # Errors
-    /// `Imprint` if the curves are not in order, `NoSuchPart` in a part of the mesh without curves.
+    /// `Imprint` if the curves are not in order, `NoRegion` in a part of the mesh without curves.
     pub fn region_at(&self, place: &FacePoint) -> Result<u32, EditError> {
         let found = regions(self.mesh, self.adjacency, &self.network)?;
         let p = place.position(self.mesh);
         let cut = &found.drawn.cut;
-        let away = |f: u32| (cut.mesh.corners(f as usize).into_iter().sum::<glam::DVec3>() / 3.0).distance(p);
+        let away = |f: u32| (cut.mesh.corners(f as usize).into_iter().sum::<DVec3>() / 3.0).distance(p);
         let bounded: Vec<&Vec<u32>> = found.parts.iter().filter(|p| !p.0.is_empty()).map(|p| &p.1).collect();
         let near = bounded.iter().enumerate().flat_map(|(k, faces)| {
             faces.iter().filter(|&&f| cut.parent[f as usize] == place.face).map(move |&f| (away(f), k as u32))
         });
-        let count = bounded.len();
-        near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|x| x.1).ok_or(EditError::NoSuchPart {
-            what: "region",
-            index: count as u32,
-            count,
-        })
+        let found = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|x| x.1);
+        found.ok_or(EditError::NoRegion { place: p })
     }
 
     /// Splits one region; returns the corners put into its sides.
@@ -194,11 +196,36 @@ impl Editor<'_> {
     }
 
     /// Lays out everything that the curves do not part into patches yet. The curves stay where they are, bit for bit
-    /// where they are not divided; new corners may come to lie on them.
+    /// where they are not divided; new corners may come to lie on them. No curves of the result cross.
     /// # Errors
-    /// `Imprint` if curves cross, `Layout` if there is no layout around them.
+    /// `Imprint` if curves cross, `Layout` if there is no layout around them, `Entangled` if there is none that the
+    /// mesh can hold.
     pub fn complete(&mut self, params: &LayoutParams, observer: &dyn Observer) -> Result<(), EditError> {
         let found = regions(self.mesh, self.adjacency, &self.network)?;
+        let mut wrong = None;
+        for attempt in 0..COMPLETIONS {
+            // With other numbers of patches curves run elsewhere.
+            let patches = params.patches + attempt * params.patches.div_ceil(OTHER_PATCHES);
+            let network = self.completed(&found, &LayoutParams { patches, ..params.clone() }, observer)?;
+            match regions(self.mesh, self.adjacency, &network) {
+                Ok(_) => {
+                    self.network = network;
+                    return Ok(());
+                }
+                Err(e) => wrong = wrong.or(Some(e)),
+            }
+        }
+        match wrong {
+            Some(ImprintError::Crossing { x, y, z, .. } | ImprintError::Jump { x, y, z, .. }) => {
+                Err(EditError::Entangled { place: DVec3::new(x, y, z) })
+            }
+            Some(other) => Err(other.into()),
+            None => Ok(()),
+        }
+    }
+
+    /// The network with everything laid out that the curves do not part into patches yet.
+    fn completed(&self, found: &Regions, params: &LayoutParams, observer: &dyn Observer) -> Result<Network, EditError> {
         let drawn = &found.drawn;
         let mut corner = vec![false; drawn.cut.mesh.points.len()];
         for (curve, chain) in self.network.curves.iter().zip(&drawn.cut.chains) {
@@ -227,8 +254,7 @@ impl Editor<'_> {
                 points: curve.points.iter().map(to_input).collect(),
             });
         }
-        self.network = network;
-        Ok(())
+        Ok(network)
     }
 }
 

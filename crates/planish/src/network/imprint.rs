@@ -12,7 +12,7 @@ use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
 use glam::DVec3;
 use rayon::prelude::*;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Outward bulge of the points of an edge in the flat picture of a face, as a fraction of the face. It makes
 /// them strictly convex, so that rounding can neither hide one nor leave a gap along the edge.
@@ -202,13 +202,7 @@ pub(crate) fn shared_face(adjacency: &Adjacency, triangles: &[[u32; 3]], a: &Pla
 }
 
 /// The place `t` of the way from `a` to `b` if both lie on one edge of the mesh.
-pub(crate) fn along_edge(
-    adjacency: &Adjacency,
-    triangles: &[[u32; 3]],
-    a: &Place,
-    b: &Place,
-    t: f64,
-) -> Option<Place> {
+pub(crate) fn along_edge(adjacency: &Adjacency, triangles: &[[u32; 3]], a: &Place, b: &Place, t: f64) -> Option<Place> {
     if shared_face(adjacency, triangles, a, b) != Some(Shared::Edge) {
         return None;
     }
@@ -541,7 +535,7 @@ fn split_face(
     segments: &HashMap<u32, Vec<Segment>>,
     points: &[DVec3],
 ) -> Result<Vec<[u32; 3]>, ImprintError> {
-    let mut names = Vec::new();
+    let (mut names, mut ring) = (Vec::new(), Vec::new());
     let mut flat = Vec::new();
     for k in 0..3 {
         names.push(mesh.triangles[f as usize][k]);
@@ -549,9 +543,16 @@ fn split_face(
         let h = 3 * f + k as u32;
         let o = adjacency.opposite[h as usize];
         let mine = on_edge.get(&if o < h { o } else { h }).map_or(&[][..], |l| &l[..]);
+        let first = names.len();
         for &(t, v) in mine {
             names.push(v);
             flat.push(on_side(k, if o < h { 1.0 - t } else { t }));
+        }
+        ring.push(names[first - 1]);
+        ring.extend_from_slice(&names[first..]);
+        if o < h {
+            let last = ring.len() - mine.len();
+            ring[last..].reverse();
         }
     }
     for (p, v) in in_face.get(&f).map_or(&[][..], |l| &l[..]) {
@@ -584,7 +585,38 @@ fn split_face(
             return Err(crossing(a));
         }
     }
-    Ok(cdt.inner_faces().map(|t| t.vertices().map(|v| owner[v.index()])).collect())
+    let triangles = |cdt: &ConstrainedDelaunayTriangulation<Point2<f64>>| -> Vec<[u32; 3]> {
+        cdt.inner_faces().map(|t| t.vertices().map(|v| owner[v.index()])).collect()
+    };
+    let made = triangles(&cdt);
+    // By Euler's formula; more where points of a side lie so near each other that rounding takes its bulge away.
+    let wanted = 2 * names.len() - ring.len() - 2;
+    if made.len() == wanted {
+        return Ok(made);
+    }
+    for (k, &a) in ring.iter().enumerate() {
+        let b = ring[(k + 1) % ring.len()];
+        let (x, y) = (handle_of(a), handle_of(b));
+        if cdt.try_add_constraint(x, y).is_empty() && !cdt.exists_constraint(x, y) {
+            return Err(crossing(a));
+        }
+    }
+    let made = within(triangles(&cdt), &ring);
+    if made.len() == wanted { Ok(made) } else { Err(crossing(ring[0])) }
+}
+
+/// The triangles inside `ring`, given all inside its convex hull.
+fn within(mut triangles: Vec<[u32; 3]>, ring: &[u32]) -> Vec<[u32; 3]> {
+    let edges = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
+    let rim: HashSet<[u32; 2]> = (0..ring.len()).map(|k| [ring[k], ring[(k + 1) % ring.len()]]).collect();
+    loop {
+        let there: HashSet<[u32; 2]> = triangles.iter().flat_map(edges).collect();
+        let count = triangles.len();
+        triangles.retain(|t| edges(t).iter().all(|e| rim.contains(e) || there.contains(&[e[1], e[0]])));
+        if triangles.len() == count {
+            return triangles;
+        }
+    }
 }
 
 /// Names the faces of a cut mesh: `seeds` are `(chain edge start, chain edge end, name)`, the face to the left
@@ -632,4 +664,67 @@ pub(crate) fn flood(
 /// The half-edge of `adjacency` from vertex `a` to vertex `b`.
 pub(crate) fn half_edge(triangles: &[[u32; 3]], adjacency: &Adjacency, a: u32, b: u32) -> Option<u32> {
     adjacency.fan(a).find(|&h| triangles[h as usize / 3][next(h) as usize % 3] == b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    /// Half-edges without another face.
+    fn free(mesh: &TriMesh) -> usize {
+        Adjacency::new(mesh).opposite.iter().filter(|&&o| o == NONE).count()
+    }
+
+    #[test]
+    fn points_of_a_side_1e_9_or_less_apart_leave_no_gap_between_its_faces() {
+        let mesh = shapes::rectangle(1.0, 1.0, 1, 1);
+        let adjacency = Adjacency::new(&mesh);
+        let h = (0..6).find(|&h| adjacency.opposite[h as usize] > h && adjacency.opposite[h as usize] != NONE).unwrap();
+        let apex = mesh.origin(crate::mesh::previous(h));
+        for k in 0..300 {
+            let first = 0.003 * k as f64 + 1e-9;
+            for gap in [1e-9, 1e-12] {
+                let curves: Vec<Vec<Place>> =
+                    (0..5).map(|i| vec![Place::Vertex(apex), Place::Edge(h, first + gap * i as f64)]).collect();
+                let borrowed: Vec<&[Place]> = curves.iter().map(|c| &c[..]).collect();
+                let cut = cut(&mesh, &adjacency, &borrowed).unwrap();
+                assert_eq!(free(&cut.mesh), 4, "{first} {gap}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_place_of_the_cut_mesh_is_the_same_bits_of_the_uncut_one_from_all_its_faces() {
+        let mesh = shapes::sphere(1.0, 2);
+        let adjacency = Adjacency::new(&mesh);
+        let curve = |seed: u32| -> Vec<Place> {
+            let from = FacePoint { face: seed, bary: [0.21, 0.33, 0.46] };
+            let to = FacePoint { face: (seed * 37 + 151) % mesh.triangles.len() as u32, bary: [0.6, 0.3, 0.1] };
+            let way = crate::curve::connect(&mesh, &adjacency, from, to).unwrap();
+            way.iter().map(|p| place_of(&adjacency, &mesh.triangles, p)).collect()
+        };
+        let mut looked = 0;
+        for seed in 0..60 {
+            let curve = curve(seed);
+            let cut = cut(&mesh, &adjacency, &[&curve]).unwrap();
+            let own = Adjacency::new(&cut.mesh);
+            let to_uncut = |face, bary| cut.to_uncut(&adjacency, &mesh.triangles, face, bary);
+            for h in 0..own.opposite.len() as u32 {
+                let (o, mut a, mut b) = (own.opposite[h as usize], [0.0; 3], [0.0; 3]);
+                (a[h as usize % 3], a[next(h) as usize % 3]) = (0.75, 0.25);
+                (b[next(o) as usize % 3], b[o as usize % 3]) = (0.75, 0.25);
+                assert_eq!(to_uncut(h / 3, a), to_uncut(o / 3, b));
+                let corner = FacePoint::corner(h / 3, h as usize % 3);
+                let there = FacePoint::corner(o / 3, next(o) as usize % 3);
+                let place = to_uncut(h / 3, corner.bary);
+                assert_eq!(place, to_uncut(o / 3, there.bary));
+                // And it is the place that was cut.
+                let origin = cut.origin[cut.mesh.triangles[h as usize / 3][h as usize % 3] as usize];
+                assert_eq!(place_of(&adjacency, &mesh.triangles, &place), origin);
+                looked += 1;
+            }
+        }
+        assert!(looked > 50_000);
+    }
 }
