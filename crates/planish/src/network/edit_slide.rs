@@ -10,6 +10,9 @@ use crate::curve::between;
 use crate::mesh::FacePoint;
 use glam::DVec3;
 
+/// Nearer to a point of the line than this share of the piece is at it.
+const AT_POINT: f64 = 1e-9;
+
 /// Where a corner has slid to.
 pub(super) struct Slid {
     /// Its new place.
@@ -41,6 +44,13 @@ impl Editor<'_> {
         }
         let at: Vec<DVec3> = chain.iter().map(|p| p.position(self.mesh)).collect();
         let (k, share) = nearest(&at, to);
+        let share = if share < AT_POINT {
+            0.0
+        } else if share > 1.0 - AT_POINT {
+            1.0
+        } else {
+            share
+        };
         let last = chain.len() - 2;
         if (k, share) == (0, 0.0) || (k, share) == (last, 1.0) {
             // The end of the line; of a closed one the corner itself.

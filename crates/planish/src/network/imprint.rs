@@ -519,9 +519,11 @@ impl Cut {
             sum = [sum[0] + weight * at.x, sum[1] + weight * at.y];
             total += weight;
         }
-        let [x, y] = sum.map(|s| s / total);
         // Beside a side that bulges it may lie beyond it, or be taken for a place on it.
-        FacePoint { face: parent, bary: [1.0 - x - y, x, y].map(|b| b.max(2.0 * ON_EDGE)) }
+        let [x, y] = sum.map(|s| (s / total).max(2.0 * ON_EDGE));
+        let room = ((1.0 - 2.0 * ON_EDGE) / (x + y)).min(1.0);
+        let [x, y] = [x * room, y * room];
+        FacePoint { face: parent, bary: [(1.0 - x - y).max(ON_EDGE * 1.5), x, y] }
     }
 }
 
@@ -535,24 +537,25 @@ fn split_face(
     segments: &HashMap<u32, Vec<Segment>>,
     points: &[DVec3],
 ) -> Result<Vec<[u32; 3]>, ImprintError> {
-    let (mut names, mut ring) = (Vec::new(), Vec::new());
-    let mut flat = Vec::new();
+    // Vertices with their places in the flat picture; those of the rim, in order; and the sides that each lies on.
+    let (mut names, mut flat, mut ring, mut sides) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for k in 0..3 {
+        ring.push(names.len());
         names.push(mesh.triangles[f as usize][k]);
         flat.push(on_side(k, 0.0));
+        sides.push(1u8 << k | 1 << ((k + 2) % 3));
         let h = 3 * f + k as u32;
         let o = adjacency.opposite[h as usize];
         let mine = on_edge.get(&if o < h { o } else { h }).map_or(&[][..], |l| &l[..]);
-        let first = names.len();
+        let first = ring.len();
         for &(t, v) in mine {
+            ring.push(names.len());
             names.push(v);
             flat.push(on_side(k, if o < h { 1.0 - t } else { t }));
+            sides.push(1 << k);
         }
-        ring.push(names[first - 1]);
-        ring.extend_from_slice(&names[first..]);
         if o < h {
-            let last = ring.len() - mine.len();
-            ring[last..].reverse();
+            ring[first..].reverse();
         }
     }
     for (p, v) in in_face.get(&f).map_or(&[][..], |l| &l[..]) {
@@ -585,37 +588,72 @@ fn split_face(
             return Err(crossing(a));
         }
     }
-    let triangles = |cdt: &ConstrainedDelaunayTriangulation<Point2<f64>>| -> Vec<[u32; 3]> {
-        cdt.inner_faces().map(|t| t.vertices().map(|v| owner[v.index()])).collect()
+    sides.resize(names.len(), 0);
+    let triangles = |cdt: &ConstrainedDelaunayTriangulation<Point2<f64>>| -> Vec<[usize; 3]> {
+        cdt.inner_faces().map(|t| t.vertices().map(|v| v.index())).collect()
     };
-    let made = triangles(&cdt);
-    // By Euler's formula; more where points of a side lie so near each other that rounding takes its bulge away.
-    let wanted = 2 * names.len() - ring.len() - 2;
-    if made.len() == wanted {
-        return Ok(made);
-    }
-    for (k, &a) in ring.iter().enumerate() {
-        let b = ring[(k + 1) % ring.len()];
-        let (x, y) = (handle_of(a), handle_of(b));
-        if cdt.try_add_constraint(x, y).is_empty() && !cdt.exists_constraint(x, y) {
-            return Err(crossing(a));
+    let mut made = triangles(&cdt);
+    if !is_within(&made, &ring, names.len()) {
+        // Points of a side lie so near each other that rounding takes its bulge away.
+        for (k, &a) in ring.iter().enumerate() {
+            let [x, y] = [a, ring[(k + 1) % ring.len()]].map(|i| handle_of(names[i]));
+            if cdt.try_add_constraint(x, y).is_empty() && !cdt.exists_constraint(x, y) {
+                return Err(crossing(names[a]));
+            }
+        }
+        made = within(triangles(&cdt), &ring);
+        if !is_within(&made, &ring, names.len()) {
+            return Err(crossing(names[ring[0]]));
         }
     }
-    let made = within(triangles(&cdt), &ring);
-    if made.len() == wanted { Ok(made) } else { Err(crossing(ring[0])) }
+    flip_flat(&mut made, &sides);
+    Ok(made.into_iter().map(|t| t.map(|i| owner[i])).collect())
+}
+
+fn edges(t: &[usize; 3]) -> [[usize; 2]; 3] {
+    [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]
+}
+
+fn rim(ring: &[usize]) -> impl Iterator<Item = [usize; 2]> {
+    (0..ring.len()).map(|k| [ring[k], ring[(k + 1) % ring.len()]])
+}
+
+/// True if triangles over `points` points fill what is inside `ring`, and that alone: their number is that of Euler's
+/// formula, and all edges of the ring are theirs.
+fn is_within(triangles: &[[usize; 3]], ring: &[usize], points: usize) -> bool {
+    triangles.len() + ring.len() + 2 == 2 * points && rim(ring).all(|e| triangles.iter().any(|t| edges(t).contains(&e)))
 }
 
 /// The triangles inside `ring`, given all inside its convex hull.
-fn within(mut triangles: Vec<[u32; 3]>, ring: &[u32]) -> Vec<[u32; 3]> {
-    let edges = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
-    let rim: HashSet<[u32; 2]> = (0..ring.len()).map(|k| [ring[k], ring[(k + 1) % ring.len()]]).collect();
+fn within(mut triangles: Vec<[usize; 3]>, ring: &[usize]) -> Vec<[usize; 3]> {
+    let rim: HashSet<[usize; 2]> = rim(ring).collect();
     loop {
-        let there: HashSet<[u32; 2]> = triangles.iter().flat_map(edges).collect();
+        let there: HashSet<[usize; 2]> = triangles.iter().flat_map(edges).collect();
         let count = triangles.len();
         triangles.retain(|t| edges(t).iter().all(|e| rim.contains(e) || there.contains(&[e[1], e[0]])));
         if triangles.len() == count {
             return triangles;
         }
+    }
+}
+
+/// Flips away triangles between three points of one side: their long edges run beside the side, and the face across it
+/// may have the same.
+fn flip_flat(triangles: &mut [[usize; 3]], sides: &[u8]) {
+    let flat = |t: &[usize; 3]| sides[t[0]] & sides[t[1]] & sides[t[2]] != 0;
+    loop {
+        let found = (0..triangles.len()).filter(|&i| flat(&triangles[i])).find_map(|i| {
+            let t = triangles[i];
+            (0..3).find_map(|k| {
+                let (a, b, c) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
+                let across = |u: &[usize; 3]| edges(u).iter().position(|e| *e == [b, a]);
+                let j = triangles.iter().position(|u| !flat(u) && across(u).is_some())?;
+                let d = triangles[j][(across(&triangles[j])? + 2) % 3];
+                Some((i, j, [d, b, c], [c, a, d]))
+            })
+        });
+        let Some((i, j, first, second)) = found else { return };
+        (triangles[i], triangles[j]) = (first, second);
     }
 }
 
