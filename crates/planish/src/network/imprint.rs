@@ -523,7 +523,7 @@ impl Cut {
         let [x, y] = sum.map(|s| (s / total).max(2.0 * ON_EDGE));
         let room = ((1.0 - 2.0 * ON_EDGE) / (x + y)).min(1.0);
         let [x, y] = [x * room, y * room];
-        FacePoint { face: parent, bary: [(1.0 - x - y).max(ON_EDGE * 1.5), x, y] }
+        FacePoint { face: parent, bary: [1.0 - x - y, x, y] }
     }
 }
 
