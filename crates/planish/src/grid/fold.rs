@@ -85,9 +85,7 @@ fn ends(cols: usize, rows: usize) -> [usize; 4] {
 
 /// Indices of the folded cells of a net.
 pub fn folded_cells(net: &Net) -> Vec<usize> {
-    // Every point is a corner of four cells.
-    let normals: Vec<DVec3> = net.spots.iter().map(|&spot| net.chart.normal(spot)).collect();
-    sheet(net, &|k| normals[k]).folded_cells()
+    sheet(net, &|k| net.chart.normal(net.spots[k])).folded_cells()
 }
 
 fn sheet<'a>(net: &'a Net, normal: &'a dyn Fn(usize) -> DVec3) -> Sheet<'a> {
