@@ -278,7 +278,7 @@ fn cuts_and_strokes(mesh: &TriMesh, seed: u64, boundaries: bool) -> Vec<String> 
 fn networks_completed_around_two_cuts_and_two_strokes_on_rough_meshes_are_finished_without_crossings() {
     let mut rough = shapes::torus(2.0, 0.8, 90, 45);
     for (k, p) in rough.points.iter_mut().enumerate() {
-        *p += DVec3::new(0.7, 0.4, 0.6) * 0.03 * ((k as f64 * 12.9898).sin() * 43_758.5453).fract();
+        *p += DVec3::new(0.7, 0.4, 0.6) * 0.03 * ((k as f64 * 12.9898).sin() * 43_758.545_3).fract();
     }
     let mut meshes = vec![("torus", rough)];
     meshes.extend(

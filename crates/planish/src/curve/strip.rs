@@ -654,7 +654,7 @@ mod tests {
     fn a_way_from_an_edge_over_a_rough_surface_never_turns_back_by_more_than_90_degrees() {
         let mut mesh = shapes::sphere(1.0, 4);
         for (k, p) in mesh.points.iter_mut().enumerate() {
-            *p *= 1.0 + 0.004 * ((k as f64 * 12.9898).sin() * 43_758.5453).fract();
+            *p *= 1.0 + 0.004 * ((k as f64 * 12.9898).sin() * 43_758.545_3).fract();
         }
         let adjacency = Adjacency::new(&mesh);
         let faces = mesh.triangles.len() as u32;
