@@ -318,7 +318,7 @@ pub struct Edit {
     /// The model; or a mesh, to draw a network from nothing
     #[arg(value_name = "MODEL.planish|MESH")]
     pub input: PathBuf,
-    /// The edits, one after the other
+    /// The edits, one after the other: `[[step]]` tables, each with an `edit`. docs/guide/edit.md has them all
     #[arg(value_name = "SCRIPT.toml")]
     pub script: PathBuf,
     /// Where the edited model goes [default: over the input, if that is a model]

@@ -492,3 +492,20 @@ proptest! {
         prop_assert!(snake.unevenness().unwrap() < 0.1);
     }
 }
+
+#[test]
+fn a_chain_that_passes_its_end_by_1e_9_of_an_edge_and_comes_back_goes_there_straight() {
+    let mesh = shapes::rectangle(1.0, 1.0, 4, 4);
+    let adjacency = Adjacency::new(&mesh);
+    let face = 9;
+    // From one corner of a face to the next, and back along the edge by next to nothing.
+    let end = FacePoint { face, bary: [1e-9, 1.0 - 1e-9, 0.0] };
+    let chain = SurfaceCurve::open(vec![FacePoint::corner(face, 0), FacePoint::corner(face, 1), end]);
+    assert_eq!(chain.trace(&mesh, &adjacency).unwrap(), vec![FacePoint::corner(face, 0), end]);
+    let there = SurfaceCurve::open(vec![end, FacePoint::corner(face, 1), FacePoint::corner(face, 0)]);
+    assert_eq!(there.trace(&mesh, &adjacency).unwrap(), vec![end, FacePoint::corner(face, 0)]);
+    // What goes on in another edge stays.
+    let on =
+        SurfaceCurve::open(vec![FacePoint::corner(face, 0), FacePoint::corner(face, 1), FacePoint::corner(face, 2)]);
+    assert_eq!(on.trace(&mesh, &adjacency).unwrap().len(), 3);
+}

@@ -248,6 +248,54 @@ fn the_rest_of_a_network_is_completed_around_curves_that_stay_within_a_millionth
     assert!(editor.network.curves.iter().all(|c| c.kind == CurveKind::Smooth));
 }
 
+/// Edits of a session: cuts by planes through places of the mesh, strokes between places, and the rest completed.
+fn cuts_and_strokes(mesh: &TriMesh, seed: u64, boundaries: bool) -> Vec<String> {
+    let used: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    let pick = |k: u64| {
+        let k = (seed + 1).wrapping_mul(k).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
+        mesh.points[used[k as usize % used.len()] as usize]
+    };
+    let text = |p: DVec3| format!("[{},{},{}]", p.x, p.y, p.z);
+    let mut edits: Vec<String> = if boundaries { vec![r#"{"edit":"boundaries"}"#.into()] } else { Vec::new() };
+    for (k, normal) in [(1, [1.0, 0.2, 0.1]), (2, [0.0, 0.3, 1.0])] {
+        let c = mesh.bounds();
+        let middle = (c.min + c.max) / 2.0;
+        // Near the middle, so that the cut is a long one.
+        let n = DVec3::from_array(normal);
+        let near = |p: &DVec3| (*p - middle).dot(n).abs();
+        let through = (0..40).map(|i| pick(100 * k + i)).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap();
+        edits.push(format!(r#"{{"edit":"cut","through":{},"normal":{normal:?}}}"#, text(through)));
+    }
+    for (k, mode) in [(7, "geodesic"), (11, "magnetic")] {
+        let (a, b) = (pick(k), pick(k + 1));
+        edits.push(format!(r#"{{"edit":"paint","mode":"{mode}","picks":[{},{}]}}"#, text(a), text(b)));
+    }
+    edits.push(r#"{"edit":"complete","patches":50}"#.into());
+    edits
+}
+
+#[test]
+fn networks_completed_around_two_cuts_and_two_strokes_on_rough_meshes_are_finished_without_crossings() {
+    let mut rough = shapes::torus(2.0, 0.8, 90, 45);
+    for (k, p) in rough.points.iter_mut().enumerate() {
+        *p += DVec3::new(0.7, 0.4, 0.6) * 0.03 * ((k as f64 * 12.9898).sin() * 43_758.545_3).fract();
+    }
+    let mut meshes = vec![("torus", rough)];
+    meshes.extend(
+        ["bunny", "rocker_arm"].map(|n| Some((n, common::data_mesh(&format!("{n}.ply"))?))).into_iter().flatten(),
+    );
+    for (name, mesh) in &meshes {
+        for seed in 0..if *name == "torus" { 2 } else { 1 } {
+            let edits = cuts_and_strokes(mesh, seed, *name == "bunny");
+            let drawn = run(mesh, Drawing::default(), &edits.iter().map(|e| e.as_str()).collect::<Vec<_>>());
+            let adjacency = Adjacency::new(mesh);
+            let found = Editor::new(mesh, &adjacency, drawn.network.clone()).diagnose();
+            assert!(found.is_finished(), "{name} {seed}: {:?}", found.faults);
+            assert!(imprint(mesh, &drawn.network).is_ok(), "{name} {seed}");
+        }
+    }
+}
+
 /// A patch with a bump, and curves across it: `u` and `v` of each family.
 fn bumpy(u: usize, v: usize) -> (TriMesh, Network, Vec<FeatureCurve>) {
     let at =

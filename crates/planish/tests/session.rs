@@ -8,7 +8,7 @@ use planish::geom::Bvh;
 use planish::grid::{self, Family};
 use planish::mesh::{Adjacency, Attribute, TriMesh, shapes};
 use planish::model::{Drawing, HistoryEntry, Model};
-use planish::network::{EditError, Fault, diagnose, imprint};
+use planish::network::{CurveKind, EditError, Fault, diagnose, imprint};
 use planish::observe::Silent;
 use planish::pipeline::{self, PipelineParams};
 
@@ -383,6 +383,7 @@ fn numbers_out_of_their_range_are_told_by_name_and_leave_the_drawing_as_it_was()
         (r#"{"edit":"split_curve","curve":{"near":[90,0,0]},"at":0.5}"#, "off the mesh"),
         (r#"{"edit":"delete_feature","feature":{"near":[1,0,0]}}"#, "there is no feature curve yet"),
         (r#"{"edit":"join","corner":9}"#, "corner 9 is not there, there are 1"),
+        (r#"{"edit":"paint","picks":[[1,0,0],[0,1,0]],"magnet":"creases"}"#, "a magnet draws magnetic strokes alone"),
     ] {
         let refused = make(&ground, &mut drawing, edit).unwrap_err().to_string();
         assert!(refused.contains(told), "{edit}: {refused}");
@@ -516,4 +517,165 @@ fn corners_near_the_plane_of_symmetry_are_put_into_it_and_have_no_image_besides(
     // The curve and its image part the sphere in two regions of two sides.
     let found = diagnose(&mesh, &Adjacency::new(&mesh), &drawing.network);
     assert!(found.faults.iter().all(|f| f.to_string().contains("2 sides")) && found.faults.len() == 2, "{found:?}");
+}
+
+/// World length of a curve.
+fn length(mesh: &TriMesh, points: &[planish::mesh::FacePoint]) -> f64 {
+    points.windows(2).map(|w| w[0].position(mesh).distance(w[1].position(mesh))).sum()
+}
+
+#[test]
+fn a_corner_on_the_boundary_slides_along_it_and_its_curves_follow() {
+    let (mesh, start) = sheet();
+    let ground = Ground::new(&mesh);
+    let mut drawing = start;
+    make(&ground, &mut drawing, r#"{"edit":"paint","mode":"geodesic","picks":[[0.9,0,0],[1.1,1,0]]}"#).unwrap();
+    let before = drawing.network.clone();
+    assert_eq!((before.corners.len(), before.curves.len(), before.patches.len()), (6, 7, 2));
+    let corner =
+        (0..6).find(|&k| before.corners[k].place.position(&mesh).distance(DVec3::new(0.9, 0.0, 0.0)) < 0.1).unwrap();
+    let along = |n: &planish::network::Network| -> f64 {
+        n.curves.iter().filter(|c| c.kind == CurveKind::Boundary).map(|c| length(&mesh, &c.points)).sum()
+    };
+    // Dragged into the sheet, and by an uneven part of an edge.
+    let to = r#"[0.713,0.15,0.05]"#;
+    let made =
+        make(&ground, &mut drawing, &format!(r#"{{"edit":"drag_corner","corner":{corner},"to":{to}}}"#)).unwrap();
+    assert_eq!(made.faults, Some(Vec::new()));
+    assert_eq!(made.relaxed.len(), 1);
+    let after = drawing.network.clone();
+    let p = after.corners[corner].place.position(&mesh);
+    assert!(p.y == 0.0 && (p.x - 0.713).abs() < 0.02, "{p}");
+    assert_eq!(after.patches, before.patches);
+    assert!((along(&after) - along(&before)).abs() < 1e-12);
+    for (k, (old, new)) in before.curves.iter().zip(&after.curves).enumerate() {
+        let ends_there = old.corners.contains(&(corner as u32));
+        assert_eq!(old != new, ends_there, "{k}");
+        assert_eq!((old.corners, old.kind), (new.corners, new.kind));
+    }
+    // Back again: the boundary is what it was, without a trace of where the corner has been.
+    let was = serde_json::to_string(&before.corners[corner].place).unwrap();
+    make(&ground, &mut drawing, &format!(r#"{{"edit":"drag_corner","corner":{corner},"to":{was}}}"#)).unwrap();
+    for (old, new) in before.curves.iter().zip(&drawing.network.curves).filter(|(c, _)| c.kind == CurveKind::Boundary) {
+        let places = |c: &planish::network::Curve| c.points.iter().map(|p| p.position(&mesh)).collect::<Vec<_>>();
+        let (old, new) = (places(old), places(new));
+        assert_eq!(old.len(), new.len());
+        assert!(old.iter().zip(&new).all(|(a, b)| a.distance(*b) < 1e-9));
+    }
+    // Past the next corner of the boundary, and a boundary curve off the boundary.
+    let kept = drawing.clone();
+    for (edit, told) in [
+        (format!(r#"{{"edit":"drag_corner","corner":{corner},"to":[-0.3,-0.1,0]}}"#), "would meet corner 0"),
+        (r#"{"edit":"drag_curve","curve":{"near":[1.5,0,0]},"at":0.5,"by":[0,0.1,0]}"#.into(), "follows the boundary"),
+    ] {
+        let refused = make(&ground, &mut drawing, &edit).unwrap_err().to_string();
+        assert!(refused.contains(told), "{refused}");
+        assert_eq!(drawing, kept);
+    }
+}
+
+#[test]
+fn a_closed_boundary_turns_with_its_only_corner_and_corners_on_sharp_edges_slide_along_them() {
+    let mesh = shapes::annulus(1.0, 2.0, 48);
+    let (mut drawing, _) = run(&mesh, &[r#"{"edit":"boundaries"}"#]);
+    let ground = Ground::new(&mesh);
+    let whole: Vec<f64> = drawing.network.curves.iter().map(|c| length(&mesh, &c.points)).collect();
+    for to in ["[-2.1,0.3,0]", "[0.2,-2.3,0]"] {
+        let edit = format!(r#"{{"edit":"drag_corner","corner":{{"near":[2,0,0]}},"to":{to}}}"#);
+        let edit = if to.starts_with("[0.2") { edit.replace("[2,0,0]", "[-2,0.3,0]") } else { edit };
+        make(&ground, &mut drawing, &edit).unwrap();
+    }
+    let at = drawing.network.corners.iter().map(|c| c.place.position(&mesh));
+    assert!(at.clone().any(|p| p.distance(DVec3::new(0.17, -1.99, 0.0)) < 0.05), "{:?}", at.collect::<Vec<_>>());
+    for (curve, whole) in drawing.network.curves.iter().zip(whole) {
+        assert!((length(&mesh, &curve.points) - whole).abs() < 1e-12);
+        assert_eq!(
+            curve.points.len(),
+            curve
+                .points
+                .iter()
+                .map(|p| p.position(&mesh).to_array().map(f64::to_bits))
+                .collect::<std::collections::BTreeSet<_>>()
+                .len()
+                + 1
+        );
+    }
+    // A box: the corner on an edge slides, those of the box stay.
+    let mesh = shapes::cuboid(DVec3::ONE, 8);
+    let low = mesh.bounds().min;
+    let at = |x: f64, y: f64, z: f64| format!("[{},{},{}]", low.x + x, low.y + y, low.z + z);
+    let add = format!(r#"{{"edit":"add_corner","at":{}}}"#, at(0.5, 0.0, 0.0));
+    let (mut drawing, _) = run(&mesh, &[r#"{"edit":"feature_lines","angle_deg":40}"#, &add]);
+    let ground = Ground::new(&mesh);
+    let corner = drawing.network.corners.len() - 1;
+    let drag = |to: String, corner: usize| format!(r#"{{"edit":"drag_corner","corner":{corner},"to":{to}}}"#);
+    make(&ground, &mut drawing, &drag(at(0.31, 0.1, 0.0), corner)).unwrap();
+    let p = drawing.network.corners[corner].place.position(&mesh) - low;
+    assert!(p.distance(DVec3::new(0.31, 0.0, 0.0)) < 1e-9, "{p}");
+    let tip = (0..corner).find(|&k| drawing.network.corners[k].place.position(&mesh).distance(low) < 1e-9).unwrap();
+    let refused = make(&ground, &mut drawing, &drag(at(0.2, 0.0, 0.0), tip)).unwrap_err().to_string();
+    assert!(refused.contains("ends 3 curves along sharp edges"), "{refused}");
+}
+
+#[test]
+fn a_dragged_section_goes_on_from_the_rest_of_its_curve_without_a_kink() {
+    let mesh = shapes::sphere(1.0, 5);
+    let ground = Ground::new(&mesh);
+    let (start, _) = run(&mesh, &CUTS[..1]);
+    let turns = |forces: &str| -> f64 {
+        let mut drawing = start.clone();
+        let edit =
+            format!(r#"{{"edit":"drag_curve","curve":0,"at":0.5,"by":[0,0,0.1],"width":0.3,"forces":{forces}}}"#);
+        make(&ground, &mut drawing, &edit).unwrap();
+        let at: Vec<DVec3> = drawing.network.curves[0].points.iter().map(|p| p.position(&mesh)).collect();
+        let old = &start.network.curves[0].points;
+        // Where the section starts and ends: the bits change there.
+        let new = &drawing.network.curves[0].points;
+        let first = old.iter().zip(new).take_while(|(a, b)| a == b).count() - 1;
+        let last = new.len() - old.iter().rev().zip(new.iter().rev()).take_while(|(a, b)| a == b).count();
+        let turn = |k: usize| {
+            let arm = |step: &dyn Fn(usize) -> usize| {
+                let mut i = k;
+                while at[i].distance(at[k]) < 0.05 {
+                    i = step(i);
+                }
+                at[i]
+            };
+            let (a, b) = (arm(&|i| i - 1), arm(&|i| i + 1));
+            // In the surface: without the bend of the sphere.
+            let n = at[k].normalize();
+            let flat = |d: DVec3| d - n * d.dot(n);
+            flat(at[k] - a).angle_between(flat(b - at[k])).to_degrees()
+        };
+        turn(first).max(turn(last))
+    };
+    let band = turns(r#"{"fairness":1.0,"curvature":0.0}"#);
+    let wire = turns(r#"{"fairness":0.02,"curvature":1.0}"#);
+    assert!(band > 6.0 && wire < 0.4 * band, "{band} {wire}");
+}
+
+#[test]
+fn a_stroke_along_edges_that_a_curve_runs_along_adds_what_is_not_there_yet() {
+    let mesh = shapes::cuboid(DVec3::ONE, 8);
+    let low = mesh.bounds().min;
+    let ground = Ground::new(&mesh);
+    let (start, _) = run(&mesh, &[r#"{"edit":"feature_lines","angle_deg":40}"#]);
+    let at = |x: f64, y: f64, z: f64| format!("[{},{},{}]", low.x + x, low.y + y, low.z + z);
+    let whole = |d: &Drawing| -> f64 { d.network.curves.iter().map(|c| length(&mesh, &c.points)).sum() };
+    assert!((whole(&start) - 12.0).abs() < 1e-9);
+    // Down one face onto an edge, along it, and off again over the other.
+    let mut drawing = start.clone();
+    let picks = [at(0.25, 0.5, 0.0), at(0.25, 0.0, 0.0), at(0.75, 0.0, 0.0), at(0.75, 0.0, 0.5)].join(",");
+    let made =
+        make(&ground, &mut drawing, &format!(r#"{{"edit":"paint","mode":"geodesic","picks":[{picks}]}}"#)).unwrap();
+    let faults: Vec<String> = made.faults.unwrap().iter().map(|f| f.to_string()).collect();
+    assert!(faults.iter().all(|f| !f.contains("cross")), "{faults:?}");
+    assert!((whole(&drawing) - 13.0).abs() < 1e-9, "{}", whole(&drawing));
+    assert_eq!(drawing.network.corners.len(), start.network.corners.len() + 4);
+    // A stroke along nothing else adds no curve.
+    let mut drawing = start.clone();
+    let picks = [at(0.25, 0.0, 0.0), at(0.75, 0.0, 0.0)].join(",");
+    make(&ground, &mut drawing, &format!(r#"{{"edit":"paint","mode":"geodesic","picks":[{picks}]}}"#)).unwrap();
+    assert!((whole(&drawing) - 12.0).abs() < 1e-9);
+    assert!(diagnose(&mesh, &ground.canvas.adjacency, &drawing.network).is_finished());
 }

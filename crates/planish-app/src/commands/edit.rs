@@ -117,7 +117,10 @@ fn read_script(path: &Path) -> Result<Script, Failure> {
     let line = |at: usize| text[..at.min(text.len())].matches('\n').count() + 1;
     let wrong = |message: &str, line: Option<usize>| {
         let place = line.map_or(String::new(), |n| format!(" (line {n})"));
-        let message = message.trim().replace('\n', ", ");
+        let mut message = message.trim().replace('\n', ", ");
+        for (name, words) in [("usize", "a whole number, 0 or more"), ("u32", "a whole number, 0 or more")] {
+            message = message.replace(&format!("expected {name}"), &format!("expected {words}"));
+        }
         Failure::input(path, format!("{message}{place}")).hint("see docs/guide/edit.md for the edits")
     };
     let script: Text = toml::from_str(&text).map_err(|e| wrong(e.message(), e.span().map(|s| line(s.start))))?;

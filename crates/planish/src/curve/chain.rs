@@ -119,7 +119,35 @@ fn lies(mesh: &TriMesh, p: &FacePoint) -> Lies {
     }
 }
 
-/// Takes away places that repeat the one before; the last place is kept.
+/// How far along an edge (lower vertex first) a place of it lies.
+fn along(lies: &Lies, edge: (u32, u32)) -> Option<f64> {
+    match *lies {
+        Lies::Vertex(v) if v == edge.0 => Some(0.0),
+        Lies::Vertex(v) if v == edge.1 => Some(1.0),
+        Lies::Edge(a, b, t) if (a, b) == edge => Some(t),
+        _ => None,
+    }
+}
+
+/// True if a chain that comes from `a` to `b` on an edge turns back there, to `c` on the same edge.
+fn turns_back(mesh: &TriMesh, [a, b, c]: [&FacePoint; 3]) -> bool {
+    let all = [a, b, c].map(|p| lies(mesh, p));
+    let edge = all.iter().find_map(|l| match *l {
+        Lies::Edge(a, b, _) => Some((a, b)),
+        _ => None,
+    });
+    let edge = edge.or(match all {
+        [Lies::Vertex(v), Lies::Vertex(w), _] => Some((v.min(w), v.max(w))),
+        _ => None,
+    });
+    match edge.map(|e| [0, 1, 2].map(|k| along(&all[k], e))) {
+        Some([Some(r), Some(s), Some(t)]) => (s - r) * (t - s) < 0.0,
+        _ => false,
+    }
+}
+
+/// Takes away places that repeat the one before, and places beyond which the chain goes back in the edge that it came
+/// along; the last place is kept.
 pub(crate) fn without_repeats(mesh: &TriMesh, chain: &mut Vec<FacePoint>) {
     let same = |a: &FacePoint, b: &FacePoint| match (lies(mesh, a), lies(mesh, b)) {
         (Lies::Vertex(v), Lies::Vertex(w)) => v == w,
@@ -128,7 +156,18 @@ pub(crate) fn without_repeats(mesh: &TriMesh, chain: &mut Vec<FacePoint>) {
         _ => false,
     };
     let last = chain.last().copied();
-    chain.dedup_by(|b, a| same(a, b));
+    let mut kept: Vec<FacePoint> = Vec::with_capacity(chain.len());
+    for place in chain.drain(..) {
+        while let [.., a, b] = &kept[..]
+            && turns_back(mesh, [a, b, &place])
+        {
+            kept.pop();
+        }
+        if kept.last().is_none_or(|p| !same(p, &place)) {
+            kept.push(place);
+        }
+    }
+    *chain = kept;
     if let (Some(last), Some(end)) = (last, chain.last_mut()) {
         *end = last;
     }

@@ -326,8 +326,8 @@ fn straightened(
     to: FacePoint,
 ) -> Vec<FacePoint> {
     let ends = [from, to];
-    let (from, to) =
-        (beyond_its_edge(adjacency, from, &mut portals, true), beyond_its_edge(adjacency, to, &mut portals, false));
+    let (mut from, mut to) = (from, to);
+    beyond_their_edges(adjacency, [&mut from, &mut to], &mut portals, |&h| h);
     let mut gates: Vec<Gate> = portals.into_iter().map(|h| Gate::new(mesh, adjacency, h)).collect();
     let mut turned: Vec<Gate> = Vec::with_capacity(gates.len());
     let mut lay = Layout::default();
@@ -362,6 +362,8 @@ fn straightened(
         }
         push_gates(adjacency, &mut turned, gates[done..].iter().copied());
         std::mem::swap(&mut gates, &mut turned);
+        // An end on an edge that is crossed now would lie between the sides of the funnel, in line with them.
+        beyond_their_edges(adjacency, [&mut from, &mut to], &mut gates, |g| g.half_edge);
     }
     let mut places = places(mesh, &from, &gates, &to, &lay, &bends);
     let last = places.len() - 1;
@@ -395,35 +397,30 @@ fn whole_angle(mesh: &TriMesh, adjacency: &Adjacency, w: u32) -> f64 {
 /// Weights below this are zero: the place lies on the edge.
 const ON_EDGE: f64 = 1e-12;
 
-/// An end of a strip that lies on the first (or last) edge crossed, named on the face beyond; that edge is no longer
+/// Names ends of a strip that lie on the first (or last) edge crossed on the face beyond; such edges are no longer
 /// crossed then, or the way would name the place twice.
-fn beyond_its_edge(adjacency: &Adjacency, place: FacePoint, portals: &mut Vec<u32>, first: bool) -> FacePoint {
-    let mut at = place;
-    let mut done = 0;
-    loop {
+fn beyond_their_edges<G>(
+    adjacency: &Adjacency,
+    [from, to]: [&mut FacePoint; 2],
+    gates: &mut Vec<G>,
+    half_edge: impl Fn(&G) -> u32,
+) {
+    let beyond = |at: &mut FacePoint, h: u32| {
         // The half-edge of the face that the place is named on, and the one beyond.
-        let left = portals.len() - done;
-        let h = match first {
-            _ if left == 0 => break,
-            true => portals[done],
-            false => adjacency.opposite[portals[left - 1] as usize],
-        };
         if h / 3 != at.face || at.bary[previous(h) as usize % 3] > ON_EDGE {
-            break;
+            return false;
         }
         let g = adjacency.opposite[h as usize];
         let mut bary = [0.0; 3];
         let (a, b) = (at.bary[h as usize % 3], at.bary[next(h) as usize % 3]);
         (bary[next(g) as usize % 3], bary[g as usize % 3]) = (a / (a + b), b / (a + b));
-        at = FacePoint { face: g / 3, bary };
-        done += 1;
-    }
-    if first {
-        portals.drain(..done)
-    } else {
-        portals.drain(portals.len() - done..)
+        *at = FacePoint { face: g / 3, bary };
+        true
     };
-    at
+    let first = gates.iter().take_while(|g| beyond(from, half_edge(g))).count();
+    gates.drain(..first);
+    let last = gates.iter().rev().take_while(|g| beyond(to, adjacency.opposite[half_edge(g) as usize])).count();
+    gates.truncate(gates.len() - last);
 }
 
 /// The half-edges that pass the vertex of `bend` on its other side, if the surface opens by less than 180 degrees
@@ -649,6 +646,32 @@ mod tests {
                 };
                 let other = faces(&pair[1]);
                 assert!(faces(&pair[0]).iter().any(|f| other.contains(f)), "{k}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_way_from_an_edge_over_a_rough_surface_never_turns_back_by_more_than_90_degrees() {
+        let mut mesh = shapes::sphere(1.0, 4);
+        for (k, p) in mesh.points.iter_mut().enumerate() {
+            *p *= 1.0 + 0.004 * ((k as f64 * 12.9898).sin() * 43_758.545_3).fract();
+        }
+        let adjacency = Adjacency::new(&mesh);
+        let faces = mesh.triangles.len() as u32;
+        for k in 0..3000u32 {
+            let mut bary = [0.0, 0.5070568822340139, 0.4929431177659861];
+            bary.rotate_left(k as usize % 3);
+            let p = FacePoint { face: k * 1031 % faces, bary };
+            // Some faces on, over an edge or a vertex.
+            let fan: Vec<u32> = adjacency.fan(mesh.triangles[p.face as usize][k as usize / 3 % 3]).collect();
+            let h = previous(adjacency.opposite[fan[k as usize % fan.len()] as usize]);
+            let q = FacePoint { face: adjacency.opposite[h as usize] / 3, bary: [0.0, 0.5, 0.5] };
+            let way = connect(&mesh, &adjacency, p, q).unwrap();
+            let at: Vec<DVec3> = way.iter().map(|x| x.position(&mesh)).collect();
+            for w in at.windows(3) {
+                let (d, e) = (w[1] - w[0], w[2] - w[1]);
+                let short = d.length().min(e.length()) < 1e-9;
+                assert!(short || d.angle_between(e).to_degrees() < 90.0, "{k}: {way:?}");
             }
         }
     }

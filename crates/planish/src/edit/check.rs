@@ -1,6 +1,7 @@
 //! Numbers of an edit that are none, or out of their range.
 
 use super::{ApplyError, Edit, Forces, Magnetism, Name, Pull, SplineMove, Spot};
+use crate::curve::PaintMode;
 use crate::network::Stretch;
 
 /// Cells of a section at most: a grid as fine as the finest displacement maps.
@@ -70,8 +71,9 @@ fn holds(pins: &[f64], stiffness: &[Stretch]) -> Result<(), ApplyError> {
     })
 }
 
-fn magnetism(magnet: Option<&Magnetism>) -> Result<(), ApplyError> {
+fn magnetism(magnet: Option<&Magnetism>, mode: PaintMode) -> Result<(), ApplyError> {
     match magnet {
+        Some(_) if mode != PaintMode::Magnetic => Err(ApplyError::IdleMagnet),
         Some(Magnetism::Sharp(angle)) => within("the angle of the magnet", *angle, Range::Angle),
         _ => Ok(()),
     }
@@ -108,15 +110,15 @@ pub(super) fn check(edit: &Edit) -> Result<(), ApplyError> {
         Name::Near { near } => look("near", near),
     };
     match edit {
-        Edit::Paint { picks, magnet, snap, .. } => {
+        Edit::Paint { picks, mode, magnet, snap, .. } => {
             picks.iter().try_for_each(|p| spot("a pick", p))?;
-            magnetism(magnet.as_ref())?;
+            magnetism(magnet.as_ref(), *mode)?;
             within("snap", *snap, Range::NotNegative)
         }
-        Edit::Extend { curve, picks, magnet, snap, .. } => {
+        Edit::Extend { curve, picks, mode, magnet, snap, .. } => {
             name(curve)?;
             picks.iter().try_for_each(|p| spot("a pick", p))?;
-            magnetism(magnet.as_ref())?;
+            magnetism(magnet.as_ref(), *mode)?;
             within("snap", *snap, Range::NotNegative)
         }
         Edit::Cut { through, normal, snap } => {
@@ -197,9 +199,9 @@ pub(super) fn check(edit: &Edit) -> Result<(), ApplyError> {
             count("patches", *patches, 1, "1 or more")?;
             within("sharp_angle_deg", *sharp_angle_deg, Range::Angle)
         }
-        Edit::Feature { picks, magnet, .. } => {
+        Edit::Feature { picks, mode, magnet, .. } => {
             picks.iter().try_for_each(|p| spot("a pick", p))?;
-            magnetism(magnet.as_ref())
+            magnetism(magnet.as_ref(), *mode)
         }
         Edit::Symmetry { plane } => plane.map_or(Ok(()), |p| {
             look("the point of the plane", &p.point.to_array())?;

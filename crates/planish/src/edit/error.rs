@@ -37,6 +37,9 @@ pub enum ApplyError {
         /// What it may be, in words.
         wanted: &'static str,
     },
+    /// A magnet for a stroke that is not drawn to anything.
+    #[error("a magnet draws magnetic strokes alone - hint: add mode = \"magnetic\", or leave the magnet away")]
+    IdleMagnet,
     /// A move further than the mesh is wide.
     #[error("a move by {:.1} times the diagonal leads off the mesh - hint: check the units", share)]
     TooFar {

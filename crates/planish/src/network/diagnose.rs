@@ -51,8 +51,8 @@ pub enum Fault {
     },
     /// A region with another number of sides than four.
     #[error(
-        "the region at ({:.6}, {:.6}, {:.6}) has {} sides, not 4 - hint: {}",
-        place.x, place.y, place.z, sides.len(), offer(sides.len())
+        "the region at ({:.6}, {:.6}, {:.6}) has {} side{}, not 4 - hint: {}",
+        place.x, place.y, place.z, sides.len(), if sides.len() == 1 { "" } else { "s" }, offer(sides.len())
     )]
     NotFourSided {
         /// Its sides.

@@ -48,12 +48,34 @@ pub enum EditError {
         curve: u32,
     },
     /// A curve that follows an edge or the boundary is not dragged away from it.
-    #[error("curve {curve} follows the {line} - hint: drag another, or delete it and draw a new one")]
+    #[error(
+        "curve {curve} follows {line} and stays on it - hint: drag its corners along it, or delete it and draw a new one"
+    )]
     Bound {
         /// The curve.
         curve: u32,
         /// What it follows.
         line: &'static str,
+    },
+    /// A corner that cannot slide along the lines that its curves follow.
+    #[error(
+        "corner {corner} ends {curves} curves along sharp edges or boundaries and stays there - hint: one between two of them slides along"
+    )]
+    Fixed {
+        /// The corner.
+        corner: u32,
+        /// Ends of such curves there.
+        curves: usize,
+    },
+    /// A corner that slides along a line comes to the next one.
+    #[error(
+        "corner {corner} slides along its line and would meet corner {other} there - hint: drag it less far, or delete corner {other} first"
+    )]
+    Meets {
+        /// The corner.
+        corner: u32,
+        /// The corner that it meets.
+        other: u32,
     },
     /// A closed curve that its forces draw together.
     #[error(
@@ -70,6 +92,24 @@ pub enum EditError {
         region: u32,
         /// Its sides.
         sides: usize,
+    },
+    /// No curves run around a place.
+    #[error(
+        "no curves run around ({:.6}, {:.6}, {:.6}) yet - hint: draw some, or complete the network",
+        place.x, place.y, place.z
+    )]
+    NoRegion {
+        /// World position.
+        place: DVec3,
+    },
+    /// Curves run so near each other that none can be laid out between them.
+    #[error(
+        "the rest cannot be laid out between the curves at ({:.6}, {:.6}, {:.6}): there is next to no room - hint: move them apart there, or let them meet",
+        place.x, place.y, place.z
+    )]
+    Entangled {
+        /// World position.
+        place: DVec3,
     },
     /// A curve cannot be made.
     #[error(transparent)]
@@ -332,8 +372,8 @@ impl<'m> Editor<'m> {
         let found = self.curve(curve)?;
         match found.kind {
             CurveKind::Smooth => Ok(found),
-            CurveKind::Feature => Err(EditError::Bound { curve, line: "sharp edge" }),
-            CurveKind::Boundary => Err(EditError::Bound { curve, line: "boundary of the mesh" }),
+            CurveKind::Feature => Err(EditError::Bound { curve, line: "a sharp edge" }),
+            CurveKind::Boundary => Err(EditError::Bound { curve, line: "the boundary of the mesh" }),
         }
     }
 

@@ -37,8 +37,8 @@ struct Stop {
 }
 
 impl Editor<'_> {
-    /// As [`Editor::add_curve`]; where the curve crosses or touches others, corners divide both. A closed curve that
-    /// meets others starts at a meeting. Returns the new curves in their order along it.
+    /// As [`Editor::add_curve`]; where the curve crosses or touches others, corners divide both, and where it runs along
+    /// the edges of another it is left out. A closed curve that meets others starts at a meeting. Returns the new curves in their order along it.
     /// # Errors
     /// `Curve` if it does not lie on the mesh or has no length.
     pub fn draw_curve(&mut self, curve: &SurfaceCurve, kind: CurveKind, snap: f64) -> Result<Vec<u32>, EditError> {
@@ -52,8 +52,14 @@ impl Editor<'_> {
             return self.add_curve(curve, kind, snap).map(|c| vec![c]);
         }
         let last = chain.len() - 1;
+        if self.shared(&chain).iter().all(|&s| s) {
+            return Ok(Vec::new());
+        }
         let (start, end) = if curve.closed {
-            let first = met[0];
+            // Not within a stretch that another curve runs along.
+            let shared = self.shared(&chain);
+            let is_start = |m: &&Meeting| !shared[(m.at as usize).min(last - 1)];
+            let first = *met.iter().find(is_start).unwrap_or(&met[0]);
             let k = first.at as usize;
             let mut turned = vec![first.place];
             turned.extend_from_slice(&chain[k + 1..]);
@@ -75,8 +81,15 @@ impl Editor<'_> {
             sums[k] + (x - k as f64) * (sums[k + 1] - sums[k])
         };
         let short = BRUSH * snap + tiny;
+        let shared = self.shared(&chain);
+        // True between two pieces that others run along.
+        let inside = |x: f64| {
+            let k = x as usize;
+            let before = if x > k as f64 { shared.get(k) } else { k.checked_sub(1).and_then(|k| shared.get(k)) };
+            before == Some(&true) && shared.get(k) == Some(&true)
+        };
         let mut stops = vec![Stop { corner: start, enter: 0.0, leave: 0.0 }];
-        for meeting in self.meetings(&chain) {
+        for meeting in self.meetings(&chain).into_iter().filter(|m| !inside(m.at)) {
             let corner = self.corner_on(meeting.place, snap.max(tiny));
             let before = &mut stops[..];
             match before.last_mut() {
@@ -92,6 +105,10 @@ impl Editor<'_> {
         let mut added = Vec::with_capacity(stops.len() - 1);
         for pair in stops.windows(2) {
             let (from, to) = (pair[0].leave, pair[1].enter);
+            // A stretch that another curve runs along is there already.
+            if (from as usize..to.ceil() as usize).all(|k| shared.get(k) == Some(&true)) {
+                continue;
+            }
             let place = |x: f64| {
                 let k = (x as usize).min(chain.len() - 2);
                 between(self.mesh, self.adjacency, &chain[k], &chain[k + 1], x - k as f64)
@@ -102,6 +119,33 @@ impl Editor<'_> {
             added.push(self.push_between([pair[0].corner, pair[1].corner], &piece, kind)?);
         }
         Ok(added)
+    }
+
+    /// For each piece of a chain whether it runs along an edge of the mesh that curves run along from end to end.
+    fn shared(&self, chain: &[FacePoint]) -> Vec<bool> {
+        let triangles = &self.mesh.triangles;
+        let place = |p: &FacePoint| imprint::place_of(self.adjacency, triangles, p);
+        // The edge that two places lie on, by its lower half-edge, and how much of it lies between them.
+        let along = |pair: &[FacePoint]| -> Option<(u32, f64)> {
+            let (a, b) = (place(&pair[0]), place(&pair[1]));
+            match imprint::along_edge(self.adjacency, triangles, &a, &b, 0.5)? {
+                Place::Edge(h, middle) => {
+                    let start = match a {
+                        Place::Edge(_, t) => t,
+                        Place::Vertex(v) if v == self.mesh.origin(h) => 0.0,
+                        _ => 1.0,
+                    };
+                    Some((h, 2.0 * (middle - start).abs()))
+                }
+                _ => None,
+            }
+        };
+        let mut covered: BTreeMap<u32, f64> = BTreeMap::new();
+        for (h, part) in self.network.curves.iter().flat_map(|c| c.points.windows(2)).filter_map(along) {
+            *covered.entry(h).or_default() += part;
+        }
+        let whole = |h: u32| covered.get(&h).is_some_and(|&part| part > 1.0 - BEYOND);
+        chain.windows(2).map(|pair| along(pair).is_some_and(|(h, _)| whole(h))).collect()
     }
 
     /// The corner within `reach` of a place on a curve, else a new one that divides the curve.

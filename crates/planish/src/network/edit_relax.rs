@@ -2,13 +2,17 @@
 //!
 //! [K98] §3.8: an edit point and an edit section around it; the rest of the curve stays bit for bit.
 
+use super::CurveKind;
 use super::edit::{EditError, Editor};
-use crate::curve::{CurveError, Relaxed, ScalarField, Section, Snake, SnakeParams, SurfaceCurve};
+use crate::curve::{CurveError, Relaxed, ScalarField, Section, Snake, SnakeParams, SurfaceCurve, between};
 use crate::mesh::FacePoint;
 use crate::observe::Observer;
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// Places beside a section that tell it how the rest of its curve runs.
+const BESIDE: usize = 2;
 
 /// A closed curve shorter than this many mean edges is none.
 const SHORTEST_LOOP: f64 = 3.0;
@@ -48,9 +52,10 @@ pub struct Holds<'a> {
 
 impl<'m> Editor<'m> {
     /// Moves a corner to a place; the curves that end there follow, each relaxed over `reach` (0 to 1) of its length.
-    /// Returns these curves and how they relaxed.
+    /// A corner between two curves along a sharp edge or the boundary slides along them, to the place nearest to `to`.
+    /// Returns the curves that relaxed and how.
     /// # Errors
-    /// `NoSuchPart`; `Bound` if one of the curves follows an edge or the boundary; `Curve`.
+    /// `NoSuchPart`; `Fixed` and `Meets` for a corner that slides; `Curve`.
     pub fn drag_corner(
         &mut self,
         corner: u32,
@@ -64,8 +69,11 @@ impl<'m> Editor<'m> {
         if to.face as usize >= faces {
             return Err(CurveError::NoSuchFace { face: to.face, faces }.into());
         }
+        let slid = self.slide(corner, to.position(self.mesh))?;
+        let to = slid.as_ref().map_or(to, |s| s.place);
         let mut curves: Vec<u32> = self.ends_at(corner).iter().map(|e| e / 2).collect();
         curves.dedup();
+        curves.retain(|&c| self.network.curves[c as usize].kind == CurveKind::Smooth);
         let mut moved = Vec::with_capacity(curves.len());
         for &c in &curves {
             let curve = self.movable(c)?;
@@ -97,6 +105,9 @@ impl<'m> Editor<'m> {
             moved.push((c, relaxed, snake.curve().trace(self.mesh, self.adjacency)?));
         }
         self.network.corners[corner as usize].place = to;
+        for (c, points) in slid.into_iter().flat_map(|s| s.curves) {
+            self.network.curves[c as usize].points = points;
+        }
         let mut told = Vec::with_capacity(moved.len());
         for (c, relaxed, points) in moved {
             self.network.curves[c as usize].points = points;
@@ -233,17 +244,32 @@ impl<'m> Editor<'m> {
         let last = sums.partition_point(|s| *s < high).clamp(first + 1, at.len() - 1);
         let even = self.sampled(&SurfaceCurve::open(old.points[first..=last].to_vec()))?;
         let n = even.points.len();
+        // Places before and behind, so that the section goes on smoothly from the rest.
+        let spacing = (sums[last] - sums[first]) / (n - 1) as f64;
+        let place = |s: f64| {
+            let k = sums.partition_point(|x| *x <= s).clamp(1, at.len() - 1) - 1;
+            let share = (s - sums[k]) / (sums[k + 1] - sums[k]).max(f64::MIN_POSITIVE);
+            between(self.mesh, self.adjacency, &old.points[k], &old.points[k + 1], share.clamp(0.0, 1.0))
+        };
+        let steps = |room: f64| (1..=BESIDE).map(move |k| k as f64 * spacing).take_while(move |s| *s <= room);
+        let mut points: Vec<FacePoint> = steps(sums[first]).map(|s| place(sums[first] - s)).collect();
+        let before = points.len();
+        points.reverse();
+        points.extend(even.points);
+        points.extend(steps(total - sums[last]).map(|s| place(sums[last] + s)));
         let index = |share: f64| {
             let at = ((share * total - sums[first]) / (sums[last] - sums[first])).clamp(0.0, 1.0);
-            (at * (n - 1) as f64).round() as usize
+            before + (at * (n - 1) as f64).round() as usize
         };
-        let mut snake = self.held(&even, holds, index)?;
-        let relaxed = work(&mut snake, index(middle).clamp(1, n - 2))?;
+        let mut snake = self.held(&SurfaceCurve::open(points), holds, index)?;
+        snake.edit_section(before, n)?;
+        let relaxed = work(&mut snake, index(middle).clamp(before + 1, before + n - 2))?;
         let [a, b] = old.corners;
         if a == b && (first, last) == (0, at.len() - 1) {
             self.check_loop(curve, &snake.curve())?;
         }
-        let chain = snake.curve().trace(self.mesh, self.adjacency)?;
+        let section = snake.curve().points[before..before + n].to_vec();
+        let chain = SurfaceCurve::open(section).trace(self.mesh, self.adjacency)?;
         let points = &mut self.network.curves[curve as usize].points;
         points.splice(first + 1..last, chain[1..chain.len() - 1].iter().copied());
         Ok(relaxed)

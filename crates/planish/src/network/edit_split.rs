@@ -8,13 +8,18 @@
 use super::diagnose::{Regions, regions};
 use super::disk::{Disk, Met};
 use super::edit::{EditError, Editor};
-use super::imprint::Cut;
 use super::layout::layout_around;
-use super::{Corner, Curve, CurveKind, LayoutParams, Network};
+use super::{Corner, Curve, CurveKind, ImprintError, LayoutParams, Network};
 use crate::curve::without_repeats;
 use crate::mesh::{Adjacency, FacePoint, NONE, next};
 use crate::observe::Observer;
+use glam::DVec3;
 use std::f64::consts::TAU;
+
+/// Layouts tried around the curves of a network until the mesh can hold one, ...
+const COMPLETIONS: usize = 3;
+/// ... each with this part more of the patches asked for.
+const OTHER_PATCHES: usize = 8;
 
 /// Patches that one split may run through: more than any chord of a network has.
 const LONGEST_CHORD: usize = 10_000;
@@ -48,22 +53,18 @@ impl Editor<'_> {
 
     /// Number of the region with curves around it that a place lies in, as [`super::diagnose()`] numbers them.
     /// # Errors
-    /// `Imprint` if the curves are not in order, `NoSuchPart` in a part of the mesh without curves.
+    /// `Imprint` if the curves are not in order, `NoRegion` in a part of the mesh without curves.
     pub fn region_at(&self, place: &FacePoint) -> Result<u32, EditError> {
         let found = regions(self.mesh, self.adjacency, &self.network)?;
         let p = place.position(self.mesh);
         let cut = &found.drawn.cut;
-        let away = |f: u32| (cut.mesh.corners(f as usize).into_iter().sum::<glam::DVec3>() / 3.0).distance(p);
+        let away = |f: u32| (cut.mesh.corners(f as usize).into_iter().sum::<DVec3>() / 3.0).distance(p);
         let bounded: Vec<&Vec<u32>> = found.parts.iter().filter(|p| !p.0.is_empty()).map(|p| &p.1).collect();
         let near = bounded.iter().enumerate().flat_map(|(k, faces)| {
             faces.iter().filter(|&&f| cut.parent[f as usize] == place.face).map(move |&f| (away(f), k as u32))
         });
-        let count = bounded.len();
-        near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|x| x.1).ok_or(EditError::NoSuchPart {
-            what: "region",
-            index: count as u32,
-            count,
-        })
+        let found = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|x| x.1);
+        found.ok_or(EditError::NoRegion { place: p })
     }
 
     /// Splits one region; returns the corners put into its sides.
@@ -195,11 +196,36 @@ impl Editor<'_> {
     }
 
     /// Lays out everything that the curves do not part into patches yet. The curves stay where they are, bit for bit
-    /// where they are not divided; new corners may come to lie on them.
+    /// where they are not divided; new corners may come to lie on them. No curves of the result cross.
     /// # Errors
-    /// `Imprint` if curves cross, `Layout` if there is no layout around them.
+    /// `Imprint` if curves cross, `Layout` if there is no layout around them, `Entangled` if there is none that the
+    /// mesh can hold.
     pub fn complete(&mut self, params: &LayoutParams, observer: &dyn Observer) -> Result<(), EditError> {
         let found = regions(self.mesh, self.adjacency, &self.network)?;
+        let mut wrong = None;
+        for attempt in 0..COMPLETIONS {
+            // With other numbers of patches curves run elsewhere.
+            let patches = params.patches + attempt * params.patches.div_ceil(OTHER_PATCHES);
+            let network = self.completed(&found, &LayoutParams { patches, ..params.clone() }, observer)?;
+            match regions(self.mesh, self.adjacency, &network) {
+                Ok(_) => {
+                    self.network = network;
+                    return Ok(());
+                }
+                Err(e) => wrong = wrong.or(Some(e)),
+            }
+        }
+        match wrong {
+            Some(ImprintError::Crossing { x, y, z, .. } | ImprintError::Jump { x, y, z, .. }) => {
+                Err(EditError::Entangled { place: DVec3::new(x, y, z) })
+            }
+            Some(other) => Err(other.into()),
+            None => Ok(()),
+        }
+    }
+
+    /// The network with everything laid out that the curves do not part into patches yet.
+    fn completed(&self, found: &Regions, params: &LayoutParams, observer: &dyn Observer) -> Result<Network, EditError> {
         let drawn = &found.drawn;
         let mut corner = vec![false; drawn.cut.mesh.points.len()];
         for (curve, chain) in self.network.curves.iter().zip(&drawn.cut.chains) {
@@ -216,7 +242,7 @@ impl Editor<'_> {
         }
         let laid = layout_around(&drawn.cut.mesh, &drawn.barrier, &corner, &[], params, observer)?;
         let triangles = &drawn.cut.mesh.triangles;
-        let to_input = |p: &FacePoint| place_on_input(self, &drawn.cut, p.face, p.bary);
+        let to_input = |p: &FacePoint| drawn.cut.to_uncut(self.adjacency, &self.mesh.triangles, p.face, p.bary);
         let mut network = Network { patches: laid.patches.clone(), ..Network::default() };
         network.corners = laid.corners.iter().map(|c| Corner { place: to_input(&c.place) }).collect();
         for curve in &laid.curves {
@@ -228,8 +254,7 @@ impl Editor<'_> {
                 points: curve.points.iter().map(to_input).collect(),
             });
         }
-        self.network = network;
-        Ok(())
+        Ok(network)
     }
 }
 
@@ -255,25 +280,6 @@ fn line_of(
     let on = [a, b].map(|p| p.on_face(adjacency, triangles, face));
     let zero = (0..3).find(|&k| on.iter().flatten().all(|p| p.bary[k] == 0.0))?;
     kind[3 * face as usize + (zero + 1) % 3]
-}
-
-/// A place of the cut mesh on the input mesh.
-fn place_on_input(editor: &Editor, cut: &Cut, face: u32, bary: [f64; 3]) -> FacePoint {
-    let parent = cut.parent[face as usize];
-    let mut out = [0.0; 3];
-    for (k, &v) in cut.mesh.triangles[face as usize].iter().enumerate() {
-        if bary[k] == 0.0 {
-            continue;
-        }
-        let corner = cut.origin[v as usize].on_face(editor.adjacency, &editor.mesh.triangles, parent);
-        if let Some(corner) = corner {
-            for i in 0..3 {
-                out[i] += bary[k] * corner.bary[i];
-            }
-        }
-    }
-    let sum: f64 = out.iter().sum();
-    FacePoint { face: parent, bary: out.map(|b| b / sum) }
 }
 
 /// A region as a disk with its map.
@@ -361,7 +367,7 @@ impl Flat {
         let face = self.disk.faces[h as usize / 3];
         let mut bary = [0.0; 3];
         bary[h as usize % 3] = 1.0;
-        place_on_input(editor, &drawn.cut, face, bary)
+        drawn.cut.to_uncut(editor.adjacency, &editor.mesh.triangles, face, bary)
     }
 
     /// The straight line of the map between two vertices, as places of the input; neighbours share a face.
@@ -380,7 +386,8 @@ impl Flat {
                     let mut bary = [0.0; 3];
                     let (i, j) = (h as usize % 3, next(h) as usize % 3);
                     (bary[i], bary[j]) = if forward { (1.0 - t, t) } else { (t, 1.0 - t) };
-                    place_on_input(editor, &found.drawn.cut, self.disk.faces[h as usize / 3], bary)
+                    let face = self.disk.faces[h as usize / 3];
+                    found.drawn.cut.to_uncut(editor.adjacency, &editor.mesh.triangles, face, bary)
                 }
             });
         }

@@ -12,7 +12,7 @@ use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
 use glam::DVec3;
 use rayon::prelude::*;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Outward bulge of the points of an edge in the flat picture of a face, as a fraction of the face. It makes
 /// them strictly convex, so that rounding can neither hide one nor leave a gap along the edge.
@@ -199,6 +199,27 @@ pub(crate) fn shared_face(adjacency: &Adjacency, triangles: &[[u32; 3]], a: &Pla
         _ => false,
     };
     Some(if along { Shared::Edge } else { Shared::Face(face) })
+}
+
+/// The place `t` of the way from `a` to `b` if both lie on one edge of the mesh.
+pub(crate) fn along_edge(adjacency: &Adjacency, triangles: &[[u32; 3]], a: &Place, b: &Place, t: f64) -> Option<Place> {
+    if shared_face(adjacency, triangles, a, b) != Some(Shared::Edge) {
+        return None;
+    }
+    let h = match (*a, *b) {
+        (Place::Edge(h, _), _) | (_, Place::Edge(h, _)) => h,
+        (Place::Vertex(v), Place::Vertex(w)) => {
+            let h = half_edge(triangles, adjacency, v, w).or_else(|| half_edge(triangles, adjacency, w, v))?;
+            h.min(adjacency.opposite[h as usize])
+        }
+        _ => return None,
+    };
+    let along = |place: &Place| match *place {
+        Place::Edge(_, t) => t,
+        Place::Vertex(v) if triangles[h as usize / 3][next(h) as usize % 3] == v => 1.0,
+        _ => 0.0,
+    };
+    Some(Place::Edge(h, along(a) + (along(b) - along(a)) * t))
 }
 
 /// What two neighbouring places of a curve have in common.
@@ -460,6 +481,52 @@ struct Segment {
     curve: usize,
 }
 
+/// The place `t` of the way along side `k` of a face in its flat picture, where the sides bulge.
+fn on_side(k: usize, t: f64) -> Point2<f64> {
+    const CORNERS: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+    const OUT: [[f64; 2]; 3] = [[0.0, -1.0], [1.0, 1.0], [-1.0, 0.0]];
+    let (a, b) = (CORNERS[k], CORNERS[(k + 1) % 3]);
+    let bulge = BULGE * t * (1.0 - t);
+    Point2::new(a[0] + (b[0] - a[0]) * t + OUT[k][0] * bulge, a[1] + (b[1] - a[1]) * t + OUT[k][1] * bulge)
+}
+
+impl Cut {
+    /// A place of the cut mesh as one of the uncut mesh, by its weights in a face of the cut mesh: the same, bit for
+    /// bit, from all faces that it lies on. What does not cross on the cut mesh does not cross on the uncut one either:
+    /// inside a face places go by the flat picture, in which its pieces lie side by side.
+    pub fn to_uncut(&self, adjacency: &Adjacency, triangles: &[[u32; 3]], face: u32, bary: [f64; 3]) -> FacePoint {
+        let corners = self.mesh.triangles[face as usize];
+        let mut on: Vec<(u32, f64)> = (0..3).filter(|&k| bary[k] != 0.0).map(|k| (corners[k], bary[k])).collect();
+        on.sort_unstable_by_key(|x| x.0);
+        let origin = |v: u32| self.origin[v as usize];
+        let edge = match on[..] {
+            [(v, _)] => Some(origin(v)),
+            [(a, x), (b, y)] => along_edge(adjacency, triangles, &origin(a), &origin(b), y / (x + y)),
+            _ => None,
+        };
+        if let Some(place) = edge {
+            let on = place.on_face(adjacency, triangles, place.some_face(adjacency));
+            return on.expect("a place lies on its own face");
+        }
+        let parent = self.parent[face as usize];
+        let (mut sum, mut total) = ([0.0; 2], 0.0);
+        for (v, weight) in on {
+            let at = origin(v).on_face(adjacency, triangles, parent).expect("a corner lies on the uncut face");
+            let at = match (0..3).find(|&k| at.bary[k] == 0.0) {
+                Some(k) => on_side((k + 1) % 3, at.bary[(k + 2) % 3]),
+                None => Point2::new(at.bary[1], at.bary[2]),
+            };
+            sum = [sum[0] + weight * at.x, sum[1] + weight * at.y];
+            total += weight;
+        }
+        // Beside a side that bulges it may lie beyond it, or be taken for a place on it.
+        let [x, y] = sum.map(|s| (s / total).max(2.0 * ON_EDGE));
+        let room = ((1.0 - 2.0 * ON_EDGE) / (x + y)).min(1.0);
+        let [x, y] = [x * room, y * room];
+        FacePoint { face: parent, bary: [1.0 - x - y, x, y] }
+    }
+}
+
 /// Triangulates one face with its new vertices and curve pieces.
 fn split_face(
     f: u32,
@@ -470,25 +537,25 @@ fn split_face(
     segments: &HashMap<u32, Vec<Segment>>,
     points: &[DVec3],
 ) -> Result<Vec<[u32; 3]>, ImprintError> {
-    const CORNERS: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-    const OUT: [[f64; 2]; 3] = [[0.0, -1.0], [1.0, 1.0], [-1.0, 0.0]];
-    let mut names = Vec::new();
-    let mut flat = Vec::new();
+    // Vertices with their places in the flat picture; those of the rim, in order; and the sides that each lies on.
+    let (mut names, mut flat, mut ring, mut sides) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for k in 0..3 {
+        ring.push(names.len());
         names.push(mesh.triangles[f as usize][k]);
-        flat.push(Point2::new(CORNERS[k][0], CORNERS[k][1]));
+        flat.push(on_side(k, 0.0));
+        sides.push(1u8 << k | 1 << ((k + 2) % 3));
         let h = 3 * f + k as u32;
         let o = adjacency.opposite[h as usize];
         let mine = on_edge.get(&if o < h { o } else { h }).map_or(&[][..], |l| &l[..]);
-        let (a, b) = (CORNERS[k], CORNERS[(k + 1) % 3]);
+        let first = ring.len();
         for &(t, v) in mine {
-            let t = if o < h { 1.0 - t } else { t };
-            let bulge = BULGE * t * (1.0 - t);
+            ring.push(names.len());
             names.push(v);
-            flat.push(Point2::new(
-                a[0] + (b[0] - a[0]) * t + OUT[k][0] * bulge,
-                a[1] + (b[1] - a[1]) * t + OUT[k][1] * bulge,
-            ));
+            flat.push(on_side(k, if o < h { 1.0 - t } else { t }));
+            sides.push(1 << k);
+        }
+        if o < h {
+            ring[first..].reverse();
         }
     }
     for (p, v) in in_face.get(&f).map_or(&[][..], |l| &l[..]) {
@@ -521,7 +588,73 @@ fn split_face(
             return Err(crossing(a));
         }
     }
-    Ok(cdt.inner_faces().map(|t| t.vertices().map(|v| owner[v.index()])).collect())
+    sides.resize(names.len(), 0);
+    let triangles = |cdt: &ConstrainedDelaunayTriangulation<Point2<f64>>| -> Vec<[usize; 3]> {
+        cdt.inner_faces().map(|t| t.vertices().map(|v| v.index())).collect()
+    };
+    let mut made = triangles(&cdt);
+    if !is_within(&made, &ring, names.len()) {
+        // Points of a side lie so near each other that rounding takes its bulge away.
+        for (k, &a) in ring.iter().enumerate() {
+            let [x, y] = [a, ring[(k + 1) % ring.len()]].map(|i| handle_of(names[i]));
+            if cdt.try_add_constraint(x, y).is_empty() && !cdt.exists_constraint(x, y) {
+                return Err(crossing(names[a]));
+            }
+        }
+        made = within(triangles(&cdt), &ring);
+        if !is_within(&made, &ring, names.len()) {
+            return Err(crossing(names[ring[0]]));
+        }
+    }
+    flip_flat(&mut made, &sides);
+    Ok(made.into_iter().map(|t| t.map(|i| owner[i])).collect())
+}
+
+fn edges(t: &[usize; 3]) -> [[usize; 2]; 3] {
+    [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]
+}
+
+fn rim(ring: &[usize]) -> impl Iterator<Item = [usize; 2]> {
+    (0..ring.len()).map(|k| [ring[k], ring[(k + 1) % ring.len()]])
+}
+
+/// True if triangles over `points` points fill what is inside `ring`, and that alone: their number is that of Euler's
+/// formula, and all edges of the ring are theirs.
+fn is_within(triangles: &[[usize; 3]], ring: &[usize], points: usize) -> bool {
+    triangles.len() + ring.len() + 2 == 2 * points && rim(ring).all(|e| triangles.iter().any(|t| edges(t).contains(&e)))
+}
+
+/// The triangles inside `ring`, given all inside its convex hull.
+fn within(mut triangles: Vec<[usize; 3]>, ring: &[usize]) -> Vec<[usize; 3]> {
+    let rim: HashSet<[usize; 2]> = rim(ring).collect();
+    loop {
+        let there: HashSet<[usize; 2]> = triangles.iter().flat_map(edges).collect();
+        let count = triangles.len();
+        triangles.retain(|t| edges(t).iter().all(|e| rim.contains(e) || there.contains(&[e[1], e[0]])));
+        if triangles.len() == count {
+            return triangles;
+        }
+    }
+}
+
+/// Flips away triangles between three points of one side: their long edges run beside the side, and the face across it
+/// may have the same.
+fn flip_flat(triangles: &mut [[usize; 3]], sides: &[u8]) {
+    let flat = |t: &[usize; 3]| sides[t[0]] & sides[t[1]] & sides[t[2]] != 0;
+    loop {
+        let found = (0..triangles.len()).filter(|&i| flat(&triangles[i])).find_map(|i| {
+            let t = triangles[i];
+            (0..3).find_map(|k| {
+                let (a, b, c) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
+                let across = |u: &[usize; 3]| edges(u).iter().position(|e| *e == [b, a]);
+                let j = triangles.iter().position(|u| !flat(u) && across(u).is_some())?;
+                let d = triangles[j][(across(&triangles[j])? + 2) % 3];
+                Some((i, j, [d, b, c], [c, a, d]))
+            })
+        });
+        let Some((i, j, first, second)) = found else { return };
+        (triangles[i], triangles[j]) = (first, second);
+    }
 }
 
 /// Names the faces of a cut mesh: `seeds` are `(chain edge start, chain edge end, name)`, the face to the left
@@ -569,4 +702,67 @@ pub(crate) fn flood(
 /// The half-edge of `adjacency` from vertex `a` to vertex `b`.
 pub(crate) fn half_edge(triangles: &[[u32; 3]], adjacency: &Adjacency, a: u32, b: u32) -> Option<u32> {
     adjacency.fan(a).find(|&h| triangles[h as usize / 3][next(h) as usize % 3] == b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    /// Half-edges without another face.
+    fn free(mesh: &TriMesh) -> usize {
+        Adjacency::new(mesh).opposite.iter().filter(|&&o| o == NONE).count()
+    }
+
+    #[test]
+    fn points_of_a_side_1e_9_or_less_apart_leave_no_gap_between_its_faces() {
+        let mesh = shapes::rectangle(1.0, 1.0, 1, 1);
+        let adjacency = Adjacency::new(&mesh);
+        let h = (0..6).find(|&h| adjacency.opposite[h as usize] > h && adjacency.opposite[h as usize] != NONE).unwrap();
+        let apex = mesh.origin(crate::mesh::previous(h));
+        for k in 0..300 {
+            let first = 0.003 * k as f64 + 1e-9;
+            for gap in [1e-9, 1e-12] {
+                let curves: Vec<Vec<Place>> =
+                    (0..5).map(|i| vec![Place::Vertex(apex), Place::Edge(h, first + gap * i as f64)]).collect();
+                let borrowed: Vec<&[Place]> = curves.iter().map(|c| &c[..]).collect();
+                let cut = cut(&mesh, &adjacency, &borrowed).unwrap();
+                assert_eq!(free(&cut.mesh), 4, "{first} {gap}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_place_of_the_cut_mesh_is_the_same_bits_of_the_uncut_one_from_all_its_faces() {
+        let mesh = shapes::sphere(1.0, 2);
+        let adjacency = Adjacency::new(&mesh);
+        let curve = |seed: u32| -> Vec<Place> {
+            let from = FacePoint { face: seed, bary: [0.21, 0.33, 0.46] };
+            let to = FacePoint { face: (seed * 37 + 151) % mesh.triangles.len() as u32, bary: [0.6, 0.3, 0.1] };
+            let way = crate::curve::connect(&mesh, &adjacency, from, to).unwrap();
+            way.iter().map(|p| place_of(&adjacency, &mesh.triangles, p)).collect()
+        };
+        let mut looked = 0;
+        for seed in 0..60 {
+            let curve = curve(seed);
+            let cut = cut(&mesh, &adjacency, &[&curve]).unwrap();
+            let own = Adjacency::new(&cut.mesh);
+            let to_uncut = |face, bary| cut.to_uncut(&adjacency, &mesh.triangles, face, bary);
+            for h in 0..own.opposite.len() as u32 {
+                let (o, mut a, mut b) = (own.opposite[h as usize], [0.0; 3], [0.0; 3]);
+                (a[h as usize % 3], a[next(h) as usize % 3]) = (0.75, 0.25);
+                (b[next(o) as usize % 3], b[o as usize % 3]) = (0.75, 0.25);
+                assert_eq!(to_uncut(h / 3, a), to_uncut(o / 3, b));
+                let corner = FacePoint::corner(h / 3, h as usize % 3);
+                let there = FacePoint::corner(o / 3, next(o) as usize % 3);
+                let place = to_uncut(h / 3, corner.bary);
+                assert_eq!(place, to_uncut(o / 3, there.bary));
+                // And it is the place that was cut.
+                let origin = cut.origin[cut.mesh.triangles[h as usize / 3][h as usize % 3] as usize];
+                assert_eq!(place_of(&adjacency, &mesh.triangles, &place), origin);
+                looked += 1;
+            }
+        }
+        assert!(looked > 50_000);
+    }
 }

@@ -5,6 +5,7 @@ pub(crate) mod disk;
 mod edit;
 mod edit_cross;
 mod edit_relax;
+mod edit_slide;
 mod edit_split;
 pub(crate) mod imprint;
 mod layout;

@@ -8,7 +8,7 @@ use super::slide::Slide;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::CurveKind;
 use crate::network::disk::{Disk, Met};
-use crate::network::imprint::{self, Cut, ImprintError, Place, Shared, canonical, flood, half_edge, shared_face};
+use crate::network::imprint::{self, Cut, ImprintError, Place, along_edge, canonical, flood, half_edge};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -352,24 +352,7 @@ impl Embedding {
             },
             Met::Edge(p, q, t) => {
                 let (a, b) = (name(p), name(q));
-                if shared_face(adjacency, &mesh.triangles, &a, &b) != Some(Shared::Edge) {
-                    return None;
-                }
-                let h = match (a, b) {
-                    (Place::Edge(h, _), _) | (_, Place::Edge(h, _)) => h,
-                    (Place::Vertex(v), Place::Vertex(w)) => {
-                        let h = half_edge(&mesh.triangles, adjacency, v, w)
-                            .or_else(|| half_edge(&mesh.triangles, adjacency, w, v))?;
-                        h.min(adjacency.opposite[h as usize])
-                    }
-                    _ => return None,
-                };
-                let along = |place: Place| match place {
-                    Place::Edge(_, t) => t,
-                    Place::Vertex(v) if mesh.triangles[h as usize / 3][next(h) as usize % 3] == v => 1.0,
-                    _ => 0.0,
-                };
-                Some(Place::Edge(h, along(a) + (along(b) - along(a)) * t))
+                along_edge(adjacency, &mesh.triangles, &a, &b, t)
             }
         }
     }
