@@ -123,6 +123,27 @@ fn crossing_and_dangling_curves_are_told_with_their_place() {
 }
 
 #[test]
+fn a_stroke_that_is_drawn_to_a_corner_beyond_a_curve_divides_the_curve_on_its_way() {
+    let mesh = shapes::rectangle(2.0, 1.0, 21, 11);
+    let adjacency = Adjacency::new(&mesh);
+    let bvh = Bvh::new(&mesh);
+    let b = mesh.bounds();
+    let at = |x: f64, y: f64| near(&bvh, DVec3::new(b.min.x + 2.0 * x, b.min.y + y, 0.0));
+    let line = |p, q| SurfaceCurve::open(vec![p, q]);
+    for (from, to) in [((0.3, 0.5), (0.7, 0.47)), ((0.3, 0.5), (0.503, 0.5))] {
+        let mut editor = Editor::new(&mesh, &adjacency, one_patch(&mesh));
+        editor.draw_curve(&line(at(0.5, 0.2), at(0.501, 0.8)), CurveKind::Smooth, 0.0).unwrap();
+        // Its end, .016 behind that line, is the corner next to where the stroke meets the line.
+        editor.draw_curve(&line(at(0.508, 0.49), at(0.8, 0.52)), CurveKind::Smooth, 0.0).unwrap();
+        let before = editor.network.curves.len();
+        editor.draw_curve(&line(at(from.0, from.1), at(to.0, to.1)), CurveKind::Smooth, 0.04).unwrap();
+        let told: Vec<String> = editor.diagnose().faults.iter().map(|f| f.to_string()).collect();
+        assert!(!told.iter().any(|t| t.contains("cross at")), "{told:?}");
+        assert!(editor.network.curves.len() >= before + 3, "one curve in two, and the stroke on both sides of it");
+    }
+}
+
+#[test]
 fn split_and_join_give_the_curve_back_and_deleting_takes_its_free_corners() {
     let mesh = shapes::sphere(1.0, 3);
     let adjacency = Adjacency::new(&mesh);

@@ -49,7 +49,8 @@ impl Editor<'_> {
         }
         let met = self.meetings(&chain);
         if met.is_empty() {
-            return self.add_curve(curve, kind, snap).map(|c| vec![c]);
+            self.add_curve(curve, kind, snap)?;
+            return self.divided(snap);
         }
         let last = chain.len() - 1;
         if self.shared(&chain).iter().all(|&s| s) {
@@ -116,9 +117,24 @@ impl Editor<'_> {
             let mut piece = vec![place(from)];
             piece.extend((0..chain.len()).filter(|&k| (k as f64) > from && (k as f64) < to).map(|k| chain[k]));
             piece.push(place(to));
-            added.push(self.push_between([pair[0].corner, pair[1].corner], &piece, kind)?);
+            self.push_between([pair[0].corner, pair[1].corner], &piece, kind)?;
+            added.extend(self.divided(snap)?);
         }
         Ok(added)
+    }
+
+    /// Divides the last curve where its ways to corners within the snap distance cross what the chain itself does not.
+    fn divided(&mut self, snap: f64) -> Result<Vec<u32>, EditError> {
+        let last = self.network.curves.len() - 1;
+        let Some(curve) = self.network.curves.pop() else { return Ok(Vec::new()) };
+        let tiny = TINY * self.mesh.bounds().diagonal();
+        let ends = curve.corners.map(|k| self.network.corners[k as usize].place.position(self.mesh));
+        let is_inside = |m: &Meeting| ends.iter().all(|e| e.distance(m.place.position(self.mesh)) > tiny);
+        if snap > 0.0 && self.meetings(&curve.points).iter().any(is_inside) {
+            return self.draw_curve(&SurfaceCurve::open(curve.points), curve.kind, 0.0);
+        }
+        self.network.curves.push(curve);
+        Ok(vec![last as u32])
     }
 
     /// For each piece of a chain whether it runs along an edge of the mesh that curves run along from end to end.
