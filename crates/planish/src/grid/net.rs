@@ -8,8 +8,8 @@ use rayon::prelude::*;
 /// Halvings of a point's move before it is given up for this round.
 const HALVINGS: usize = 4;
 
-/// Points that one task moves at least.
-const PARALLEL_LENGTH: usize = 2048;
+/// Points that one task looks after at least.
+pub const PARALLEL_LENGTH: usize = 2048;
 
 /// `cols x rows` points of a chart, row-major; the rim is fixed.
 #[derive(Clone)]

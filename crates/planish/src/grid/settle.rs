@@ -6,9 +6,10 @@
 //! bend of both curves. Unknowns are moves `(a, b)` in cells along the net's own tangents; points then walk over
 //! the surface (MovePointOnSurface), and a move that would turn a cell over is shortened.
 
-use super::net::{Net, cell_corners};
+use super::net::{Net, PARALLEL_LENGTH};
 use super::{Fault, GridParams};
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 /// Part of the squareness weight that acts on the square of the angle, besides its tenth power: enough to tell
 /// which of two cells near square is better.
@@ -29,6 +30,8 @@ const ATTEMPTS: usize = 4;
 const DAMPING_STEP: f64 = 10.0;
 /// A round that lowers the energy by less than this fraction ends the resolution.
 const SETTLED: f64 = 1e-3;
+/// Conjugate gradients rest where the square of the preconditioned residual has fallen to this share.
+const CG_REST: f64 = 1e-6;
 
 /// Settles `net` in up to `rounds` rounds of `steps` steps of conjugate gradients.
 pub fn settle<'a>(
@@ -37,11 +40,11 @@ pub fn settle<'a>(
     params: &GridParams,
     cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Net<'a>, Fault> {
-    let mut energy = None;
+    let mut known = None;
     let mut damping = DAMPING;
     for _ in 0..rounds {
-        let system = System::new(&net, params);
-        let before = energy.unwrap_or_else(|| system.energy());
+        let system = System::new(&Terms::new(&net, params));
+        let before = known.unwrap_or_else(|| system.energy());
         let mut least = before;
         for attempt in 0..ATTEMPTS {
             let Some(moves) = system.solve(damping, steps, cancelled) else { return Err(Fault::Cancelled) };
@@ -50,7 +53,7 @@ pub fn settle<'a>(
                 let [u, v] = system.tangents[k];
                 net.chart.advance(net.spots[k], u * m.x + v * m.y)
             });
-            let reached = energy_of(&trial, params);
+            let reached = Terms::new(&trial, params).energy();
             if reached < least {
                 net = trial;
                 least = reached;
@@ -64,7 +67,7 @@ pub fn settle<'a>(
         if least >= before * (1.0 - SETTLED) {
             break;
         }
-        energy = Some(least);
+        known = Some(least);
     }
     Ok(net)
 }
@@ -77,9 +80,9 @@ fn angle_residual(angle: f64, squareness: f64) -> (f64, f64) {
     (x * root, squareness * (GENTLE_SHARE + 5.0 * steep) / root / MEANT_ANGLE)
 }
 
-/// Mid-lines of a cell, along u and v.
-fn midlines(net: &Net, c: usize) -> (DVec3, DVec3) {
-    let [a, b, c, d] = cell_corners(net.cols, c).map(|k| net.points[k]);
+/// Mid-lines of the cell above and to the right of node `k`, along u and v.
+fn midlines(points: &[DVec3], cols: usize, k: usize) -> (DVec3, DVec3) {
+    let [a, b, c, d] = [k, k + 1, k + 1 + cols, k + cols].map(|k| points[k]);
     ((b - a + c - d) / 2.0, (d - a + c - b) / 2.0)
 }
 
@@ -93,48 +96,9 @@ fn off_square(e: DVec3, f: DVec3) -> (f64, f64, f64) {
     (sin.asin(), sin, (1.0 - sin * sin).sqrt().max(LEAST_SINE))
 }
 
-/// Edges of the inner curves: all lines along u, then all along v, as (first node, stride, number of edges).
-fn curves(net: &Net) -> impl Iterator<Item = (usize, usize, usize)> + use<> {
-    let (cols, rows) = (net.cols, net.rows);
-    let lines = (1..rows - 1).map(move |j| (j * cols, 1, cols - 1));
-    lines.chain((1..cols - 1).map(move |i| (i, cols, rows - 1)))
-}
-
-fn energy_of(net: &Net, params: &GridParams) -> f64 {
-    let mut sum = 0.0;
-    let mut lengths = Vec::new();
-    for (first, stride, count) in curves(net) {
-        lengths.clear();
-        let node = |k: usize| net.points[first + k * stride];
-        lengths.extend((0..count).map(|k| node(k).distance(node(k + 1))));
-        let mean = lengths.iter().sum::<f64>() / count as f64;
-        sum += lengths.iter().map(|l| (l / mean - 1.0).powi(2)).sum::<f64>();
-    }
-    let weight = bend_weight(net, params.fairness);
-    for (k, stride) in bends(net) {
-        sum += bend_of(net, k, stride, weight).0.powi(2);
-    }
-    for c in 0..(net.cols - 1) * (net.rows - 1) {
-        let (e, f) = midlines(net, c);
-        sum += angle_residual(off_square(e, f).0, params.squareness).0.powi(2);
-    }
-    sum
-}
-
-/// Inner nodes with the stride of the curve through them, for both curves.
-fn bends(net: &Net) -> impl Iterator<Item = (usize, usize)> + use<> {
-    let (cols, rows) = (net.cols, net.rows);
-    (1..rows - 1).flat_map(move |j| (1..cols - 1).flat_map(move |i| [(j * cols + i, 1), (j * cols + i, cols)]))
-}
-
-/// Weight of a bend: angles between edges shrink with the cells, so that the weight grows with their number.
-fn bend_weight(net: &Net, fairness: f64) -> f64 {
-    fairness * (net.cols - 1).max(net.rows - 1) as f64 / MEANT_CELLS
-}
-
 /// How far the curve of `stride` bends sideways at node `k`, in edges, times `weight`; and the direction it is
 /// measured in, over the edge length.
-fn bend_of(net: &Net, k: usize, stride: usize, weight: f64) -> (f64, DVec3) {
+fn bend(net: &Net, k: usize, stride: usize, weight: f64) -> (f64, DVec3) {
     let other = if stride == 1 { net.cols } else { 1 };
     let along = (net.points[k + stride] - net.points[k - stride]) / 2.0;
     let across = net.points[k + other] - net.points[k - other];
@@ -145,202 +109,275 @@ fn bend_of(net: &Net, k: usize, stride: usize, weight: f64) -> (f64, DVec3) {
     (second.dot(sideways), sideways)
 }
 
-/// The linearised energy: residuals and their derivatives by the moves of the nodes.
+/// What belongs to a node, for the curve along u through it and the one along v: the edges that leave it, the cell
+/// between them, and the bends in it. Zero where there is none; edges and bends of the rim do not count.
+#[derive(Clone, Copy, Default)]
+struct AtNode<T, C> {
+    edges: [T; 2],
+    cell: C,
+    bends: [T; 2],
+}
+
+type Residuals = AtNode<f64, f64>;
+
+/// Derivatives by places: of an edge by its far end, of a cell by its mid-lines, of a bend by the second difference.
+type Gradients = AtNode<DVec3, [DVec3; 2]>;
+
+impl Residuals {
+    fn squared(&self) -> f64 {
+        let [a, b] = self.edges;
+        let [c, d] = self.bends;
+        a * a + b * b + c * c + d * d + self.cell * self.cell
+    }
+}
+
+/// Sets `all`, one value per node of `cols` columns, to `of(i, j)`.
+fn at_nodes<T: Send>(all: &mut [T], cols: usize, of: impl Fn(usize, usize) -> T + Sync) {
+    all.par_chunks_mut(cols).enumerate().with_min_len((PARALLEL_LENGTH / cols).max(1)).for_each(|(j, row)| {
+        row.iter_mut().enumerate().for_each(|(i, x)| *x = of(i, j));
+    });
+}
+
+/// The sum of `of` over all indices, in pieces that do not depend on the number of threads.
+fn sum(count: usize, of: impl Fn(usize) -> f64 + Sync) -> f64 {
+    let piece = |first: usize| (first..(first + PARALLEL_LENGTH).min(count)).map(&of).sum::<f64>();
+    let pieces: Vec<f64> =
+        (0..count.div_ceil(PARALLEL_LENGTH)).into_par_iter().map(|n| piece(n * PARALLEL_LENGTH)).collect();
+    pieces.iter().sum()
+}
+
+/// The residuals of a net and their derivatives.
+struct Terms<'a> {
+    net: &'a Net<'a>,
+    squareness: f64,
+    /// Angles between edges shrink with the cells, so that the weight of bends grows with their number.
+    bend_weight: f64,
+    /// Mean length of the edges of every row, and of every column.
+    means: [Vec<f64>; 2],
+}
+
+impl<'a> Terms<'a> {
+    fn new(net: &'a Net<'a>, params: &GridParams) -> Terms<'a> {
+        let (cols, rows) = (net.cols, net.rows);
+        let mean = |first: usize, stride: usize, count: usize| {
+            let node = |k: usize| net.points[first + k * stride];
+            (0..count).map(|k| node(k).distance(node(k + 1))).sum::<f64>() / count as f64
+        };
+        Terms {
+            net,
+            squareness: params.squareness,
+            bend_weight: params.fairness * (cols - 1).max(rows - 1) as f64 / MEANT_CELLS,
+            means: [
+                (0..rows).map(|j| mean(j * cols, 1, cols - 1)).collect(),
+                (0..cols).map(|i| mean(i, cols, rows - 1)).collect(),
+            ],
+        }
+    }
+
+    #[inline(always)]
+    fn at(&self, i: usize, j: usize) -> (Residuals, Gradients) {
+        let net = self.net;
+        let k = j * net.cols + i;
+        let mut found = (Residuals::default(), Gradients::default());
+        if i + 1 == net.cols || j + 1 == net.rows {
+            return found;
+        }
+        (found.0.cell, found.1.cell) = self.cell(k);
+        for (d, (stride, mean, inner)) in
+            [(1, self.means[0][j], j > 0), (net.cols, self.means[1][i], i > 0)].into_iter().enumerate()
+        {
+            if inner {
+                let edge = net.points[k + stride] - net.points[k];
+                let length = edge.length();
+                found.0.edges[d] = length / mean - 1.0;
+                found.1.edges[d] = edge / (length * mean).max(f64::MIN_POSITIVE);
+            }
+            if i > 0 && j > 0 {
+                (found.0.bends[d], found.1.bends[d]) = bend(net, k, stride, self.bend_weight);
+            }
+        }
+        found
+    }
+
+    /// The cell above and to the right of node `k`.
+    fn cell(&self, k: usize) -> (f64, [DVec3; 2]) {
+        let (e, f) = midlines(&self.net.points, self.net.cols, k);
+        let (angle, cos, sin) = off_square(e, f);
+        let (residual, slope) = angle_residual(angle, self.squareness);
+        let (le, lf) = (e.length().max(f64::MIN_POSITIVE), f.length().max(f64::MIN_POSITIVE));
+        let by_cos = slope / sin;
+        (residual, [(f / lf - e / le * cos) * (by_cos / le), (e / le - f / lf * cos) * (by_cos / lf)])
+    }
+
+    fn energy(&self) -> f64 {
+        let cols = self.net.cols;
+        sum(self.net.points.len(), |k| self.at(k % cols, k / cols).0.squared())
+    }
+}
+
+/// The linearised energy by moves of the nodes.
 struct System {
     cols: usize,
     rows: usize,
     /// Tangents of every node, one cell long; zero on the rim, which thereby stays.
     tangents: Vec<[DVec3; 2]>,
-    /// For each curve its first node, stride and number of edges.
-    curves: Vec<(usize, usize, usize)>,
-    /// For each edge, curve after curve: derivatives by the moves of its two nodes, and the residual.
-    edges: Vec<([DVec2; 2], f64)>,
-    /// For each cell the same with four nodes.
-    cells: Vec<([DVec2; 4], f64)>,
-    /// For each bend its node and stride, the derivatives by the node before, itself and after, and the residual.
-    bends: Vec<(usize, usize, [DVec2; 3], f64)>,
+    residuals: Vec<Residuals>,
+    gradients: Vec<Gradients>,
 }
 
 impl System {
-    fn new(net: &Net, params: &GridParams) -> System {
+    fn new(terms: &Terms) -> System {
+        let net = terms.net;
         let (cols, rows) = (net.cols, net.rows);
-        let tangents: Vec<[DVec3; 2]> = (0..cols * rows)
-            .map(|k| match net.is_inner(k) {
-                true => {
-                    [(net.points[k + 1] - net.points[k - 1]) / 2.0, (net.points[k + cols] - net.points[k - cols]) / 2.0]
-                }
-                false => [DVec3::ZERO; 2],
-            })
-            .collect();
-        let by = |k: usize, g: DVec3| DVec2::new(g.dot(tangents[k][0]), g.dot(tangents[k][1]));
-        let curves: Vec<_> = curves(net).collect();
-        let mut edges = Vec::with_capacity(2 * cols * rows);
-        for &(first, stride, count) in &curves {
-            let start = edges.len();
-            let mut sum = 0.0;
-            for k in 0..count {
-                let (a, b) = (first + k * stride, first + (k + 1) * stride);
-                let edge = net.points[b] - net.points[a];
-                let length = edge.length();
-                sum += length;
-                let unit = edge / length.max(f64::MIN_POSITIVE);
-                edges.push(([-by(a, unit), by(b, unit)], length));
-            }
-            let mean = sum / count as f64;
-            for edge in &mut edges[start..] {
-                edge.0 = edge.0.map(|g| g / mean);
-                edge.1 = edge.1 / mean - 1.0;
-            }
-        }
-        let cells = (0..(cols - 1) * (rows - 1))
-            .map(|c| {
-                let (e, f) = midlines(net, c);
-                let (angle, cos, sin) = off_square(e, f);
-                let (residual, slope) = angle_residual(angle, params.squareness);
-                let (le, lf) = (e.length().max(f64::MIN_POSITIVE), f.length().max(f64::MIN_POSITIVE));
-                let by_cos = slope / sin;
-                let by_e = (f / lf - e / le * cos) * (by_cos / le / 2.0);
-                let by_f = (e / le - f / lf * cos) * (by_cos / lf / 2.0);
-                let [a, b, c, d] = cell_corners(cols, c);
-                let g = [by(a, -by_e - by_f), by(b, by_e - by_f), by(c, by_e + by_f), by(d, by_f - by_e)];
-                (g, residual)
-            })
-            .collect();
-        let weight = bend_weight(net, params.fairness);
-        let bends = bends(net)
-            .map(|(k, stride)| {
-                let (residual, g) = bend_of(net, k, stride, weight);
-                (k, stride, [by(k - stride, g), by(k, g * -2.0), by(k + stride, g)], residual)
-            })
-            .collect();
-        System { cols, rows, tangents, curves, edges, cells, bends }
+        let count = cols * rows;
+        let mut system = System {
+            cols,
+            rows,
+            tangents: vec![[DVec3::ZERO; 2]; count],
+            residuals: vec![Residuals::default(); count],
+            gradients: vec![Gradients::default(); count],
+        };
+        at_nodes(&mut system.tangents, cols, |i, j| {
+            let k = j * cols + i;
+            let step = |stride: usize| (net.points[k + stride] - net.points[k - stride]) / 2.0;
+            if net.is_inner(k) { [step(1), step(cols)] } else { [DVec3::ZERO; 2] }
+        });
+        at_nodes(&mut system.residuals, cols, |i, j| terms.at(i, j).0);
+        at_nodes(&mut system.gradients, cols, |i, j| terms.at(i, j).1);
+        system
     }
 
-    /// The energy of the net, as [`energy_of`] sums it up.
+    /// The energy of the net, as [`Terms::energy`] sums it up.
     fn energy(&self) -> f64 {
-        let mut sum = 0.0;
-        let mut n = 0;
-        for &(_, _, count) in &self.curves {
-            sum += self.edges[n..n + count].iter().map(|e| e.1.powi(2)).sum::<f64>();
-            n += count;
-        }
-        let sum = self.bends.iter().fold(sum, |sum, b| sum + b.3.powi(2));
-        self.cells.iter().fold(sum, |sum, c| sum + c.1.powi(2))
+        sum(self.residuals.len(), |k| self.residuals[k].squared())
     }
 
-    /// `Jᵀ r` for residuals of edges and cells.
-    fn transpose(&self, edge: &[f64], cell: &[f64], bend: &[f64], out: &mut [DVec2]) {
-        out.fill(DVec2::ZERO);
-        let mut n = 0;
-        for &(first, stride, count) in &self.curves {
-            for k in 0..count {
-                let g = &self.edges[n].0;
-                out[first + k * stride] += g[0] * edge[n];
-                out[first + (k + 1) * stride] += g[1] * edge[n];
-                n += 1;
+    /// Calls `part` with every residual that inner node `k` has a part in, and its derivative by the place of the node.
+    #[inline(always)]
+    fn parts(&self, k: usize, residuals: &[Residuals], mut part: impl FnMut(f64, DVec3)) {
+        let (g, r) = (&self.gradients, residuals);
+        for (d, stride) in [1, self.cols].into_iter().enumerate() {
+            let (before, after) = (k - stride, k + stride);
+            part(r[before].edges[d], g[before].edges[d]);
+            part(r[k].edges[d], -g[k].edges[d]);
+            part(r[before].bends[d], g[before].bends[d]);
+            part(r[k].bends[d], g[k].bends[d] * -2.0);
+            part(r[after].bends[d], g[after].bends[d]);
+        }
+        let (left, below) = (k - 1, k - self.cols);
+        for (c, along, across) in [(k, -0.5, -0.5), (left, 0.5, -0.5), (below - 1, 0.5, 0.5), (below, -0.5, 0.5)] {
+            part(r[c].cell, g[c].cell[0] * along + g[c].cell[1] * across);
+        }
+    }
+
+    fn is_inner(&self, i: usize, j: usize) -> bool {
+        i > 0 && j > 0 && i + 1 < self.cols && j + 1 < self.rows
+    }
+
+    /// `Jᵀ r`.
+    fn transpose(&self, r: &[Residuals], out: &mut [DVec2]) {
+        at_nodes(out, self.cols, |i, j| {
+            let mut force = DVec3::ZERO;
+            let k = j * self.cols + i;
+            if self.is_inner(i, j) {
+                self.parts(k, r, |r, g| force += g * r);
             }
-        }
-        for (c, (g, _)) in self.cells.iter().enumerate() {
-            for (k, g) in cell_corners(self.cols, c).into_iter().zip(g) {
-                out[k] += *g * cell[c];
-            }
-        }
-        for ((k, stride, g, _), r) in self.bends.iter().zip(bend) {
-            out[k - stride] += g[0] * *r;
-            out[*k] += g[1] * *r;
-            out[k + stride] += g[2] * *r;
-        }
+            self.along_tangents(k, force)
+        });
+    }
+
+    fn along_tangents(&self, k: usize, g: DVec3) -> DVec2 {
+        let [u, v] = self.tangents[k];
+        DVec2::new(u.dot(g), v.dot(g))
     }
 
     /// `J x`, the edges of each curve without their mean: a curve may grow or shrink as a whole.
-    fn apply(&self, x: &[DVec2], edge: &mut [f64], cell: &mut [f64], bend: &mut [f64]) {
-        let mut n = 0;
-        for &(first, stride, count) in &self.curves {
-            let mut sum = 0.0;
-            for k in 0..count {
-                let g = &self.edges[n + k].0;
-                let r = g[0].dot(x[first + k * stride]) + g[1].dot(x[first + (k + 1) * stride]);
-                edge[n + k] = r;
-                sum += r;
+    /// * `moves` - room for the moves of the nodes in space
+    fn apply(&self, x: &[DVec2], moves: &mut [DVec3], out: &mut [Residuals]) {
+        let (cols, rows) = (self.cols, self.rows);
+        at_nodes(moves, cols, |i, j| {
+            let k = j * cols + i;
+            let [u, v] = self.tangents[k];
+            u * x[k].x + v * x[k].y
+        });
+        let moves = &*moves;
+        at_nodes(out, cols, |i, j| {
+            let mut r = Residuals::default();
+            if i + 1 == cols || j + 1 == rows {
+                return r;
             }
-            let mean = sum / count as f64;
-            edge[n..n + count].iter_mut().for_each(|r| *r -= mean);
-            n += count;
+            let k = j * cols + i;
+            let g = &self.gradients[k];
+            let (e, f) = midlines(moves, cols, k);
+            r.cell = g.cell[0].dot(e) + g.cell[1].dot(f);
+            for (d, stride) in [1, cols].into_iter().enumerate() {
+                r.edges[d] = g.edges[d].dot(moves[k + stride] - moves[k]);
+                if i > 0 && j > 0 {
+                    r.bends[d] = g.bends[d].dot(moves[k + stride] + moves[k - stride] - moves[k] * 2.0);
+                }
+            }
+            r
+        });
+        let mut columns = vec![0.0; cols];
+        for row in out.chunks_mut(cols) {
+            let mean = row.iter().map(|r| r.edges[0]).sum::<f64>() / (cols - 1) as f64;
+            for (r, column) in row.iter_mut().zip(&mut columns) {
+                r.edges[0] -= mean;
+                *column += r.edges[1] / (rows - 1) as f64;
+            }
         }
-        for (c, (g, _)) in self.cells.iter().enumerate() {
-            let corners = cell_corners(self.cols, c);
-            cell[c] = (0..4).map(|k| g[k].dot(x[corners[k]])).sum();
+        for row in out.chunks_mut(cols) {
+            row.iter_mut().zip(&columns).for_each(|(r, mean)| r.edges[1] -= mean);
         }
-        for ((k, stride, g, _), r) in self.bends.iter().zip(bend) {
-            *r = g[0].dot(x[k - stride]) + g[1].dot(x[*k]) + g[2].dot(x[k + stride]);
-        }
+    }
+
+    /// The inverse of the 2 x 2 blocks of `JᵀJ + damping`, as its three entries.
+    fn preconditioner(&self, damping: f64) -> Vec<[f64; 3]> {
+        let mut inverse = vec![[0.0; 3]; self.cols * self.rows];
+        at_nodes(&mut inverse, self.cols, |i, j| {
+            let [mut a, mut b, mut c] = [damping, 0.0, damping];
+            if self.is_inner(i, j) {
+                let k = j * self.cols + i;
+                self.parts(k, &self.residuals, |_, g| {
+                    let g = self.along_tangents(k, g);
+                    (a, b, c) = (a + g.x * g.x, b + g.x * g.y, c + g.y * g.y);
+                });
+            }
+            let det = (a * c - b * b).max(f64::MIN_POSITIVE);
+            [c / det, -b / det, a / det]
+        });
+        inverse
     }
 
     /// Moves that lower the linearised energy: conjugate gradients, preconditioned by the 2 x 2 blocks.
     fn solve(&self, damping: f64, steps: usize, cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Vec<DVec2>> {
         let count = self.cols * self.rows;
-        let mut edge: Vec<f64> = self.edges.iter().map(|e| e.1).collect();
-        let mut cell: Vec<f64> = self.cells.iter().map(|c| c.1).collect();
-        let mut bend: Vec<f64> = self.bends.iter().map(|b| b.3).collect();
-        let mut blocks = vec![[damping, 0.0, damping]; count];
-        let add = |block: &mut [f64; 3], g: DVec2| {
-            block[0] += g.x * g.x;
-            block[1] += g.x * g.y;
-            block[2] += g.y * g.y;
-        };
-        let mut n = 0;
-        for &(first, stride, edges) in &self.curves {
-            for k in 0..edges {
-                add(&mut blocks[first + k * stride], self.edges[n].0[0]);
-                add(&mut blocks[first + (k + 1) * stride], self.edges[n].0[1]);
-                n += 1;
-            }
-        }
-        for (c, (g, _)) in self.cells.iter().enumerate() {
-            for (k, g) in cell_corners(self.cols, c).into_iter().zip(g) {
-                add(&mut blocks[k], *g);
-            }
-        }
-        for (k, stride, g, _) in &self.bends {
-            add(&mut blocks[k - stride], g[0]);
-            add(&mut blocks[*k], g[1]);
-            add(&mut blocks[k + stride], g[2]);
-        }
-        let precondition = |r: &[DVec2], z: &mut [DVec2]| {
-            for ((z, r), [a, b, c]) in z.iter_mut().zip(r).zip(&blocks) {
-                let det = (a * c - b * b).max(f64::MIN_POSITIVE);
-                *z = DVec2::new(c * r.x - b * r.y, a * r.y - b * r.x) / det;
-            }
-        };
-        let dot = |x: &[DVec2], y: &[DVec2]| x.iter().zip(y).map(|(x, y)| x.dot(*y)).sum::<f64>();
-        let mut r = vec![DVec2::ZERO; count];
-        self.transpose(&edge, &cell, &bend, &mut r);
+        let inverse = self.preconditioner(damping);
+        let precondition = |r: DVec2, [a, b, c]: [f64; 3]| DVec2::new(a * r.x + b * r.y, b * r.x + c * r.y);
+        let (mut r, mut q) = (vec![DVec2::ZERO; count], vec![DVec2::ZERO; count]);
+        let (mut moves, mut changes) = (vec![DVec3::ZERO; count], vec![Residuals::default(); count]);
+        self.transpose(&self.residuals, &mut r);
         r.iter_mut().for_each(|r| *r = -*r);
         let mut x = vec![DVec2::ZERO; count];
-        let mut z = vec![DVec2::ZERO; count];
-        let mut q = vec![DVec2::ZERO; count];
-        precondition(&r, &mut z);
-        let mut p = z.clone();
-        let mut rz = dot(&r, &z);
+        let mut p: Vec<DVec2> = r.iter().zip(&inverse).map(|(r, m)| precondition(*r, *m)).collect();
+        let mut rz = sum(count, |k| r[k].dot(p[k]));
         let first = rz;
         for _ in 0..steps {
-            if rz <= 1e-6 * first || cancelled() {
+            if rz <= CG_REST * first || cancelled() {
                 break;
             }
-            self.apply(&p, &mut edge, &mut cell, &mut bend);
-            self.transpose(&edge, &cell, &bend, &mut q);
-            q.iter_mut().zip(&p).for_each(|(q, p)| *q += damping * *p);
-            let alpha = rz / dot(&p, &q);
+            self.apply(&p, &mut moves, &mut changes);
+            self.transpose(&changes, &mut q);
+            let alpha = rz / sum(count, |k| p[k].dot(q[k] + damping * p[k]));
             for k in 0..count {
                 x[k] += alpha * p[k];
-                r[k] -= alpha * q[k];
+                r[k] -= alpha * (q[k] + damping * p[k]);
             }
-            precondition(&r, &mut z);
-            let next = dot(&r, &z);
+            let next = sum(count, |k| r[k].dot(precondition(r[k], inverse[k])));
             let beta = next / rz;
             rz = next;
             for k in 0..count {
-                p[k] = z[k] + beta * p[k];
+                p[k] = precondition(r[k], inverse[k]) + beta * p[k];
             }
         }
         (!cancelled()).then_some(x)
