@@ -437,6 +437,31 @@ fn the_default_leaves_four_cells_to_every_span_however_rough_the_grid() {
 }
 
 #[test]
+fn a_patch_that_folds_is_smoothed_and_leaves_its_neighbours_as_they_are() {
+    // One patch with waves, none on its sides: they stand up from it or hang over.
+    let waves = |size: f64, overhanging: bool| {
+        let mut work = cube(41, CurveKind::Smooth, blob);
+        let grid = &mut work.grids[0];
+        let along = (grid.points[40] - grid.points[0]).normalize();
+        let up = along.cross(grid.points[40 * 41] - grid.points[0]).normalize();
+        let way = if overhanging { along } else { up };
+        for (k, p) in grid.points.iter_mut().enumerate() {
+            let [s, t] = [k % 41, k / 41].map(|i| i as f64 / 40.0);
+            *p += way * (size * s * (1.0 - s) * t * (1.0 - t) * (20.0 * s).sin());
+        }
+        let params = FitParams { resolution: Resolution::Control([13, 13]), ..FitParams::default() };
+        let surfaces = fit(&work, &params);
+        assert_eq!(surface::folds(&surfaces[0], &work.grids[0]), 0);
+        (surface::deviation_of(&surfaces[0], &work.grids[0]).rms, surfaces)
+    };
+    let (_, flat) = waves(0.0, false);
+    let (standing, _) = waves(2.0, false);
+    let (hanging, surfaces) = waves(2.0, true);
+    assert!(hanging > 2.0 * standing, "smoothed: {hanging} against {standing}");
+    assert!(flat[1..] == surfaces[1..], "a neighbour moved");
+}
+
+#[test]
 fn parameters_out_of_range_are_named() {
     let work = wavy([12, 15]);
     for (cells_per_span, smoothing, wrong) in [(0.5, 0.0, "cells_per_span"), (4.0, f64::NAN, "smoothing")] {

@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 const ROUNDS: usize = 3;
 
 /// Weights of the smoothing that folded patches get, one after the other until they are open: from a tenth of what
-/// the nodes weigh to a surface that is all but the blend of its boundary.
+/// the nodes weigh to a surface that is all but the blend of its boundary curves, which stay.
 pub(super) const SMOOTHING: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
 
 /// How to fit the surfaces of a network.
@@ -77,7 +77,9 @@ pub fn fit_network(
     let most: Vec<usize> = nodes.iter().map(|&n| (spans(n) + 3).clamp(FEWEST_CONTROL, n.max(FEWEST_CONTROL))).collect();
     let mut counts = resolution::counts(network, grids, &most, &params.resolution, size)?;
     let mut smoothing = vec![params.smoothing; grids.len()];
-    let fit = |counts: &[usize], smoothing: &[f64]| fit_counts(network, grids, &nodes, counts, smoothing, observer);
+    let fit = |counts: &[usize], smoothing: &[f64]| {
+        fit_counts(network, grids, &nodes, counts, (params.smoothing, smoothing), observer)
+    };
     let mut surfaces = fit(&counts, &smoothing)?;
     if let &Resolution::Tolerance(fraction) = &params.resolution {
         for _ in 0..ROUNDS {
@@ -118,14 +120,14 @@ pub fn fit_network(
     Ok(surfaces)
 }
 
-/// Fits with known counts of nodes and control points along the curves, and a smoothing for each patch; a curve
-/// takes the larger one of its patches.
+/// Fits with known counts of nodes and control points along the curves, a smoothing for all curves and one for the inside
+/// of each patch: a folded patch does not bend the curves of its neighbours, which would fold in turn.
 fn fit_counts(
     network: &Network,
     grids: &[Grid],
     nodes: &[usize],
     counts: &[usize],
-    smoothing: &[f64],
+    (curve_smoothing, smoothing): (f64, &[f64]),
     observer: &dyn Observer,
 ) -> Result<Vec<Surface>, FitError> {
     let used = nodes.iter().zip(counts).filter(|(n, _)| **n > 0).map(|(&n, &c)| (n, c));
@@ -135,11 +137,10 @@ fn fit_counts(
         .into_par_iter()
         .enumerate()
         .map(|(c, nodes)| {
-            let most = uses[c].iter().map(|&(p, _)| smoothing[p as usize]).fold(0.0, f64::max);
-            Ok(match (nodes.len(), most) {
-                (0, _) => Vec::new(),
-                (n, 0.0) => fit_curve(&nodes, directions.get(n, counts[c])),
-                (n, most) => fit_curve(&nodes, &Direction::new(n, counts[c], most)?),
+            Ok(match nodes.len() {
+                0 => Vec::new(),
+                n if curve_smoothing == 0.0 => fit_curve(&nodes, directions.get(n, counts[c])),
+                n => fit_curve(&nodes, &Direction::new(n, counts[c], curve_smoothing)?),
             })
         })
         .collect();
