@@ -437,6 +437,21 @@ fn the_default_leaves_four_cells_to_every_span_however_rough_the_grid() {
 }
 
 #[test]
+fn angles_along_a_seam_are_means_over_its_length() {
+    // A sheet whose right half is hinged at the seam by an angle that grows evenly from 0 to 0.2.
+    let work = sheet(2, 1, [false, false], [33, 33], |x, y| DVec3::new(x, y, (x - 1.0).max(0.0) * (0.2 * y).tan()));
+    let seams = surface::measure_seams(&work.network, &fit(&work, &control(8, 8)));
+    let [seam] = &seams[..] else { panic!("one seam, not {}", seams.len()) };
+    let whole = 0.2f64.to_degrees();
+    for (found, wanted) in
+        [(seam.angle_max_deg, whole), (seam.angle_rms_deg, whole / 3f64.sqrt()), (seam.angle_mean_deg, whole / 2.0)]
+    {
+        assert!((found / wanted - 1.0).abs() < 1e-3, "{found} {wanted}");
+    }
+    assert!((seam.length - 1.0).abs() < 1e-9 && seam.gap_max == 0.0);
+}
+
+#[test]
 fn a_patch_that_folds_is_smoothed_and_leaves_its_neighbours_as_they_are() {
     // One patch with waves, none on its sides: they stand up from it or hang over.
     let waves = |size: f64, overhanging: bool| {

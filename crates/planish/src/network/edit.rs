@@ -176,11 +176,7 @@ impl<'m> Editor<'m> {
         let mut best: Option<OnCurve> = None;
         for c in 0..self.network.curves.len() as u32 {
             let at = self.positions(c);
-            for (k, w) in at.windows(2).enumerate() {
-                let d = w[1] - w[0];
-                let square = d.length_squared();
-                let share = if square > 0.0 { ((p - w[0]).dot(d) / square).clamp(0.0, 1.0) } else { 0.0 };
-                let distance = p.distance(w[0] + d * share);
+            for (k, share, distance) in feet(&at, p) {
                 let end = (k == 0 && share == 0.0) || (k + 2 == at.len() && share == 1.0);
                 if !end && distance <= reach && best.is_none_or(|b| distance < b.distance) {
                     best = Some(OnCurve { curve: c, at: CurvePlace { segment: k, share }, distance });
@@ -444,4 +440,14 @@ impl<'m> Editor<'m> {
         self.network.patches = found.patches.clone();
         found
     }
+}
+
+/// The place of every piece of a chain that is nearest to `p`: number of the piece, share of it, and distance.
+pub(super) fn feet(chain: &[DVec3], p: DVec3) -> impl Iterator<Item = (usize, f64, f64)> {
+    chain.windows(2).enumerate().map(move |(k, w)| {
+        let d = w[1] - w[0];
+        let square = d.length_squared();
+        let share = if square > 0.0 { ((p - w[0]).dot(d) / square).clamp(0.0, 1.0) } else { 0.0 };
+        (k, share, p.distance(w[0] + d * share))
+    })
 }

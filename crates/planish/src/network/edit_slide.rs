@@ -3,7 +3,7 @@
 //! The two curves that follow the line at the corner are one chain; the corner goes to the place of the chain that is
 //! nearest to where it is dragged and divides it there. So the line stays covered, and nothing leaves it.
 
-use super::edit::{EditError, Editor};
+use super::edit::{EditError, Editor, feet};
 use super::imprint::{self, Place};
 use super::{Curve, CurveKind};
 use crate::curve::between;
@@ -43,7 +43,7 @@ impl Editor<'_> {
             chain.extend_from_slice(&turned(of(b), b % 2 == 1)[1..]);
         }
         let at: Vec<DVec3> = chain.iter().map(|p| p.position(self.mesh)).collect();
-        let (k, share) = nearest(&at, to);
+        let (k, share, _) = feet(&at, to).min_by(|a, b| a.2.total_cmp(&b.2)).expect("a line has pieces");
         let share = if share < AT_POINT {
             0.0
         } else if share > 1.0 - AT_POINT {
@@ -106,19 +106,4 @@ fn turned(curve: &Curve, around: bool) -> Vec<FacePoint> {
         points.reverse();
     }
     points
-}
-
-/// Piece of a chain and share of it nearest to `p`.
-fn nearest(at: &[DVec3], p: DVec3) -> (usize, f64) {
-    let mut best = (f64::INFINITY, (0, 0.0));
-    for (k, w) in at.windows(2).enumerate() {
-        let d = w[1] - w[0];
-        let square = d.length_squared();
-        let share = if square > 0.0 { ((p - w[0]).dot(d) / square).clamp(0.0, 1.0) } else { 0.0 };
-        let distance = p.distance(w[0] + d * share);
-        if distance < best.0 {
-            best = (distance, (k, share));
-        }
-    }
-    best.1
 }

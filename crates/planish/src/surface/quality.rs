@@ -76,17 +76,18 @@ pub struct SeamQuality {
     pub kind: CurveKind,
     /// Largest distance between the two boundaries at equal parameters, world units.
     pub gap_max: f64,
-    /// Largest angle between the two normals, degrees.
+    /// Largest angle between the two normals, ends included, degrees.
     pub angle_max_deg: f64,
-    /// Root of the mean square of the angle, degrees.
+    /// Root of the mean square of the angle over the length of the seam, degrees.
     pub angle_rms_deg: f64,
-    /// Mean angle, degrees.
+    /// Mean angle over the length of the seam, degrees.
     pub angle_mean_deg: f64,
     /// Length of the seam, world units.
     pub length: f64,
 }
 
-/// Measures every curve that has a patch on both sides, in the order of the curves, at 33 samples or more.
+/// Measures every curve that has a patch on both sides, in the order of the curves, in 32 pieces or more: means by the
+/// midpoint rule, largest values at the ends of the pieces, too.
 ///
 /// Surfaces must be those of the network's patches. Samples where a surface has no normal (a corner with an
 /// angle of 0 or 180 degrees) count for the gap only.
@@ -153,35 +154,41 @@ fn measure(network: &Network, surfaces: &[Surface], curve: usize, uses: [(u32, u
     let (first, k) = (&surfaces[uses[0].0 as usize], uses[0].1);
     let spans = if k % 2 == 0 { first.cols } else { first.rows } - 3;
     let samples = SEAM_SAMPLES.max(SPAN_SAMPLES * spans + 1);
-    let (mut gap_max, mut angle_max, mut squares, mut sum, mut angles, mut length) = (0f64, 0f64, 0.0, 0.0, 0, 0.0);
-    let mut last = None;
-    for t in uniform_parameters(samples) {
-        let [a, b] = uses.map(|(p, k)| {
-            let side = network.patches[p as usize].sides[k as usize];
-            let (u, v) = place(k as usize, side.reversed, t);
-            surfaces[p as usize].jet(u, v)
-        });
-        gap_max = gap_max.max(a.point.distance(b.point));
-        length += last.map_or(0.0, |l| a.point.distance(l));
-        last = Some(a.point);
+    let jets: Vec<[super::Jet; 2]> = uniform_parameters(2 * samples - 1)
+        .into_iter()
+        .map(|t| {
+            uses.map(|(p, k)| {
+                let side = network.patches[p as usize].sides[k as usize];
+                let (u, v) = place(k as usize, side.reversed, t);
+                surfaces[p as usize].jet(u, v)
+            })
+        })
+        .collect();
+    let gap_max = jets.iter().map(|[a, b]| a.point.distance(b.point)).fold(0.0, f64::max);
+    let angle = |[a, b]: &[super::Jet; 2]| {
         let has_normal = |j: &super::Jet| j.area_vector().length() > FLAT * j.u.length() * j.v.length();
-        if has_normal(&a) && has_normal(&b) {
-            let (na, nb) = (a.area_vector().normalize(), b.area_vector().normalize());
-            let angle = na.cross(nb).length().atan2(na.dot(nb)).to_degrees();
-            angle_max = angle_max.max(angle);
-            squares += angle * angle;
-            sum += angle;
-            angles += 1;
+        let (na, nb) = (a.area_vector().normalize_or_zero(), b.area_vector().normalize_or_zero());
+        (has_normal(a) && has_normal(b)).then(|| na.cross(nb).length().atan2(na.dot(nb)).to_degrees())
+    };
+    let angle_max = jets.iter().filter_map(angle).fold(0.0, f64::max);
+    let (mut length, mut known, mut squares, mut sum) = (0.0, 0.0, 0.0, 0.0);
+    for piece in jets.windows(3).step_by(2) {
+        let chord = piece[0][0].point.distance(piece[2][0].point);
+        length += chord;
+        if let Some(angle) = angle(&piece[1]) {
+            known += chord;
+            squares += chord * angle * angle;
+            sum += chord * angle;
         }
     }
-    let count = f64::from(angles.max(1));
+    let known = if known > 0.0 { known } else { 1.0 };
     SeamQuality {
         curve: curve as u32,
         kind: network.curves[curve].kind,
         gap_max,
         angle_max_deg: angle_max,
-        angle_rms_deg: (squares / count).sqrt(),
-        angle_mean_deg: sum / count,
+        angle_rms_deg: (squares / known).sqrt(),
+        angle_mean_deg: sum / known,
         length,
     }
 }

@@ -24,8 +24,9 @@ const ALIKE: f64 = 0.94;
 const FEWEST_BENT: usize = 6;
 /// Damping of the conditions at the ends, each of diagonal 1: contradicting ones share their miss.
 const DAMPING: f64 = 1e-7;
-/// How far a leg of the control polygon may change, over its length: a turn of 60 degrees.
-const LEEWAY: f64 = 1.0;
+/// How far a leg of the control polygon may change, over its length: a turn of 35 degrees. Curves that are
+/// bent more than that turn their patches over.
+const LEEWAY: f64 = 0.6;
 /// Conditions depend on the direction that they change a little; the second pass sees to that.
 const PASSES: usize = 2;
 /// Samples per knot span of a field of normals, enough for its cubic and the products with cubics.
