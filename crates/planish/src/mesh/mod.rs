@@ -105,6 +105,7 @@ impl TriMesh {
     }
 
     /// The three corner positions of triangle `t`.
+    #[inline]
     pub fn corners(&self, t: usize) -> [DVec3; 3] {
         self.triangles[t].map(|v| self.points[v as usize])
     }
@@ -116,11 +117,13 @@ impl TriMesh {
     }
 
     /// Unit normal of triangle `t`; zero for a degenerate one.
+    #[inline]
     pub fn normal(&self, t: usize) -> DVec3 {
         self.area_vector(t).normalize_or_zero()
     }
 
     /// Area of triangle `t`.
+    #[inline]
     pub fn area(&self, t: usize) -> f64 {
         self.area_vector(t).length() / 2.0
     }
