@@ -195,6 +195,10 @@ fn thin(crossings: &[Vec<Crossing>; 3]) -> Thin {
 
 /// True if for every pair of positions as many edges run one way as the other.
 fn is_balanced(mesh: &TriMesh) -> bool {
+    // Welding adds up what is balanced by names.
+    if is_balanced_by_names(mesh) {
+        return true;
+    }
     let (welded, _) = crate::mesh::weld(mesh);
     let mut keyed: Vec<(u64, i32)> = welded
         .triangles
@@ -208,6 +212,32 @@ fn is_balanced(mesh: &TriMesh) -> bool {
         .collect();
     keyed.par_sort_unstable();
     keyed.chunk_by(|a, b| a.0 == b.0).all(|run| run.iter().map(|e| e.1).sum::<i32>() == 0)
+}
+
+/// True if for every pair of vertices as many edges run one way as the other.
+fn is_balanced_by_names(mesh: &TriMesh) -> bool {
+    // Edges in buckets by their lower vertex, a handful each.
+    let edges = || {
+        let of = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
+        mesh.triangles.iter().flat_map(of).filter(|(a, b)| a != b)
+    };
+    let mut start = vec![0u32; mesh.points.len() + 1];
+    edges().for_each(|(a, b)| start[a.min(b) as usize + 1] += 1);
+    for v in 0..mesh.points.len() {
+        start[v + 1] += start[v];
+    }
+    let mut next = start.clone();
+    let mut others = vec![(0u32, 0i32); start[mesh.points.len()] as usize];
+    for (a, b) in edges() {
+        let at = &mut next[a.min(b) as usize];
+        others[*at as usize] = (a.max(b), if a < b { 1 } else { -1 });
+        *at += 1;
+    }
+    start.windows(2).all(|ends| {
+        let bucket = &mut others[ends[0] as usize..ends[1] as usize];
+        bucket.sort_unstable();
+        bucket.chunk_by(|a, b| a.0 == b.0).all(|run| run.iter().map(|e| e.1).sum::<i32>() == 0)
+    })
 }
 
 /// Lines of an axis are numbered so that sorting by line keeps rows in order: x lines by (k, j), y lines by (i, k),
@@ -289,24 +319,33 @@ fn rasterise(mesh: &TriMesh, lattice: &Lattice, axis: usize) -> Vec<Crossing> {
 /// Coordinates nearer to a node than this fraction of a cell are compared by exact signs.
 const NEAR_NODE: f64 = 1e-6;
 
+/// The greatest whole number that is not above `x`.
+#[inline]
+fn floor(x: f64) -> i64 {
+    // Rounds towards zero, and is no call on any processor.
+    let whole = x as i64;
+    whole - (x < whole as f64) as i64
+}
+
+#[inline]
 fn rasterise_one(corners: [DVec3; 3], face: u32, lattice: &Lattice, axis: usize, out: &mut Vec<Crossing>) {
     let (ua, va) = ((axis + 1) % 3, (axis + 2) % 3);
     let flat = corners.map(|p| DVec2::new(p[ua], p[va]));
-    let turn = orient2d(flat[0], flat[1], flat[2]);
-    if turn == 0.0 {
-        return;
-    }
     let (low, high) = (flat[0].min(flat[1]).min(flat[2]), flat[0].max(flat[1]).max(flat[2]));
     let range = |a: usize, low: f64, high: f64| {
         let (o, h) = (lattice.origin[a], lattice.step[a]);
         // One node more on both sides than rounding could take away.
-        let first = ((low - o) / h - 0.001).ceil().max(0.0) as usize;
-        let last = ((high - o) / h + 0.001).floor();
-        (first, if last < 0.0 { None } else { Some((last as usize).min(lattice.cells[a])) })
+        let first = floor((low - o) / h - 0.001) + 1;
+        let last = floor((high - o) / h + 0.001);
+        (first.max(0) as usize, if last < 0 { None } else { Some((last as usize).min(lattice.cells[a])) })
     };
     let (v0, Some(v1)) = range(va, low.y, high.y) else { return };
     let (u0, Some(u1)) = range(ua, low.x, high.x) else { return };
     if u0 > u1 || v0 > v1 {
+        return;
+    }
+    let turn = orient2d(flat[0], flat[1], flat[2]);
+    if turn == 0.0 {
         return;
     }
     let wide = (u1 - u0 + 1) * (v1 - v0 + 1) > 12;
@@ -340,11 +379,12 @@ fn rasterise_one(corners: [DVec3; 3], face: u32, lattice: &Lattice, axis: usize,
         }
         for u in from..=to {
             let q = DVec2::new(lattice.coordinate(ua, u), y);
-            let weights = [1, 2, 0].map(|k| orient2d(flat[k], flat[(k + 1) % 3], q));
+            let mut weights = [0.0; 3];
             // All three on the side of the triangle, or on the edge and shifted to it.
             let inside = (0..3).all(|k| {
-                let s =
-                    if weights[k] != 0.0 { weights[k] } else { shifted(flat[(k + 1) % 3], flat[(k + 2) % 3], ua, va) };
+                let (a, b) = (flat[(k + 1) % 3], flat[(k + 2) % 3]);
+                weights[k] = orient2d(a, b, q);
+                let s = if weights[k] != 0.0 { weights[k] } else { shifted(a, b, ua, va) };
                 (s > 0.0) == (turn > 0.0) && s != 0.0
             });
             if !inside {
@@ -356,8 +396,8 @@ fn rasterise_one(corners: [DVec3; 3], face: u32, lattice: &Lattice, axis: usize,
             let most = corners.iter().map(|c| c[axis]).fold(f64::NEG_INFINITY, f64::max);
             let x = (mix(weights) / sum).clamp(least, most);
             let along = (x - lattice.origin[axis]) / lattice.step[axis];
-            let mut edge = along.floor() as i32;
-            let nearest = along.round();
+            let mut edge = floor(along) as i32;
+            let nearest = floor(along + 0.5) as f64;
             if (along - nearest).abs() < NEAR_NODE || !along.is_finite() {
                 let node = nearest.clamp(-1.0, lattice.cells[axis] as f64 + 1.0) as i32;
                 let mut at = DVec3::ZERO;
