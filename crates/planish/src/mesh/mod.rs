@@ -111,6 +111,7 @@ impl TriMesh {
     }
 
     /// Twice the area vector of triangle `t`: its length is twice the area, its direction the normal.
+    #[inline]
     pub fn area_vector(&self, t: usize) -> DVec3 {
         let [a, b, c] = self.corners(t);
         (b - a).cross(c - a)
