@@ -146,8 +146,9 @@ impl Lattice {
     }
 }
 
-/// A hit while it is sorted, in its row, and as a vertex with two triangles.
-const BYTES_PER_HIT: f64 = 230.0;
+/// A hit while it is sorted, in its row, and as a vertex with two triangles, while features are brought to their place:
+/// 8.9 GB were measured for 27 million.
+const BYTES_PER_HIT: f64 = 330.0;
 /// Starts of a row in the four tables.
 const BYTES_PER_ROW: f64 = 40.0;
 
