@@ -107,6 +107,39 @@ fn faulty_scripts_volumes_and_sizes_are_status_3_and_nothing_is_written() {
 }
 
 #[test]
+fn volumes_without_a_surface_tell_their_range_and_options_that_mean_nothing_for_them_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut volume = b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 5 5 5\nencoding: raw\n\n".to_vec();
+    volume.extend((0..125u8).map(|n| if n == 62 { 200 } else { 7 }));
+    fs::write(folder.path().join("dot.nrrd"), volume).unwrap();
+    let line = refused(&["mesh", "dot.nrrd", "-o", "out.ply"], folder.path());
+    assert!(line.contains("from 7 to 200") && line.contains("hint: choose a level"), "{line}");
+    done(&["mesh", "dot.nrrd", "-o", "dot.ply", "--iso", "100", "--body", "above", "-q"], folder.path());
+    for option in [["--voxel", "0.1"], ["--resolution", "20"]] {
+        let output = planish(&[&["mesh", "dot.nrrd", "-o", "no.ply"], option.as_slice()].concat(), folder.path());
+        let told = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && told.contains(option[0]), "{told}");
+    }
+    fs::write(folder.path().join("head.nhdr"), "NRRD0004\n").unwrap();
+    let line = refused(&["mesh", "head.nhdr", "-o", "no.ply"], folder.path());
+    assert!(line.contains("nhdr") && line.contains(".nrrd") && line.contains(".toml"), "{line}");
+    assert!(!folder.path().join("no.ply").exists());
+}
+
+#[test]
+fn a_decimation_that_cannot_go_as_far_as_asked_is_told_and_targets_that_are_none_are_wrong_usage() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("box.toml"), "[solid.a]\nbox = { size = [3, 2, 1] }\n").unwrap();
+    done(&["mesh", "box.toml", "-o", "box.ply", "--resolution", "12", "-q"], folder.path());
+    let output = planish(&["decimate", "box.ply", "--triangles", "6", "-o", "few.ply"], folder.path());
+    let told = text(&output.stderr);
+    assert!(output.status.code() == Some(0) && told.contains("12 triangles are left where 6 were wanted"), "{told}");
+    let output = planish(&["decimate", "box.ply", "--ratio", "0", "-o", "none.ply"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!folder.path().join("none.ply").exists());
+}
+
+#[test]
 fn a_plate_thinner_than_the_voxel_is_told_with_the_voxel_that_it_needs() {
     let folder = tempfile::tempdir().unwrap();
     let part = "[solid.block]\nbox = { size = [4, 4, 4] }\n[solid.fin]\nbox = { size = [10, 4, 0.03] }\n[solid.part]\nunion = [\"block\", \"fin\"]\n";

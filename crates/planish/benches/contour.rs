@@ -212,9 +212,7 @@ fn dense_armadillo() -> Option<TriMesh> {
 
 fn decimation(name: &str, mesh: Option<TriMesh>, figures: &mut Figures) {
     let Some(mesh) = mesh else { return };
-    let start = Instant::now();
-    let found = decimate(&mesh, None, &DecimateParams::default(), &Silent).expect("a manifold");
-    let seconds = start.elapsed().as_secs_f64();
+    let (found, seconds) = least(|| decimate(&mesh, None, &DecimateParams::default(), &Silent).expect("a manifold"));
     let off = compare(&mesh, &found.mesh, &CompareParams::default(), &Silent).expect("surfaces");
     let d = diagnose(&found.mesh);
     eprintln!(
@@ -246,9 +244,7 @@ fn smoothing(figures: &mut Figures) {
         // The sum of twelve uniform numbers is nearly normal.
         *p += n * size * ((0..12).map(|k| random::unit(4, 12 * v as u64 + k)).sum::<f64>() - 6.0);
     }
-    let start = Instant::now();
-    let found = smooth(&rough, None, &SmoothParams::default(), &Silent).expect("a sound mesh");
-    let seconds = start.elapsed().as_secs_f64();
+    let (found, seconds) = least(|| smooth(&rough, None, &SmoothParams::default(), &Silent).expect("a sound mesh"));
     for (what, m) in [("rough", &rough), ("smooth", &found.mesh)] {
         let z = zone::measure(&mesh, m, 0.01 * mesh.bounds().diagonal() / 1.5);
         eprintln!(

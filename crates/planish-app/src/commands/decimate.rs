@@ -7,7 +7,7 @@ use crate::files;
 use crate::products::Staged;
 use crate::progress;
 use crate::summary::Summary;
-use planish::mesh::{decimate as decimate_mesh, diagnose};
+use planish::mesh::{DecimateError, DecimateTarget, decimate as decimate_mesh, diagnose};
 use planish::pipeline::{Figure, Warning};
 use planish_io::WriteOptions;
 use planish_io::report::{Report, count, number};
@@ -23,6 +23,9 @@ pub fn decimate(session: &Session, args: &Decimate) -> Result<Status, Failure> {
         return Err(Failure::interrupted());
     }
     let made = made.map_err(|e| {
+        if let DecimateError::Target { .. } = e {
+            return Failure::usage(&args.mesh, super::with_hint(&e.to_string()));
+        }
         Failure::input(&args.mesh, super::with_hint(&e.to_string())).hint("look for faults with `planish info`")
     })?;
     let options = WriteOptions { units: session.units(), ..WriteOptions::default() };
@@ -42,6 +45,19 @@ pub fn decimate(session: &Session, args: &Decimate) -> Result<Status, Failure> {
     if made.self_intersections > 0 {
         let text = format!("{} pairs of triangles meet, as in the input.", made.self_intersections);
         report.warnings.push(Warning::new("self_intersections", text, ""));
+    }
+    let wanted = match params.target {
+        DecimateTarget::Triangles(n) => Some(n),
+        DecimateTarget::Ratio(r) => Some((mesh.triangles.len() as f64 * r) as usize),
+        DecimateTarget::Tolerance(_) => None,
+    };
+    if let Some(wanted) = wanted.filter(|&n| facts.triangles > n) {
+        let text = format!(
+            "{} triangles are left where {} were wanted: no other can go without turning one, touching, or leaving a feature.",
+            count(facts.triangles as u64),
+            count(wanted as u64)
+        );
+        report.warnings.push(Warning::new("target_missed", text, ""));
     }
     staged.commit()?;
     commit_report(own_report, &report)?;

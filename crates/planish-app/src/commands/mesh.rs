@@ -13,9 +13,9 @@ use planish::field::{Part, Spacing};
 use planish::mesh::{TriMesh, diagnose};
 use planish::model::Units;
 use planish::pipeline::{self, Figure, ScanError, ScanParams, Warning};
-use planish_io::WriteOptions;
 use planish_io::report::{Input, Report, count, number};
 use planish_io::script::Script;
+use planish_io::{MeshFormat, WriteOptions};
 
 /// Cells along the longest side unless the user says.
 const RESOLUTION: usize = 129;
@@ -143,8 +143,15 @@ fn read(session: &Session, args: &Mesh) -> Result<(Source, Input, Units), Failur
     }
     if planish_io::is_grid(path) && !planish_io::is_scan(path) {
         let mut grid = planish_io::read_grid(path).map_err(|e| Failure::input(path, e))?;
+        let npy = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
+        if args.resolution.is_some() || args.voxel.is_some() && !npy {
+            let what =
+                if npy { "the cells of a volume are its own samples" } else { "a NRRD file tells its own spacing" };
+            let option = if args.voxel.is_some() { "--voxel" } else { "--resolution" };
+            return Err(Failure::usage(path, format!("{what}, {option} has no meaning here")).hint("leave it out"));
+        }
         // NumPy arrays carry no size of a voxel.
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
+        if npy {
             grid.spacing *= args.voxel.unwrap_or(1.0);
         }
         let units = session.units();
@@ -162,6 +169,16 @@ fn read(session: &Session, args: &Mesh) -> Result<(Source, Input, Units), Failur
         let scan = files::scan(path, &args.scan)?;
         let input = super::clean::scan_facts(path, &scan, session.units());
         return Ok((Source::Scan(scan), input, session.units()));
+    }
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    if !files::is_model(path) && MeshFormat::ALL.iter().all(|f| f.extension() != extension) {
+        let list = |all: &[&str]| all.iter().map(|e| format!(".{e}")).collect::<Vec<_>>().join(", ");
+        let known = format!(
+            "meshes are {}; scans {}; volumes .nrrd (one file), .npy; scripts .toml",
+            list(&MeshFormat::ALL.map(MeshFormat::extension)),
+            list(&planish_io::SCAN_EXTENSIONS)
+        );
+        return Err(Failure::input(path, format!("unknown extension \"{extension}\"")).hint(known));
     }
     let mesh = files::mesh(path)?;
     let input = files::mesh_facts(path, &mesh, session.units());

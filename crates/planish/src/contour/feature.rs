@@ -80,36 +80,33 @@ pub fn solve(planes: &[(DVec3, DVec3)], near: DVec3, shape: Shape) -> DVec3 {
 }
 
 /// Eigenvalues, descending, and unit eigenvectors of a symmetric matrix, by Jacobi rotations.
-pub fn eigen(mut a: DMat3) -> ([f64; 3], [DVec3; 3]) {
-    let mut v = DMat3::IDENTITY;
+pub fn eigen(a: DMat3) -> ([f64; 3], [DVec3; 3]) {
+    let mut on = [a.x_axis.x, a.y_axis.y, a.z_axis.z];
+    // Beside the diagonal, each named by the third axis.
+    let mut off = [a.y_axis.z, a.x_axis.z, a.x_axis.y];
+    let mut v = [DVec3::X, DVec3::Y, DVec3::Z];
     for _ in 0..16 {
-        let off = a.x_axis.y.powi(2) + a.x_axis.z.powi(2) + a.y_axis.z.powi(2);
-        let on = a.x_axis.x.powi(2) + a.y_axis.y.powi(2) + a.z_axis.z.powi(2);
-        if !(off > 1e-32 * on) {
+        let squares = |x: &[f64; 3]| x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
+        if !(squares(&off) > 1e-32 * squares(&on)) {
             break;
         }
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            let apq = a.col(p)[q];
+        for (p, q, r) in [(0, 1, 2), (0, 2, 1), (1, 2, 0)] {
+            let apq = off[r];
             if apq == 0.0 {
                 continue;
             }
-            let theta = (a.col(q)[q] - a.col(p)[p]) / (2.0 * apq);
+            let theta = (on[q] - on[p]) / (2.0 * apq);
             let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
             let c = 1.0 / (t * t + 1.0).sqrt();
             let s = t * c;
-            let mut r = DMat3::IDENTITY;
-            r.col_mut(p)[p] = c;
-            r.col_mut(q)[q] = c;
-            r.col_mut(q)[p] = s;
-            r.col_mut(p)[q] = -s;
-            a = r.transpose() * a * r;
-            v *= r;
+            (on[p], on[q], off[r]) = (on[p] - t * apq, on[q] + t * apq, 0.0);
+            (off[q], off[p]) = (c * off[q] - s * off[p], s * off[q] + c * off[p]);
+            (v[p], v[q]) = (v[p] * c - v[q] * s, v[p] * s + v[q] * c);
         }
     }
     let mut order = [0, 1, 2];
-    let value = |k: usize| a.col(k)[k];
-    order.sort_by(|&i, &j| value(j).total_cmp(&value(i)).then(i.cmp(&j)));
-    (order.map(value), order.map(|k| v.col(k)))
+    order.sort_by(|&i, &j| on[j].total_cmp(&on[i]).then(i.cmp(&j)));
+    (order.map(|k| on[k]), order.map(|k| v[k]))
 }
 
 #[cfg(test)]

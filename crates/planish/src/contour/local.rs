@@ -513,9 +513,10 @@ impl<'a> Local<'a> {
                 if names == GONE {
                     return 0;
                 }
-                let n = self.mesh.normal(t as usize);
+                let n = self.mesh.area_vector(t as usize);
                 let best = names.iter().filter_map(|&v| self.normal(v)).map(|m| m.dot(n)).fold(f64::NAN, f64::max);
-                (best <= LEAN) as usize + (best <= 0.0) as usize
+                let against = best <= 0.0;
+                (against || best * best <= LEAN * LEAN * n.length_squared()) as usize + against as usize
             })
             .sum()
     }

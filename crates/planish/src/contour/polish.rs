@@ -65,7 +65,11 @@ pub fn polish(
     if !untaken.is_empty() {
         // Any vertex near by may be needed there.
         let tree = KdTree::new(&untaken);
-        let near = |p: &DVec3| tree.closest(*p).is_some_and(|c| untaken[c as usize].distance(*p) < size);
+        let mut found = Vec::new();
+        let mut near = |p: &DVec3| {
+            tree.nearest_within(*p, 1, size, &mut found);
+            !found.is_empty()
+        };
         seeds.extend((0..mesh.points.len()).filter(|&v| near(&mesh.points[v])).map(|v| v as u32));
     }
     let mut lines = Lines::new(edges);

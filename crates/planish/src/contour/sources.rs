@@ -26,6 +26,16 @@ pub enum MeshingError {
     /// The surface cannot be extracted.
     #[error("{0}")]
     Contour(#[from] ContourError),
+    /// All numbers of a volume are on one side of its level.
+    #[error("the samples run from {low} to {high}: the level {level} has no surface; choose a level between them")]
+    Level {
+        /// The level.
+        level: f64,
+        /// The least number.
+        low: f32,
+        /// The greatest number.
+        high: f32,
+    },
 }
 
 impl From<LatticeError> for MeshingError {
@@ -141,7 +151,15 @@ pub fn from_grid(
     let own = Lattice { origin: grid.origin, step: grid.spacing, cells };
     own.check_memory(None, memory)?;
     let directed = sample_grid(grid, grid_params, &Half { observer, from: 0.0 })?;
-    let extracted = extract(&directed, None, params, &Half { observer, from: 0.5 })?;
+    let extracted = extract(&directed, None, params, &Half { observer, from: 0.5 }).map_err(|e| {
+        let known = || grid.values.iter().copied().filter(|v| v.is_finite());
+        let (low, high) = (known().fold(f32::INFINITY, f32::min), known().fold(f32::NEG_INFINITY, f32::max));
+        let level = grid_params.iso;
+        match e {
+            ContourError::Nothing { .. } if low <= high => MeshingError::Level { level, low, high },
+            e => e.into(),
+        }
+    })?;
     Ok(meshed(extracted, &directed))
 }
 

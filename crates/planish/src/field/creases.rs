@@ -8,6 +8,7 @@ use super::{Creases, Lattice};
 use crate::geom::Bvh;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use glam::DVec3;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Sharp edges of one mesh on one lattice.
@@ -61,10 +62,8 @@ impl MeshCreases {
         let adjacency = Adjacency::new(mesh);
         let mut cuts: [Vec<Cut>; 3] = Default::default();
         let mut edges: Vec<[u32; 2]> = Vec::new();
-        let normals = |h: u32| {
-            let g = adjacency.opposite[h as usize];
-            [mesh.normal(h as usize / 3) * turn, mesh.normal(g as usize / 3) * turn]
-        };
+        let of_faces: Vec<DVec3> = (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.normal(t) * turn).collect();
+        let normals = |h: u32| [h, adjacency.opposite[h as usize]].map(|h| of_faces[h as usize / 3]);
         let mut sharp_edges: Vec<u32> = Vec::new();
         let mut faint_edges: Vec<(f64, u32)> = Vec::new();
         for h in 0..adjacency.opposite.len() as u32 {

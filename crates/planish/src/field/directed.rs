@@ -185,8 +185,7 @@ pub fn changes_of(inside: &[u64], known: &[u64], nodes: usize) -> Vec<u32> {
 
 impl Hits {
     /// Hits sorted into rows.
-    pub fn sorted(rows: usize, mut placed: Vec<Placed>) -> Hits {
-        placed.par_sort_unstable_by_key(|p| (p.row, p.at));
+    pub fn sorted(rows: usize, placed: Vec<Placed>) -> Hits {
         let mut start = vec![0u32; rows + 1];
         for p in &placed {
             start[p.row as usize + 1] += 1;
@@ -194,7 +193,25 @@ impl Hits {
         for r in 0..rows {
             start[r + 1] += start[r];
         }
-        Hits { start, at: placed.iter().map(|p| p.at).collect(), hits: placed.iter().map(|p| p.hit).collect() }
+        // A counting sort by row keeps the order that most sources have within a row already.
+        let (mut order, mut next) = (vec![0u32; placed.len()], start.clone());
+        for (n, p) in placed.iter().enumerate() {
+            let at = &mut next[p.row as usize];
+            order[*at as usize] = n as u32;
+            *at += 1;
+        }
+        let at = |n: &u32| placed[*n as usize].at;
+        for ends in start.windows(2) {
+            let row = &mut order[ends[0] as usize..ends[1] as usize];
+            if !row.is_sorted_by_key(at) {
+                row.sort_by_key(at);
+            }
+        }
+        Hits {
+            at: order.iter().map(at).collect(),
+            hits: order.iter().map(|&n| placed[n as usize].hit).collect(),
+            start,
+        }
     }
 
     /// Rows of parts, one part after the other.
@@ -280,42 +297,41 @@ impl Directed {
         missing: &(dyn Fn(usize, usize) -> Missing<'a> + Sync),
     ) -> Directed {
         let words = lattice.words();
-        let bits = |row: usize| {
-            let (mut inside, mut known) = (vec![0; words], vec![0; words]);
-            sides.bits(row, &mut inside, &mut known);
-            (inside, known)
-        };
         let (ny, nz) = (lattice.nodes(1), lattice.nodes(2));
-        // Per plane: rows of the plane and the next, edges that change side, compared with the hits given.
+        // Per plane: edges that change side, from the bits of each row and the next two, compared with the hits given.
         let planes: Vec<[Plane; 3]> = (0..nz)
             .into_par_iter()
             .map(|k| {
-                let here: Vec<_> = (0..ny).map(|j| bits(lattice.row(j, k))).collect();
-                let above: Option<Vec<_>> =
-                    (k + 1 < nz).then(|| (0..ny).map(|j| bits(lattice.row(j, k + 1))).collect());
                 let mut out: [Plane; 3] = Default::default();
+                let mut bits = [(); 3].map(|()| (vec![0; words], vec![0; words]));
+                let mut crossing = vec![0u64; words];
                 for j in 0..ny {
                     let row = lattice.row(j, k);
+                    let next = [Some(row), (j + 1 < ny).then(|| row + 1), (k + 1 < nz).then(|| lattice.row(j, k + 1))];
+                    if next.iter().flatten().all(|&row| sides.start[row] == sides.start[row + 1]) {
+                        // All is outside.
+                        out.iter_mut().for_each(|plane| plane.counts.push(0));
+                        continue;
+                    }
+                    for (&row, (inside, known)) in next.iter().zip(&mut bits) {
+                        if let Some(row) = row {
+                            sides.bits(row, inside, known);
+                        }
+                    }
                     let mut missing = missing(j, k);
-                    let (a, known_a) = &here[j];
-                    let shifted = shift(a);
-                    let known_shifted = shift(known_a);
-                    let mut crossing = vec![0u64; words];
+                    let [(a, known_a), others @ ..] = &bits;
                     for w in 0..words {
-                        crossing[w] = (a[w] ^ shifted[w]) & known_a[w] & known_shifted[w];
+                        let shifted = |words: &[u64]| words[w] >> 1 | words.get(w + 1).map_or(0, |n| n << 63);
+                        crossing[w] = (a[w] ^ shifted(a)) & known_a[w] & shifted(known_a);
                     }
                     mask_past(&mut crossing, lattice.cells[0]);
                     out[0].take(&axes[0], row, &crossing, |i| missing(0, i));
-                    for (axis, other) in
-                        [(1, (j + 1 < ny).then(|| &here[j + 1])), (2, above.as_ref().map(|above| &above[j]))]
-                    {
-                        crossing.fill(0);
-                        if let Some((b, known_b)) = other {
-                            for w in 0..words {
-                                crossing[w] = (a[w] ^ b[w]) & known_a[w] & known_b[w];
-                            }
-                            mask_past(&mut crossing, lattice.nodes(0));
+                    for (axis, (b, known_b)) in (1..).zip(others) {
+                        for w in 0..words {
+                            let both = if next[axis].is_some() { known_a[w] & known_b[w] } else { 0 };
+                            crossing[w] = (a[w] ^ b[w]) & both;
                         }
+                        mask_past(&mut crossing, lattice.nodes(0));
                         out[axis].take(&axes[axis], row, &crossing, |i| missing(axis, i));
                     }
                 }
@@ -374,11 +390,6 @@ impl Plane {
         }
         self.counts.push((self.at.len() - before) as u32);
     }
-}
-
-/// Bits moved down by one: bit i is that of node i + 1.
-pub fn shift(words: &[u64]) -> Vec<u64> {
-    (0..words.len()).map(|w| words[w] >> 1 | words.get(w + 1).map_or(0, |n| n << 63)).collect()
 }
 
 /// Clears bits from `count` on.

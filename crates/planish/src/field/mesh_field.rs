@@ -85,14 +85,8 @@ impl<'a> MeshField<'a> {
     pub fn sample(&self, lattice: &Lattice, observer: &dyn Observer) -> Result<Directed, FieldError> {
         let normals: Vec<DVec3> =
             (0..self.mesh.triangles.len()).into_par_iter().map(|t| self.mesh.normal(t) * self.turn as f64).collect();
-        let mut crossings: [Vec<Crossing>; 3] = Default::default();
-        for axis in 0..3 {
-            if observer.cancelled() {
-                return Err(FieldError::Cancelled);
-            }
-            crossings[axis] = rasterise(self.mesh, lattice, axis);
-            observer.progress((axis + 1) as f64 / 6.0);
-        }
+        let crossings = rasterise(self.mesh, lattice, observer).ok_or(FieldError::Cancelled)?;
+        observer.progress(0.5);
         if observer.cancelled() {
             return Err(FieldError::Cancelled);
         }
@@ -195,6 +189,10 @@ fn thin(crossings: &[Vec<Crossing>; 3]) -> Thin {
 
 /// True if for every pair of positions as many edges run one way as the other.
 fn is_balanced(mesh: &TriMesh) -> bool {
+    // Welding adds up what is balanced by names.
+    if is_balanced_by_names(mesh) {
+        return true;
+    }
     let (welded, _) = crate::mesh::weld(mesh);
     let mut keyed: Vec<(u64, i32)> = welded
         .triangles
@@ -208,6 +206,32 @@ fn is_balanced(mesh: &TriMesh) -> bool {
         .collect();
     keyed.par_sort_unstable();
     keyed.chunk_by(|a, b| a.0 == b.0).all(|run| run.iter().map(|e| e.1).sum::<i32>() == 0)
+}
+
+/// True if for every pair of vertices as many edges run one way as the other.
+fn is_balanced_by_names(mesh: &TriMesh) -> bool {
+    // Edges in buckets by their lower vertex, a handful each.
+    let edges = || {
+        let of = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
+        mesh.triangles.iter().flat_map(of).filter(|(a, b)| a != b)
+    };
+    let mut start = vec![0u32; mesh.points.len() + 1];
+    edges().for_each(|(a, b)| start[a.min(b) as usize + 1] += 1);
+    for v in 0..mesh.points.len() {
+        start[v + 1] += start[v];
+    }
+    let mut next = start.clone();
+    let mut others = vec![(0u32, 0i32); start[mesh.points.len()] as usize];
+    for (a, b) in edges() {
+        let at = &mut next[a.min(b) as usize];
+        others[*at as usize] = (a.max(b), if a < b { 1 } else { -1 });
+        *at += 1;
+    }
+    start.windows(2).all(|ends| {
+        let bucket = &mut others[ends[0] as usize..ends[1] as usize];
+        bucket.sort_unstable();
+        bucket.chunk_by(|a, b| a.0 == b.0).all(|run| run.iter().map(|e| e.1).sum::<i32>() == 0)
+    })
 }
 
 /// Lines of an axis are numbered so that sorting by line keeps rows in order: x lines by (k, j), y lines by (i, k),
@@ -245,18 +269,30 @@ fn starts(crossings: &[Crossing], lines: usize) -> Vec<usize> {
 /// Triangles a task takes at once.
 const CHUNK: usize = 1 << 12;
 
-/// All crossings of one axis, sorted along its lines.
-fn rasterise(mesh: &TriMesh, lattice: &Lattice, axis: usize) -> Vec<Crossing> {
-    let parts: Vec<Vec<Crossing>> = (0..mesh.triangles.len().div_ceil(CHUNK))
+/// All crossings of each axis, sorted along its lines; none if cancelled.
+fn rasterise(mesh: &TriMesh, lattice: &Lattice, observer: &dyn Observer) -> Option<[Vec<Crossing>; 3]> {
+    let parts: Option<Vec<[Vec<Crossing>; 3]>> = (0..mesh.triangles.len().div_ceil(CHUNK))
         .into_par_iter()
         .map(|c| {
-            let mut out = Vec::new();
-            for t in c * CHUNK..((c + 1) * CHUNK).min(mesh.triangles.len()) {
-                rasterise_one(mesh.corners(t), t as u32, lattice, axis, &mut out);
+            if observer.cancelled() {
+                return None;
             }
-            out
+            let mut out: [Vec<Crossing>; 3] = Default::default();
+            for t in c * CHUNK..((c + 1) * CHUNK).min(mesh.triangles.len()) {
+                rasterise_one(mesh.corners(t), t as u32, lattice, &mut out);
+            }
+            Some(out)
         })
         .collect();
+    let mut parts = parts?;
+    Some([0, 1, 2].map(|axis| {
+        let own: Vec<Vec<Crossing>> = parts.iter_mut().map(|part| std::mem::take(&mut part[axis])).collect();
+        sorted(lattice, axis, &own)
+    }))
+}
+
+/// The crossings of one axis in the order of its lines, and along each of them.
+fn sorted(lattice: &Lattice, axis: usize, parts: &[Vec<Crossing>]) -> Vec<Crossing> {
     let lines = (0..3).filter(|&a| a != axis).map(|a| lattice.nodes(a)).product();
     // A counting sort by line, then a handful each.
     let mut start = vec![0u32; lines + 1];
@@ -288,27 +324,55 @@ fn rasterise(mesh: &TriMesh, lattice: &Lattice, axis: usize) -> Vec<Crossing> {
 
 /// Coordinates nearer to a node than this fraction of a cell are compared by exact signs.
 const NEAR_NODE: f64 = 1e-6;
+/// Rounding of the difference of two products of differences, relative to the sum of their sizes (Shewchuk 1997,
+/// `ccwerrboundA`, with room to spare).
+const ROUNDING: f64 = 2.0 * f64::EPSILON;
 
-fn rasterise_one(corners: [DVec3; 3], face: u32, lattice: &Lattice, axis: usize, out: &mut Vec<Crossing>) {
+/// The greatest whole number that is not above `x`.
+#[inline]
+fn floor(x: f64) -> i64 {
+    // Rounds towards zero, and is no call on any processor.
+    let whole = x as i64;
+    whole - (x < whole as f64) as i64
+}
+
+/// The crossings of one triangle with the lines of all axes.
+#[inline]
+fn rasterise_one(corners: [DVec3; 3], face: u32, lattice: &Lattice, out: &mut [Vec<Crossing>; 3]) {
+    let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
+    let nodes = [0, 1, 2].map(|a| {
+        let (o, h) = (lattice.origin[a], lattice.step[a]);
+        // One node more on both sides than rounding could take away.
+        let first = floor((low[a] - o) / h - 0.001) + 1;
+        let last = floor((high[a] - o) / h + 0.001);
+        [first.max(0), last.min(lattice.cells[a] as i64)]
+    });
+    for axis in 0..3 {
+        let (u, v) = (nodes[(axis + 1) % 3], nodes[(axis + 2) % 3]);
+        if u[0] <= u[1] && v[0] <= v[1] {
+            rasterise_along(corners, face, lattice, axis, [u, v].map(|n| n.map(|n| n as usize)), &mut out[axis]);
+        }
+    }
+}
+
+/// The crossings of one triangle with the lines of one axis.
+/// * `u`, `v` - first and last nodes of its box along the next two axes
+#[inline]
+fn rasterise_along(
+    corners: [DVec3; 3],
+    face: u32,
+    lattice: &Lattice,
+    axis: usize,
+    [[u0, u1], [v0, v1]]: [[usize; 2]; 2],
+    out: &mut Vec<Crossing>,
+) {
     let (ua, va) = ((axis + 1) % 3, (axis + 2) % 3);
     let flat = corners.map(|p| DVec2::new(p[ua], p[va]));
     let turn = orient2d(flat[0], flat[1], flat[2]);
     if turn == 0.0 {
         return;
     }
-    let (low, high) = (flat[0].min(flat[1]).min(flat[2]), flat[0].max(flat[1]).max(flat[2]));
-    let range = |a: usize, low: f64, high: f64| {
-        let (o, h) = (lattice.origin[a], lattice.step[a]);
-        // One node more on both sides than rounding could take away.
-        let first = ((low - o) / h - 0.001).ceil().max(0.0) as usize;
-        let last = ((high - o) / h + 0.001).floor();
-        (first, if last < 0.0 { None } else { Some((last as usize).min(lattice.cells[a])) })
-    };
-    let (v0, Some(v1)) = range(va, low.y, high.y) else { return };
-    let (u0, Some(u1)) = range(ua, low.x, high.x) else { return };
-    if u0 > u1 || v0 > v1 {
-        return;
-    }
+    let side = turn.signum();
     let wide = (u1 - u0 + 1) * (v1 - v0 + 1) > 12;
     for v in v0..=v1 {
         let y = lattice.coordinate(va, v);
@@ -340,15 +404,25 @@ fn rasterise_one(corners: [DVec3; 3], face: u32, lattice: &Lattice, axis: usize,
         }
         for u in from..=to {
             let q = DVec2::new(lattice.coordinate(ua, u), y);
-            let weights = [1, 2, 0].map(|k| orient2d(flat[k], flat[(k + 1) % 3], q));
-            // All three on the side of the triangle, or on the edge and shifted to it.
-            let inside = (0..3).all(|k| {
-                let s =
-                    if weights[k] != 0.0 { weights[k] } else { shifted(flat[(k + 1) % 3], flat[(k + 2) % 3], ua, va) };
-                (s > 0.0) == (turn > 0.0) && s != 0.0
-            });
-            if !inside {
+            let d = flat.map(|p| p - q);
+            let products = [1, 2, 0].map(|k| (d[k].x * d[(k + 1) % 3].y, d[k].y * d[(k + 1) % 3].x));
+            let mut weights = products.map(|(l, r)| l - r);
+            let bounds = products.map(|(l, r)| (l.abs() + r.abs()) * ROUNDING);
+            // One branch for all three: most nodes of the box are outside for certain.
+            if (0..3).fold(false, |out, k| out | (weights[k] * side < -bounds[k])) {
                 continue;
+            }
+            if !(0..3).fold(true, |sure, k| sure & (weights[k] * side > bounds[k])) {
+                // All three on the side of the triangle, or on the edge and shifted to it.
+                let inside = (0..3).all(|k| {
+                    let (a, b) = (flat[(k + 1) % 3], flat[(k + 2) % 3]);
+                    weights[k] = orient2d(a, b, q);
+                    let s = if weights[k] != 0.0 { weights[k] } else { shifted(a, b, ua, va) };
+                    (s > 0.0) == (turn > 0.0) && s != 0.0
+                });
+                if !inside {
+                    continue;
+                }
             }
             let sum = weights[0] + weights[1] + weights[2];
             let mix = |w: [f64; 3]| corners[0][axis] * w[0] + corners[1][axis] * w[1] + corners[2][axis] * w[2];
@@ -356,8 +430,8 @@ fn rasterise_one(corners: [DVec3; 3], face: u32, lattice: &Lattice, axis: usize,
             let most = corners.iter().map(|c| c[axis]).fold(f64::NEG_INFINITY, f64::max);
             let x = (mix(weights) / sum).clamp(least, most);
             let along = (x - lattice.origin[axis]) / lattice.step[axis];
-            let mut edge = along.floor() as i32;
-            let nearest = along.round();
+            let mut edge = floor(along) as i32;
+            let nearest = floor(along + 0.5) as f64;
             if (along - nearest).abs() < NEAR_NODE || !along.is_finite() {
                 let node = nearest.clamp(-1.0, lattice.cells[axis] as f64 + 1.0) as i32;
                 let mut at = DVec3::ZERO;

@@ -141,7 +141,7 @@ pub fn decimate(
             let farthest = nearest.iter().map(|n| n.1).fold(0.0, f64::max);
             if farthest > allowed && round < ROUNDS {
                 tighten(&result, &nearest, allowed, &mut tolerances);
-                log.clear();
+                log = done;
                 continue;
             }
             distance = Some(farthest);
@@ -268,6 +268,39 @@ mod tests {
         let (a, b) = (diagnose(&disk), diagnose(&found.mesh));
         assert_eq!(b.boundary_loops, a.boundary_loops);
         assert!((a.area - b.area).abs() < 0.01 * a.area && b.triangles * 3 < a.triangles);
+    }
+
+    #[test]
+    fn two_bowls_that_touch_in_their_tips_stay_joined_there() {
+        let mut points = vec![glam::DVec3::ZERO];
+        let mut triangles = Vec::new();
+        for side in [1.0, -1.0] {
+            let first = points.len() as u32;
+            for row in 1..=8 {
+                for k in 0..32 {
+                    let (r, a) = (0.1 * row as f64, std::f64::consts::TAU * k as f64 / 32.0);
+                    points.push(glam::DVec3::new(r * a.cos(), side * r * a.sin(), side * (r / 2.0 + r * r)));
+                }
+            }
+            for k in 0..32u32 {
+                let at = |row: u32, k: u32| first + 32 * row + k % 32;
+                triangles.push([0, at(0, k), at(0, k + 1)]);
+                for row in 0..7 {
+                    triangles.push([at(row, k), at(row + 1, k), at(row + 1, k + 1)]);
+                    triangles.push([at(row, k), at(row + 1, k + 1), at(row, k + 1)]);
+                }
+            }
+        }
+        let bowls = TriMesh::new(points, triangles);
+        let found = decimate(&bowls, None, &to(DecimateTarget::Ratio(0.1)), &Silent).unwrap();
+        assert_eq!(found.mesh.triangles.len() * 10, bowls.triangles.len());
+        let tip = found.mesh.points.iter().position(|p| *p == glam::DVec3::ZERO).unwrap() as u32;
+        let around = |side: f64| {
+            let beyond = |t: &[u32; 3]| t.iter().all(|&v| found.mesh.points[v as usize].z * side >= 0.0);
+            let there = |t: &&[u32; 3]| t.contains(&tip) && beyond(t);
+            found.mesh.triangles.iter().filter(there).count()
+        };
+        assert!(around(1.0) > 2 && around(-1.0) > 2, "{} and {} triangles", around(1.0), around(-1.0));
     }
 
     #[test]

@@ -80,6 +80,7 @@ pub fn diagnose(mesh: &TriMesh) -> Diagnosis {
         }
     }
     let mate = mates(&keyed, 3 * triangles.len());
+    drop(keyed);
     let orientation = orient(&triangles, &mate);
     let fan = fans(&triangles, &mate);
 

@@ -105,22 +105,26 @@ impl TriMesh {
     }
 
     /// The three corner positions of triangle `t`.
+    #[inline]
     pub fn corners(&self, t: usize) -> [DVec3; 3] {
         self.triangles[t].map(|v| self.points[v as usize])
     }
 
     /// Twice the area vector of triangle `t`: its length is twice the area, its direction the normal.
+    #[inline]
     pub fn area_vector(&self, t: usize) -> DVec3 {
         let [a, b, c] = self.corners(t);
         (b - a).cross(c - a)
     }
 
     /// Unit normal of triangle `t`; zero for a degenerate one.
+    #[inline]
     pub fn normal(&self, t: usize) -> DVec3 {
         self.area_vector(t).normalize_or_zero()
     }
 
     /// Area of triangle `t`.
+    #[inline]
     pub fn area(&self, t: usize) -> f64 {
         self.area_vector(t).length() / 2.0
     }

@@ -21,18 +21,16 @@ pub fn check(mesh: &TriMesh) -> Result<(), MeshError> {
 
 /// All half-edges of triangles with three different vertices, sorted by undirected edge: `(edge, half-edge)`.
 pub(super) fn keyed_edges(triangles: &[[u32; 3]]) -> Vec<(u64, u32)> {
-    let mut keyed: Vec<(u64, u32)> = triangles
-        .par_iter()
-        .enumerate()
-        .filter(|(_, t)| !repeats(t))
-        .flat_map_iter(|(t, tri)| {
-            (0..3).map(move |k| {
-                let (a, b) = (tri[k], tri[(k + 1) % 3]);
-                (((a.min(b) as u64) << 32) | a.max(b) as u64, (3 * t + k) as u32)
-            })
-        })
-        .collect();
+    // What is no edge is sorted to the end. One array from the start: half-edges are many in large meshes.
+    let key = |h: usize| {
+        let (t, k) = (&triangles[h / 3], h % 3);
+        let (a, b) = (t[k], t[(k + 1) % 3]);
+        let edge = ((a.min(b) as u64) << 32) | a.max(b) as u64;
+        (if repeats(t) { u64::MAX } else { edge }, h as u32)
+    };
+    let mut keyed: Vec<(u64, u32)> = (0..3 * triangles.len()).into_par_iter().map(key).collect();
     keyed.par_sort_unstable();
+    keyed.truncate(keyed.partition_point(|k| k.0 != u64::MAX));
     keyed
 }
 

@@ -27,13 +27,17 @@ impl Quadric {
         }
     }
 
-    fn plus(mut self, o: &Quadric) -> Quadric {
+    fn add(&mut self, o: &Quadric) {
         for k in 0..6 {
             self.a[k] += o.a[k];
         }
         self.b += o.b;
         self.c += o.c;
         self.weight += o.weight;
+    }
+
+    fn plus(mut self, o: &Quadric) -> Quadric {
+        self.add(o);
         self
     }
 
@@ -92,8 +96,10 @@ pub struct Collapse<'a> {
     kind: Vec<Kind>,
     /// For each vertex the planes of what is around it now.
     quadrics: Vec<Quadric>,
-    /// For each vertex the collapse that made it what it is, counted from one.
+    /// For each half-edge the last collapse that moved an end of it, counted from one; [`NONE`] where it is gone.
     stamp: Vec<u32>,
+    /// For each vertex whether it ever moved.
+    moved: Vec<bool>,
     changes: u32,
     tolerances: Vec<f64>,
     queue: Queue,
@@ -140,8 +146,10 @@ impl<'a> Collapse<'a> {
         let half_edges = adjacency.opposite.len();
         let mut feature = vec![false; half_edges];
         let mut lines = vec![0u32; points.len()];
+        let mut around = vec![0u32; points.len()];
         for h in 0..half_edges as u32 {
             let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
+            around[a as usize] += 1;
             let open = adjacency.opposite[h as usize] == NONE;
             if open || tags.edges.binary_search(&[a.min(b), a.max(b)]).is_ok() {
                 feature[h as usize] = true;
@@ -154,6 +162,8 @@ impl<'a> Collapse<'a> {
         let kind = (0..points.len())
             .map(|v| match (lines[v], tags.vertices[v]) {
                 _ if locked[v] => Kind::Fixed,
+                // Two fans that touch in a vertex would come apart.
+                _ if adjacency.fan(v as u32).count() as u32 != around[v] => Kind::Fixed,
                 (_, FeatureKind::Corner) => Kind::Fixed,
                 (0, FeatureKind::None) => Kind::Free,
                 (2, _) => Kind::Line,
@@ -172,7 +182,8 @@ impl<'a> Collapse<'a> {
             feature,
             kind,
             quadrics: vec![Quadric::default(); points.len()],
-            stamp: vec![0; points.len()],
+            stamp: vec![0; half_edges],
+            moved: vec![false; points.len()],
             changes: 0,
             tolerances,
             queue: Queue::new(0.0),
@@ -181,13 +192,14 @@ impl<'a> Collapse<'a> {
             spokes: Vec::new(),
             points,
         };
-        (0..collapse.points.len() as u32).for_each(|v| collapse.quadrics[v as usize] = collapse.quadric(v));
+        (0..collapse.triangles.len() as u32).for_each(|t| collapse.account(t, 1.0));
         collapse.replay(before);
         collapse.queue();
         Ok(collapse)
     }
 
-    /// Does what an earlier round did, but for vertices that are fixed now and what would have come of them.
+    /// Does what an earlier round did, but for vertices that are fixed now, what goes too far for tolerances that were
+    /// tightened since, and what would have come of them.
     fn replay(&mut self, before: &[Step]) {
         let mut other = vec![false; self.points.len()];
         for step in before {
@@ -199,7 +211,7 @@ impl<'a> Collapse<'a> {
             let changed = other[a as usize] || other[b as usize];
             let fixed = self.kind[a as usize] == Kind::Fixed && self.points[a as usize] != step.p
                 || self.kind[b as usize] == Kind::Fixed && self.points[b as usize] != step.p;
-            if changed || fixed || !self.allowed(h, step.p) {
+            if changed || fixed || !self.is_within(a, b, self.sum(a, b).at(step.p)) || !self.allowed(h, step.p) {
                 (other[a as usize], other[b as usize]) = (true, true);
             } else {
                 self.collapse(h, step.p);
@@ -208,26 +220,27 @@ impl<'a> Collapse<'a> {
         }
     }
 
-    /// The planes of all triangles around `v`, and those upright on them that hold its lines.
-    fn quadric(&self, v: u32) -> Quadric {
-        let mut sum = Quadric::default();
-        for h in self.fan(v) {
-            let [a, b, c] = [h, next(h), previous(h)].map(|h| self.points[self.from(h) as usize]);
-            let n = (b - a).cross(c - a);
-            let area = n.length();
-            if area == 0.0 {
-                continue;
-            }
-            sum = sum.plus(&Quadric::plane(n / area, a, area / 6.0));
-            for (line, end) in [(h, b), (previous(h), c)] {
-                if self.feature[line as usize] {
-                    let upright = n.cross(end - a).normalize_or_zero();
-                    let plane = Quadric::plane(upright, a, LINE * (end - a).length_squared() / 6.0);
-                    sum = sum.plus(&Quadric { weight: 0.0, ..plane });
-                }
-            }
+    /// Adds what triangle `t` holds in place to its corners, or takes it away: its plane, and planes upright on it
+    /// through its lines.
+    /// * `share` - 1 or -1
+    fn account(&mut self, t: u32, share: f64) {
+        let corners = self.triangles[t as usize];
+        let p = corners.map(|v| self.points[v as usize]);
+        let n = (p[1] - p[0]).cross(p[2] - p[0]);
+        let area = n.length();
+        if area == 0.0 {
+            return;
         }
-        sum
+        let plane = Quadric::plane(n / area, p[0], share * area / 6.0);
+        corners.iter().for_each(|&v| self.quadrics[v as usize].add(&plane));
+        for k in (0..3).filter(|&k| self.feature[3 * t as usize + k]) {
+            let end = (k + 1) % 3;
+            let d = p[end] - p[k];
+            let upright = n.cross(d).normalize_or_zero();
+            let plane = Quadric::plane(upright, p[k], share * LINE * d.length_squared() / 6.0);
+            let plane = Quadric { weight: 0.0, ..plane };
+            [k, end].into_iter().for_each(|k| self.quadrics[corners[k] as usize].add(&plane));
+        }
     }
 
     /// Puts all edges into the queue.
@@ -259,25 +272,17 @@ impl<'a> Collapse<'a> {
                 self.queue();
                 continue;
             };
-            if !self.alive[h as usize / 3] {
+            if self.stamp[h as usize] != stamp {
                 continue;
             }
             let (a, b) = self.ends(h);
-            if self.stamp[a as usize].max(self.stamp[b as usize]) != stamp {
-                continue;
-            }
             let Some((p, cost)) = self.place(h) else { continue };
             // The ends are as they were, but what lies around them is not.
             if self.queue.passed(cost) {
                 self.queue_edge(h);
                 continue;
             }
-            let weight = self.quadrics[a as usize].weight + self.quadrics[b as usize].weight;
-            let tolerance = self.tolerances[a as usize].min(self.tolerances[b as usize]);
-            if cost > tolerance * tolerance * weight {
-                continue;
-            }
-            if self.allowed(h, p) {
+            if self.is_within(a, b, cost) && self.allowed(h, p) {
                 self.collapse(h, p);
                 self.log.push(Step { half_edge: h, p });
                 self.queue_around(b);
@@ -316,10 +321,10 @@ impl<'a> Collapse<'a> {
             .iter()
             .map(|&v| {
                 // Vertices that never moved keep their bits.
-                if self.stamp[v as usize] == 0 {
-                    self.mesh.points[v as usize]
-                } else {
+                if self.moved[v as usize] {
                     self.points[v as usize] + self.center
+                } else {
+                    self.mesh.points[v as usize]
                 }
             })
             .collect();
@@ -359,8 +364,7 @@ impl<'a> Collapse<'a> {
     /// The entry of an edge in the queue.
     fn entry(&self, h: u32) -> Option<(f64, Entry)> {
         let (_, cost) = self.place(h)?;
-        let (a, b) = self.ends(h);
-        Some((cost, Entry { half_edge: h, stamp: self.stamp[a as usize].max(self.stamp[b as usize]) }))
+        Some((cost, Entry { half_edge: h, stamp: self.stamp[h as usize] }))
     }
 
     /// Where the two ends of an edge would meet, and the error there; `None` if they must not.
@@ -368,7 +372,7 @@ impl<'a> Collapse<'a> {
         let (a, b) = self.ends(h);
         let (ka, kb) = (self.kind[a as usize], self.kind[b as usize]);
         let (pa, pb) = (self.points[a as usize], self.points[b as usize]);
-        let q = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
+        let q = self.sum(a, b);
         let line = self.feature[h as usize];
         let p = match (ka, kb) {
             (Kind::Fixed, Kind::Fixed) => return None,
@@ -393,6 +397,19 @@ impl<'a> Collapse<'a> {
             }
         };
         Some((p, q.at(p)))
+    }
+
+    /// What is around both of two vertices.
+    fn sum(&self, a: u32, b: u32) -> Quadric {
+        self.quadrics[a as usize].plus(&self.quadrics[b as usize])
+    }
+
+    /// True if two vertices tolerate the error of their merging.
+    fn is_within(&self, a: u32, b: u32, cost: f64) -> bool {
+        let tolerance = self.tolerances[a as usize].min(self.tolerances[b as usize]);
+        let weight = self.quadrics[a as usize].weight + self.quadrics[b as usize].weight;
+        // Without a tolerance and without area there is no number to compare with.
+        !(cost > tolerance * tolerance * weight)
     }
 
     /// Half-edges that leave `v`.
@@ -505,13 +522,16 @@ impl<'a> Collapse<'a> {
         if self.kind[a as usize] == Kind::Fixed || self.kind[b as usize] == Kind::Free {
             self.kind[b as usize] = self.kind[a as usize];
         }
-        self.points[b as usize] = p;
-        self.tolerances[b as usize] = self.tolerances[a as usize].min(self.tolerances[b as usize]);
         let g = self.opposite[h as usize];
         let mut spokes = std::mem::take(&mut self.spokes);
         spokes.clear();
+        spokes.extend(self.fan(b).filter(|f| ![h, g].iter().any(|side| *side != NONE && side / 3 == f / 3)));
+        let own = spokes.len();
         spokes.extend(self.fan(a));
-        for &f in &spokes {
+        spokes.iter().for_each(|&f| self.account(f / 3, -1.0));
+        self.points[b as usize] = p;
+        self.tolerances[b as usize] = self.tolerances[a as usize].min(self.tolerances[b as usize]);
+        for &f in &spokes[own..] {
             self.triangles[f as usize / 3][f as usize % 3] = b;
         }
         let mut rest = NONE;
@@ -532,6 +552,7 @@ impl<'a> Collapse<'a> {
                 self.feature[oy as usize] = feature || ox == NONE;
             }
             self.alive[side as usize / 3] = false;
+            [side, x, y].iter().for_each(|&h| self.stamp[h as usize] = NONE);
             self.count -= 1;
             // A half-edge of a living triangle that leaves the apex, and one that leaves b.
             let (leaves_apex, leaves_b) = if ox != NONE { (ox, next(ox)) } else { (next(oy), oy) };
@@ -541,14 +562,19 @@ impl<'a> Collapse<'a> {
         }
         self.outgoing[b as usize] = self.settled(rest);
         self.changes += 1;
-        self.stamp[b as usize] = self.changes;
+        self.moved[b as usize] = true;
         self.outgoing[a as usize] = NONE;
+        spokes.clear();
+        spokes.extend(self.fan(b));
+        for &f in &spokes {
+            self.account(f / 3, 1.0);
+            let g = self.opposite[f as usize];
+            self.stamp[f as usize] = self.changes;
+            self.stamp[if g == NONE { f } else { g } as usize] = self.changes;
+            // The other edge at `b`, which has no other triangle at the rim.
+            self.stamp[previous(f) as usize] = self.changes;
+        }
         self.spokes = spokes;
-        let mut ring = std::mem::take(&mut self.rings[0]);
-        self.neighbours(b, &mut ring);
-        ring.push(b);
-        ring.iter().for_each(|&v| self.quadrics[v as usize] = self.quadric(v));
-        self.rings[0] = ring;
     }
 
     /// Puts all edges at `v` into the queue.

@@ -8,8 +8,6 @@ const MANTISSA: u32 = 6;
 /// Octaves below the greatest cost that are told apart: lower costs are all alike.
 const OCTAVES: usize = 96;
 const BUCKETS: usize = OCTAVES << MANTISSA;
-/// End of a list.
-const NONE: u32 = u32::MAX;
 
 /// An edge with the state of its ends when it was put in.
 #[derive(Clone, Copy)]
@@ -20,11 +18,7 @@ pub struct Entry {
 
 /// Edges by cost.
 pub struct Queue {
-    /// First entry of each bucket.
-    first: Vec<u32>,
-    entries: Vec<(Entry, u32)>,
-    /// Entries that are used again.
-    free: u32,
+    buckets: Vec<Vec<Entry>>,
     /// No bucket before this has an entry.
     least: usize,
     /// Bits of the lowest cost that is told apart.
@@ -36,22 +30,13 @@ impl Queue {
     pub fn new(greatest: f64) -> Queue {
         let top = greatest.max(f64::MIN_POSITIVE).to_bits() >> (52 - MANTISSA);
         let floor = top.saturating_sub(BUCKETS as u64 - 1);
-        Queue { first: vec![NONE; BUCKETS], entries: Vec::new(), free: NONE, least: BUCKETS, floor }
+        Queue { buckets: vec![Vec::new(); BUCKETS], least: BUCKETS, floor }
     }
 
     /// Puts an edge in; costs are not negative.
     pub fn push(&mut self, cost: f64, entry: Entry) {
         let bucket = self.bucket(cost);
-        let new = (entry, self.first[bucket]);
-        self.first[bucket] = if self.free == NONE {
-            self.entries.push(new);
-            self.entries.len() as u32 - 1
-        } else {
-            let at = self.free;
-            self.free = self.entries[at as usize].1;
-            self.entries[at as usize] = new;
-            at
-        };
+        self.buckets[bucket].push(entry);
         self.least = self.least.min(bucket);
     }
 
@@ -68,15 +53,12 @@ impl Queue {
 
     /// Takes out an edge of the lowest bucket.
     pub fn pop(&mut self) -> Option<Entry> {
-        while *self.first.get(self.least)? == NONE {
+        loop {
+            if let Some(entry) = self.buckets.get_mut(self.least)?.pop() {
+                return Some(entry);
+            }
             self.least += 1;
         }
-        let at = self.first[self.least];
-        let (entry, next) = self.entries[at as usize];
-        self.first[self.least] = next;
-        self.entries[at as usize].1 = self.free;
-        self.free = at;
-        Some(entry)
     }
 }
 
