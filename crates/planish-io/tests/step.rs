@@ -41,11 +41,15 @@ fn ball_of_6_patches_is_one_solid_with_12_shared_edges_and_8_vertices() {
         ("ORIENTED_EDGE", 24),
         ("VERTEX_POINT", 8),
         ("OPEN_SHELL", 0),
+        ("SURFACE_CURVE", 12),
+        ("PCURVE", 24),
+        ("LINE", 8),
     ] {
         assert_eq!(count(&text, entity), wanted, "{entity}");
     }
-    // 8 corners, 12 edges of 5 and 6 faces of 25 inner points, and the origin: shared points stand once.
-    assert_eq!(count(&text, "CARTESIAN_POINT"), 8 + 60 + 150 + 1);
+    // 8 corners, 12 edges of 5 and 6 faces of 25 inner points, and the origin: shared points stand once. The sides of the
+    // square of parameters begin in 8 more.
+    assert_eq!(count(&text, "CARTESIAN_POINT"), 8 + 60 + 150 + 1 + 8);
     assert!(text.contains("'it''s \\X2\\00E4\\X0\\ test'") && text.is_ascii());
     assert!(text.contains("(4,1,1,1,4),(4,1,1,1,4),(0.,0.25,0.5,0.75,1.)"));
 }

@@ -14,7 +14,7 @@ use crate::{Place, WriteError, atomic};
 use entities::{Entities, list, real, text};
 use planish::Units;
 use planish::geom::Aabb;
-use planish::network::Network;
+use planish::network::{Network, Patch};
 use planish::surface::Surface;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -87,6 +87,9 @@ fn document(input: &StepInput, topology: &Topology) -> Result<(String, StepSumma
             })
         })
         .collect();
+    let surfaces: Vec<usize> = input.surfaces.iter().map(|s| surface(&mut e, s)).collect();
+    let lines = side_lines(&mut e);
+    let uses = input.network.uses();
     let mut edges = vec![None; topology.curves.len()];
     for (c, curve) in topology.curves.iter().enumerate() {
         let Some(curve) = curve.as_ref().filter(|curve| !curve.collapsed) else { continue };
@@ -101,9 +104,20 @@ fn document(input: &StepInput, topology: &Topology) -> Result<(String, StepSumma
         let spline = e.add(format!(
             "B_SPLINE_CURVE_WITH_KNOTS('',3,{points},.UNSPECIFIED.,{closed},.F.,{times},{knots},.UNSPECIFIED.)"
         ));
-        edges[c] = Some(e.add(format!("EDGE_CURVE('',#{start},#{end},#{spline},.T.)")));
+        let on_surfaces: Vec<usize> = uses[c]
+            .iter()
+            .map(|&(patch, k)| {
+                let side = input.network.patches[patch as usize].sides[k as usize];
+                let line = lines[k as usize][usize::from(side.reversed)];
+                e.add(format!("PCURVE('',#{},#{line})", surfaces[patch as usize]))
+            })
+            .collect();
+        let kind = if uses[c].len() == 2 && uses[c][0].0 == uses[c][1].0 { "SEAM_CURVE" } else { "SURFACE_CURVE" };
+        let curve = e.add(format!("{kind}('',#{spline},{},.CURVE_3D.)", list(&on_surfaces)));
+        edges[c] = Some(e.add(format!("EDGE_CURVE('',#{start},#{end},#{curve},.T.)")));
     }
-    let faces: Vec<usize> = (0..input.surfaces.len()).map(|p| face(&mut e, input, p, &edges)).collect();
+    let faces: Vec<usize> =
+        (0..surfaces.len()).map(|p| face(&mut e, &input.network.patches[p], surfaces[p], &edges)).collect();
     let mut solids = Vec::new();
     let mut shells = Vec::new();
     for Component { patches, closed } in &topology.components {
@@ -186,9 +200,7 @@ fn placement(e: &mut Entities) -> usize {
     e.add(format!("AXIS2_PLACEMENT_3D('',#{origin},#{z},#{x})"))
 }
 
-/// One patch as a face: its sides run counter-clockwise seen from where its normal points.
-fn face(e: &mut Entities, input: &StepInput, patch: usize, edges: &[Option<usize>]) -> usize {
-    let surface = &input.surfaces[patch];
+fn surface(e: &mut Entities, surface: &Surface) -> usize {
     let columns: Vec<String> = (0..surface.cols)
         .map(|i| {
             let column: Vec<_> = (0..surface.rows).map(|j| surface.control[j * surface.cols + i]).collect();
@@ -198,15 +210,39 @@ fn face(e: &mut Entities, input: &StepInput, patch: usize, edges: &[Option<usize
     let ((knots_u, times_u), (knots_v, times_v)) = (multiplicities(&surface.knots_u), multiplicities(&surface.knots_v));
     let (closed_u, closed_v) = topology::closed(surface);
     let flag = |closed: bool| if closed { ".T." } else { ".F." };
-    let spline = e.add(format!(
+    e.add(format!(
         "B_SPLINE_SURFACE_WITH_KNOTS('',3,3,({}),.UNSPECIFIED.,{},{},.F.,{times_u},{times_v},{knots_u},{knots_v},\
          .UNSPECIFIED.)",
         columns.join(","),
         flag(closed_u),
         flag(closed_v),
-    ));
+    ))
+}
+
+/// The sides of the square of parameters, each along the patch's way around and against it: readers that project the curves
+/// of edges instead go astray where a surface folds or comes near itself.
+fn side_lines(e: &mut Entities) -> [[usize; 2]; 4] {
+    const CORNERS: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let context = e.add(
+        "(GEOMETRIC_REPRESENTATION_CONTEXT(2)PARAMETRIC_REPRESENTATION_CONTEXT()REPRESENTATION_CONTEXT('',''))".into(),
+    );
+    std::array::from_fn(|k| {
+        let ends = [CORNERS[k], CORNERS[(k + 1) % 4]];
+        [ends, [ends[1], ends[0]]].map(|[from, to]| {
+            let pair = |x: [f64; 2]| format!("({},{})", real(x[0]), real(x[1]));
+            let point = e.add(format!("CARTESIAN_POINT('',{})", pair(from)));
+            let direction = e.add(format!("DIRECTION('',{})", pair([to[0] - from[0], to[1] - from[1]])));
+            let vector = e.add(format!("VECTOR('',#{direction},1.)"));
+            let line = e.add(format!("LINE('',#{point},#{vector})"));
+            e.add(format!("DEFINITIONAL_REPRESENTATION('',(#{line}),#{context})"))
+        })
+    })
+}
+
+/// One patch as a face: its sides run counter-clockwise seen from where its normal points.
+fn face(e: &mut Entities, patch: &Patch, surface: usize, edges: &[Option<usize>]) -> usize {
     let mut sides = Vec::new();
-    for side in &input.network.patches[patch].sides {
+    for side in &patch.sides {
         // A collapsed side is a point, which its neighbours already end at.
         if let Some(edge) = edges[side.curve as usize] {
             let direction = if side.reversed { ".F." } else { ".T." };
@@ -215,7 +251,7 @@ fn face(e: &mut Entities, input: &StepInput, patch: usize, edges: &[Option<usize
     }
     let ring = e.add(format!("EDGE_LOOP('',{})", list(&sides)));
     let bound = e.add(format!("FACE_OUTER_BOUND('',#{ring},.T.)"));
-    e.add(format!("ADVANCED_FACE('',(#{bound}),#{spline},.T.)"))
+    e.add(format!("ADVANCED_FACE('',(#{bound}),#{surface},.T.)"))
 }
 
 /// Distinct knots and how often each stands, as STEP lists.
