@@ -4,9 +4,10 @@
 //! these functions keeps edges sharp, and where one site errs its neighbours outvote it. A plate ends where its points do
 //! (`rim`), and a cell that faces the wrong way beside cells of several sheets is left hardly a say.
 
-use super::fit::{Weighted, sheet};
+use super::fit::sheet;
 use super::front::{PRICE, VARIATION_PRICE};
 use super::nest::{self, LIMIT, Seen, cost, nest};
+use super::points::Points;
 use super::rim::rim;
 use super::sites::{Sites, in_pieces};
 use super::{Blend, Quadric, Sample};
@@ -35,6 +36,8 @@ const AWAY: f64 = 0.25;
 const BIAS: f64 = 0.5;
 /// Points of a cell at most: these many tell the sheets apart.
 const ENOUGH: usize = 200;
+/// And at most of the widest ball that sheets are fitted again to: they leave less than a tenth of the noise to chance.
+const PLENTY: usize = 1500;
 /// Candidates at most.
 const ASKED: usize = 16;
 /// A cell with one sheet is taken as it is if its points cost at most this much each, in squared noise levels, and what
@@ -251,9 +254,14 @@ fn find(
     let mut ball = Vec::new();
     tree.within(center, HEARD * support, |_, q, _| ball.push(q));
     let step = ball.len().div_ceil(ENOUGH).max(1);
-    let ball: Vec<DVec3> = ball.into_iter().step_by(step).collect();
+    let ball: Points = ball.into_iter().step_by(step).collect();
     let count = ball.len().max(1) as f64;
-    let residuals = |q: &Quadric| -> Vec<f64> { ball.iter().map(|&x| q.distance(x).0 / noise).collect() };
+    let residuals = |q: &Quadric| -> Vec<f64> {
+        let mut residuals = Vec::new();
+        ball.distances(q, &mut residuals);
+        residuals.iter_mut().for_each(|r| *r /= noise);
+        residuals
+    };
     // Candidates, those of the site first, then by distance.
     let mut near: Vec<(f64, u32)> = Vec::new();
     around.within(center, ASIDE * support, |i, _, d2| {
@@ -322,11 +330,11 @@ fn find(
     let rounds = if sheets.len() > 1 && !known { REFINED } else { 0 };
     let mut worth = spread(&sheets, concave).1;
     let mut widths = WIDTHS.to_vec();
+    let wide = if rounds > 0 { widest(place, tree) } else { Points::default() };
     for _ in 0..rounds {
-        let widest = widths.iter().copied().fold(0.0, f64::max) * HEARD * support;
-        let owned = owned(&sheets, concave, place, widest, tree);
+        let owned = owned(&sheets, concave, noise, &wide);
         let tried = widths.iter().map(|width| {
-            let better = refined(&sheets, place, width * HEARD * support, &owned);
+            let better = refined(&sheets, place, width * HEARD * support, &wide, &owned);
             let (cost, worth) = spread(&better, concave);
             (better, cost, worth, *width)
         });
@@ -373,22 +381,31 @@ fn joined(sheets: &[(Quadric, DVec3, f64)], concave: u8, p: DVec3) -> (usize, f6
     nest::joined(sheets.iter().map(|s| s.0.distance(p).0), concave)
 }
 
-/// The points of a ball that lie on the nesting, with the sheet that decides at each.
-fn owned(
-    sheets: &[(Quadric, DVec3, f64)],
-    concave: u8,
-    place: &Place,
-    radius: f64,
-    tree: &KdTree,
-) -> Vec<(DVec3, usize)> {
+/// The points of the widest ball around a place, from its centre on.
+fn widest(place: &Place, tree: &KdTree) -> Points {
+    let radius = WIDTHS.into_iter().fold(0.0, f64::max) * HEARD * place.support;
     let mut points = Vec::new();
-    tree.within(place.center, radius, |_, q, _| {
-        let (k, d) = joined(sheets, concave, q);
-        if d.abs() < LIMIT * place.noise {
-            points.push((q - place.center, k));
+    tree.within(place.center, radius, |_, q, _| points.push(q));
+    let step = points.len().div_ceil(PLENTY).max(1);
+    points.into_iter().step_by(step).collect()
+}
+
+/// For each point the sheet that decides there, `u8::MAX` if the point does not lie on the nesting.
+fn owned(sheets: &[(Quadric, DVec3, f64)], concave: u8, noise: f64, points: &Points) -> Vec<u8> {
+    let (mut value, mut next) = (Vec::new(), Vec::new());
+    points.distances(&sheets[0].0, &mut value);
+    let mut owner = vec![0; value.len()];
+    for (k, sheet) in sheets.iter().enumerate().skip(1) {
+        points.distances(&sheet.0, &mut next);
+        let least = concave >> k & 1 == 1;
+        for ((v, o), &n) in value.iter_mut().zip(&mut owner).zip(&next) {
+            if (n < *v) == least {
+                (*v, *o) = (n, k as u8);
+            }
         }
-    });
-    points
+    }
+    owner.iter_mut().zip(&value).filter(|(_, v)| v.abs() >= LIMIT * noise).for_each(|(o, _)| *o = u8::MAX);
+    owner
 }
 
 /// Every sheet fitted again to those of its points that lie in a ball.
@@ -396,23 +413,31 @@ fn refined(
     sheets: &[(Quadric, DVec3, f64)],
     place: &Place,
     radius: f64,
-    owned: &[(DVec3, usize)],
+    points: &Points,
+    owner: &[u8],
 ) -> Vec<(Quadric, DVec3, f64)> {
-    let mut points: Vec<Vec<Weighted>> = vec![Vec::new(); sheets.len()];
-    for &(q, k) in owned.iter().filter(|o| o.0.length_squared() <= radius * radius) {
-        points[k].push(Weighted { y: q / radius, weight: 1.0 });
+    let inverse = 1.0 / radius;
+    let mut parts: Vec<Points> =
+        (0..sheets.len()).map(|k| Points::with_capacity(owner.iter().filter(|&&o| o as usize == k).count())).collect();
+    for (q, &k) in points.iter().zip(owner).filter(|o| *o.1 != u8::MAX) {
+        let y = (q - place.center) * inverse;
+        if y.length_squared() <= 1.0 {
+            parts[k as usize].push(y);
+        }
     }
     sheets
         .iter()
-        .zip(&points)
+        .zip(&parts)
         .map(|(old, own)| {
             if own.len() < FEWEST_OWN {
                 return *old;
             }
-            let Some(found) = sheet(place.center, radius, own, Some(&old.0), place.noise / radius, Some(1)) else {
+            let ones = vec![1.0; own.len()];
+            let noise = place.noise / radius;
+            let Some(found) = sheet(place.center, radius, own, &ones, Some(&old.0), noise, Some(1)) else {
                 return *old;
             };
-            let middle = place.center + radius * own.iter().map(|w| w.y).sum::<DVec3>() / own.len() as f64;
+            let middle = place.center + radius * own.iter().sum::<DVec3>() / own.len() as f64;
             let foot = found.quadric.project(middle).0;
             let fresh = found.quadric.normalized_at(foot);
             let fresh = if fresh.distance(foot).1.dot(old.0.distance(foot).1) > 0.0 { fresh } else { fresh.flipped() };

@@ -15,6 +15,7 @@
 use super::Quadric;
 use super::dense;
 use super::moments::Moments;
+use super::points::{Points, weighted_squares};
 use glam::DVec3;
 
 /// Points closer to zero than this many noise levels keep their weight (Tukey's biweight, 95 % efficiency).
@@ -194,13 +195,6 @@ pub(super) fn general(m: &Moments, start: &[f64; 10]) -> Option<[f64; 10]> {
     Some(a)
 }
 
-/// A point of a neighbourhood, in local coordinates.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Weighted {
-    pub y: DVec3,
-    pub weight: f64,
-}
-
 /// One fitted sheet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sheet {
@@ -213,32 +207,29 @@ pub(super) struct Sheet {
 
 /// Fits a sheet to points in local coordinates around `center` with unit `scale`.
 ///
+/// * `own` - weight of every point
 /// * `start` - a first guess whose residuals give the first robust weights, or `None`
 /// * `noise` - standard deviation of the points in local units
 pub(super) fn sheet(
     center: DVec3,
     scale: f64,
-    points: &[Weighted],
+    points: &Points,
+    own: &[f64],
     start: Option<&Quadric>,
     noise: f64,
     rounds: Option<usize>,
 ) -> Option<Sheet> {
     let mut model = start.map(|q| (localized(q, center, scale), 6.0));
-    let mut weights: Vec<f64> = Vec::with_capacity(points.len());
+    let (mut weights, mut distances) = (own.to_vec(), Vec::new());
     let mut last = None;
     for _ in 0..rounds.unwrap_or(ROUNDS) {
-        let mut m = Moments::ZERO;
-        weights.clear();
-        for p in points {
-            let w = match &model {
-                Some((q, _)) => p.weight * tukey(q.distance(p.y).0 / noise),
-                None => p.weight,
-            };
-            weights.push(w);
-            if w > 0.0 {
-                m.add(p.y, w);
+        if let Some((q, _)) = &model {
+            points.distances(q, &mut distances);
+            for ((w, own), d) in weights.iter_mut().zip(own).zip(&distances) {
+                *w = own * tukey(d / noise);
             }
         }
+        let m = points.moments(&weights);
         if m.weight() < FEWEST {
             return None;
         }
@@ -246,7 +237,7 @@ pub(super) fn sheet(
             Some((q, _)) => Frame::of(q.value(m.mean()).1.normalize_or(DVec3::Z)),
             None => Frame::of_moments(&m),
         };
-        let chosen = choose(&m, frame, points, &weights, noise)?;
+        let chosen = choose(&m, frame, points, &weights, noise, &mut distances)?;
         model = Some((Quadric { center: DVec3::ZERO, scale: 1.0, a: chosen.0 }, chosen.1));
         last = Some((chosen, m.weight()));
     }
@@ -265,27 +256,32 @@ pub(super) fn localized(q: &Quadric, center: DVec3, scale: f64) -> Quadric {
 fn choose(
     m: &Moments,
     frame: Frame,
-    points: &[Weighted],
+    points: &Points,
     weights: &[f64],
     noise: f64,
+    distances: &mut Vec<f64>,
 ) -> Option<([f64; 10], f64, f64)> {
+    let mut squared = |a: &[f64; 10]| {
+        points.distances(&Quadric { center: DVec3::ZERO, scale: 1.0, a: *a }, distances);
+        weighted_squares(weights, distances)
+    };
     let matrix = m.matrix();
     let curved = framed_height(&matrix, frame)?;
     let n = m.weight();
     let flat = plane(m, Frame::of_moments(m));
     let score = |rss: f64, p: f64| n * (rss / n).max(1e-30).ln() + 2.0 * p * n / (n - p - 1.0).max(0.5);
-    let flat_rss = squared(&flat, points, weights);
+    let flat_rss = squared(&flat);
     let a = curved.implicit();
-    let rss = squared(&a, points, weights);
+    let rss = squared(&a);
     let mut best = (a, 6.0, rss);
     let bend = curved.c[0].abs().max(curved.c[2].abs()) * 2.0;
-    let reach = points.iter().map(|p| p.y.length_squared()).fold(0.0, f64::max).sqrt();
+    let reach = points.iter().map(DVec3::length_squared).fold(0.0, f64::max).sqrt();
     let order_four = bend.powi(3) * reach.powi(4) / 8.0;
     if n > 12.0
         && order_four > ORDER_FOUR_SHARE * (rss / n).sqrt().min(noise)
         && let Some(b) = general(m, &a)
     {
-        let general_rss = squared(&b, points, weights);
+        let general_rss = squared(&b);
         // A general quadric may have come out inside out; the sign of the height field is kept.
         let q = Quadric { center: DVec3::ZERO, scale: 1.0, a: b };
         if score(general_rss, 9.0) < score(rss, 6.0) && q.variation(m.mean(), reach) < ONE_SHEET {
@@ -297,11 +293,6 @@ fn choose(
         best = (flat, 3.0, flat_rss);
     }
     Some(best)
-}
-
-fn squared(a: &[f64; 10], points: &[Weighted], weights: &[f64]) -> f64 {
-    let q = Quadric { center: DVec3::ZERO, scale: 1.0, a: *a };
-    points.iter().zip(weights).map(|(p, &w)| if w > 0.0 { w * q.distance(p.y).0.powi(2) } else { 0.0 }).sum()
 }
 
 /// Tukey's biweight of a residual in noise levels.

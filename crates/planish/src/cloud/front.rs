@@ -12,9 +12,10 @@
 //! on its own fit, which is the seed jump of [X03]. Supports follow from the data and not from factors c_i.
 
 use super::Quadric;
-use super::fit::{Sheet, Weighted, kernel, localized, sheet};
+use super::fit::{Sheet, kernel, localized, sheet};
 use super::layers;
 use super::nest::{LIMIT, Seen, cost, nest};
+use super::points::Points;
 use super::sites::{APART, Sites, in_pieces};
 use crate::geom::KdTree;
 use crate::observe::Observer;
@@ -57,6 +58,8 @@ const FARTHEST: f64 = 3.0;
 const SURE: f64 = 0.35;
 /// A carried-on sheet begins with the ball that it has, at most this many times that of the site.
 const CARRIED: f64 = 3.0;
+/// Points of less weight are left out.
+const FELT: f64 = 1e-3;
 /// Density of points that belong to no sheet, as that of a sheet three noise levels away.
 const STRAY: f64 = 0.011;
 /// Ratio of one ball to the next when a sheet grows, and how often it grows at most.
@@ -220,20 +223,19 @@ fn fit_site(
     if survey.layer.is_some()
         && let [f, g] = &mut fits[..]
     {
-        // The two are a plate or a gap if they still are side by side.
+        // The two are a plate or a gap if they still are side by side: each sees the other on the side that it is seen on.
         let ((d, n), (e, m)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
-        let (d, e, apart) = (d.abs(), e.abs(), f.center.distance(g.center));
-        let parallel = n.dot(g.normal).abs().min(m.dot(f.normal).abs()) > PARALLEL;
-        if parallel && d.max(e).max(apart) < (1.0 + ALIKE) * d.min(e) && d.min(e) > layers::APART * noise {
-            (f.gap, g.gap) = (d, e);
+        let turns = [n.dot(g.normal), m.dot(f.normal)];
+        let alike = turns.iter().all(|t| t.abs() > SIDE_BY_SIDE && d * e * t < 0.0);
+        if alike && d.abs().min(e.abs()) > layers::APART * noise {
+            (f.gap, g.gap) = (d.abs(), e.abs());
         }
     }
     fits
 }
 
-/// Sheets side by side are parallel by this cosine (10 degrees), and their distance is the same within this share.
-const PARALLEL: f64 = 0.985;
-const ALIKE: f64 = 0.3;
+/// Sheets side by side turn by less than this cosine (30 degrees) from each other: the flanks of a wedge do so, too.
+const SIDE_BY_SIDE: f64 = 0.866;
 
 /// The sheets that explain the points around a site, each with the middle of the points that are nearest to it there.
 fn choose(
@@ -333,28 +335,41 @@ fn widen(
 ) -> Option<(Sheet, f64, f64)> {
     let mut best: Option<(Sheet, f64, f64)> = None;
     let mut guess = *start;
-    let mut ball = Vec::new();
+    let (mut ball, mut weights) = (Points::default(), Vec::new());
+    let (mut own, mut other, mut all) = (Vec::new(), Vec::new(), Vec::new());
     for step in 0..=STEPS {
         let r = radius * WIDEN.powi(step as i32);
         ball.clear();
+        weights.clear();
         tree.within(p, r, |_, q, _| {
             let y = (q - p) / r;
-            let mut weight = kernel(y.length_squared());
-            if !others.is_empty() {
-                // The chance that the point belongs to this sheet and to none of the others.
-                let chance = |s: &Quadric| (-0.5 * (s.distance(q).0 / noise).powi(2)).exp();
-                let own = chance(&guess);
-                weight *= own / (own + others.iter().map(chance).sum::<f64>() + STRAY);
-            }
-            if weight > 1e-3 {
-                ball.push(Weighted { y, weight });
-            }
+            ball.push(y);
+            weights.push(kernel(y.length_squared()));
         });
+        if !others.is_empty() {
+            // The chance that each point belongs to this sheet and to none of the others.
+            let sigma = noise / r;
+            let chance = |s: &Quadric, out: &mut Vec<f64>| {
+                ball.distances(&localized(s, p, r), out);
+                out.iter_mut().for_each(|d| *d = (-0.5 * (*d / sigma).powi(2)).exp());
+            };
+            chance(&guess, &mut own);
+            all.clear();
+            all.resize(ball.len(), STRAY);
+            for s in others.iter().chain([&guess]) {
+                chance(s, &mut other);
+                all.iter_mut().zip(&other).for_each(|(a, c)| *a += c);
+            }
+            weights.iter_mut().zip(own.iter().zip(&all)).for_each(|(w, (own, all))| *w *= own / all);
+        }
+        ball.keep(|i| weights[i] > FELT);
+        weights.retain(|&w| w > FELT);
         // Enough points: more of them cost more than they tell.
         if step > 0 && ball.len() > PLENTY && r > WIDE_ENOUGH * noise {
             break;
         }
-        let Some(found) = sheet(p, r, &ball, Some(&guess), noise / r, Some(if step == 0 { 2 } else { 1 })) else {
+        let Some(found) = sheet(p, r, &ball, &weights, Some(&guess), noise / r, Some(if step == 0 { 2 } else { 1 }))
+        else {
             if best.is_none() && step < STEPS {
                 continue;
             }
@@ -372,16 +387,18 @@ fn widen(
 
 /// Expected error of a sheet at its centre: its parameters and the bias that the averages of the sectors of its own
 /// points show.
-fn expected(s: &Sheet, p: DVec3, radius: f64, ball: &[Weighted], noise: f64) -> f64 {
+fn expected(s: &Sheet, p: DVec3, radius: f64, ball: &Points, noise: f64) -> f64 {
     let q = localized(&s.quadric, p, radius);
     let sigma = noise / radius;
     let frame = super::fit::Frame::of(q.value(DVec3::ZERO).1.normalize_or(DVec3::Z));
     let mut sums = [(0.0, 0.0); 16];
     let mut count = 0.0;
-    for w in ball {
-        let r = q.distance(w.y).0 / sigma;
+    let mut distances = Vec::new();
+    ball.distances(&q, &mut distances);
+    for (y, d) in ball.iter().zip(&distances) {
+        let r = d / sigma;
         if r.abs() < LIMIT {
-            let (u, v) = (frame.u.dot(w.y), frame.v.dot(w.y));
+            let (u, v) = (frame.u.dot(y), frame.v.dot(y));
             let mut at = usize::from(u > 0.0) | usize::from(v > 0.0) << 1 | usize::from(u.abs() > v.abs()) << 2;
             if ball.len() >= 80 && u * u + v * v > 0.5 {
                 at |= 8;

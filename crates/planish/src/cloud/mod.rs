@@ -19,6 +19,7 @@ mod link;
 mod moments;
 mod nest;
 mod orient;
+mod points;
 mod project;
 mod quadric;
 mod rim;

@@ -55,6 +55,31 @@ const ALL: [[usize; 3]; COUNT] = [
 /// Where the product of two of the ten monomials stands among all.
 const PRODUCT: [[usize; 10]; 10] = products();
 
+/// For each monomial but the first the one before it that it is a multiple of, and the axis of the other factor.
+pub(super) const PARENTS: [(usize, usize); COUNT] = parents();
+
+const fn parents() -> [(usize, usize); COUNT] {
+    let mut table = [(0, 0); COUNT];
+    let mut k = 1;
+    while k < COUNT {
+        let mut j = 0;
+        while j < k {
+            let mut axis = 0;
+            while axis < 3 {
+                let mut e = ALL[j];
+                e[axis] += 1;
+                if e[0] == ALL[k][0] && e[1] == ALL[k][1] && e[2] == ALL[k][2] {
+                    table[k] = (j, axis);
+                }
+                axis += 1;
+            }
+            j += 1;
+        }
+        k += 1;
+    }
+    table
+}
+
 const fn products() -> [[usize; 10]; 10] {
     let mut table = [[0; 10]; 10];
     let mut i = 0;

@@ -8,6 +8,7 @@
 //! would not do: it lets every point choose its sheet, and noise alone then pays for a second one. For the same reason a
 //! point above which the surface lies m-fold pays 2 ln m: twice the area has half the density of points.
 
+use super::points::{Join, joined_cost};
 use glam::DVec3;
 
 /// Most sheets that are nested: a corner of four faces.
@@ -62,7 +63,7 @@ const ENOUGH: usize = 60;
 
 /// Sum of squared residuals (in noise levels), each at most the square of [`LIMIT`].
 pub(super) fn cost(residuals: &[f64]) -> f64 {
-    residuals.iter().map(|d| (d * d).min(LIMIT * LIMIT)).sum()
+    joined_cost(&[(residuals, Join::Nearest)])
 }
 
 /// The nesting of least cost plus prices, of at most `most` sheets.
@@ -75,10 +76,10 @@ pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
     let price = |order: &[usize]| order.iter().map(|&k| asked[k].price).sum::<f64>();
     let mut best =
         Nesting { order: vec![first.1], flipped: 0, concave: 0, cost: first.0 - asked[first.1].price, total: first.0 };
-    let count = asked[0].residuals.len();
-    let step = count.div_ceil(ENOUGH).max(1);
-    let mut value = vec![0.0; count];
-    let squared = |i: usize, k: usize| asked[i].residuals[k].powi(2).min(LIMIT * LIMIT);
+    let step = asked[0].residuals.len().div_ceil(ENOUGH).max(1);
+    let all: Vec<&[f64]> = asked.iter().map(|a| &a.residuals[..]).collect();
+    let thinned: Vec<Vec<f64>> = all.iter().map(|r| r.iter().step_by(step).copied().collect()).collect();
+    let some: Vec<&[f64]> = thinned.iter().map(|r| &r[..]).collect();
     // One sheet after the other, each the best that can be joined to those chosen, in all nestings of the set. The second
     // may come with another first: between the two sides of a plate one sheet alone does best in the middle.
     while best.order.len() < most.min(MOST) {
@@ -91,10 +92,7 @@ pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
         // No nesting explains more than the union.
         let mut bound: Vec<(f64, Vec<usize>)> = sets
             .into_iter()
-            .map(|set| {
-                let least = |k: usize| set.iter().map(|&i| squared(i, k)).fold(LIMIT * LIMIT, f64::min);
-                ((0..count).map(least).sum::<f64>() + price(&set), set)
-            })
+            .map(|set| (nearest_cost(set.iter().map(|&i| all[i])) + price(&set), set))
             .filter(|b| b.0 < best.total)
             .collect();
         bound.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
@@ -113,7 +111,7 @@ pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
                 for flips in 0..signs {
                     for ops in 0..1u8 << joints {
                         let (flipped, concave) = (flips << 1, ops << 1);
-                        let part = evaluate(asked, &order, flipped, concave, step, &mut value);
+                        let part = nesting_cost(&some, &order, flipped, concave);
                         if found.as_ref().is_none_or(|n| part < n.cost) {
                             found = Some(Nesting { order: order.clone(), flipped, concave, cost: part, total: 0.0 });
                         }
@@ -121,7 +119,7 @@ pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
                 }
             }
             let Some(mut found) = found else { continue };
-            found.cost = evaluate(asked, &found.order, found.flipped, found.concave, 1, &mut value);
+            found.cost = nesting_cost(&all, &found.order, found.flipped, found.concave);
             if found.cost + priced < limit {
                 let set: Vec<Seen> =
                     found.order.iter().enumerate().map(|(k, &i)| asked[i].turned(sign(found.flipped, k))).collect();
@@ -140,24 +138,21 @@ pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
     Some(best)
 }
 
-/// Cost of every `step`-th point.
-fn evaluate(asked: &[Seen], order: &[usize], flipped: u8, concave: u8, step: usize, value: &mut [f64]) -> f64 {
-    let mut count = 0;
-    for (v, r) in value.iter_mut().zip(asked[order[0]].residuals.iter().step_by(step)) {
-        *v = *r;
-        count += 1;
-    }
-    let value = &mut value[..count];
-    for (k, &i) in order.iter().enumerate().skip(1) {
+/// Cost if every point belonged to the sheet nearest to it.
+fn nearest_cost<'a>(rows: impl Iterator<Item = &'a [f64]>) -> f64 {
+    let mut signed = [([].as_slice(), Join::Nearest); MOST];
+    let count = signed.iter_mut().zip(rows).map(|(s, row)| s.0 = row).count();
+    joined_cost(&signed[..count])
+}
+
+/// Cost of a nesting of these sheets.
+fn nesting_cost(rows: &[&[f64]], order: &[usize], flipped: u8, concave: u8) -> f64 {
+    let mut signed = [([].as_slice(), Join::Nearest); MOST];
+    for (k, (s, &i)) in signed.iter_mut().zip(order).enumerate() {
         let sign = sign(flipped, k);
-        let others = asked[i].residuals.iter().step_by(step);
-        if concave >> k & 1 == 1 {
-            value.iter_mut().zip(others).for_each(|(v, r)| *v = v.min(sign * r));
-        } else {
-            value.iter_mut().zip(others).for_each(|(v, r)| *v = v.max(sign * r));
-        }
+        *s = (rows[i], if concave >> k & 1 == 1 { Join::Least(sign) } else { Join::Greatest(sign) });
     }
-    cost(value)
+    joined_cost(&signed[..order.len()])
 }
 
 fn sign(flipped: u8, k: usize) -> f64 {
@@ -198,7 +193,9 @@ pub(super) fn folds(sheets: &[Seen], concave: u8) -> f64 {
                 layers += turn[k][own].abs();
             }
         }
-        price += 2.0 * f64::ln(layers);
+        if layers > 1.0 {
+            price += 2.0 * f64::ln(layers);
+        }
     }
     price
 }

@@ -9,6 +9,7 @@
 
 use super::Quadric;
 use super::nest;
+use super::points::Points;
 use glam::DVec3;
 
 /// Two sheets are the sides of a plate if the angle between their normals is above 135 degrees.
@@ -47,7 +48,7 @@ pub(super) fn rim(
     concave: u8,
     center: DVec3,
     radius: f64,
-    points: &[DVec3],
+    points: &Points,
     noise: f64,
 ) -> Option<Rim> {
     let normals: Vec<DVec3> = sheets.iter().map(|s| s.distance(center).1).collect();
@@ -76,7 +77,7 @@ pub(super) fn rim(
     let count = surface.len() as f64;
     let bare = |angle: f64| {
         let w = angle.cos() * u + angle.sin() * v;
-        let end = points.iter().map(|p| w.dot(*p)).fold(f64::NEG_INFINITY, f64::max);
+        let end = points.iter().map(|p| w.dot(p)).fold(f64::NEG_INFINITY, f64::max);
         (surface.iter().filter(|s| w.dot(**s) > end).count(), w, end)
     };
     let turn = std::f64::consts::TAU / DIRECTIONS as f64;
@@ -96,7 +97,7 @@ pub(super) fn rim(
     let deep = end - DEEP * noise;
     let mut beyond: Vec<f64> = surface.iter().map(|s| w.dot(*s)).filter(|d| *d > deep).collect();
     beyond.sort_unstable_by(f64::total_cmp);
-    let last = points.iter().filter(|p| w.dot(**p) > deep).count() as f64;
+    let last = points.iter().filter(|p| w.dot(*p) > deep).count() as f64;
     let (inside, area) = (points.len() as f64 - last, count - beyond.len() as f64);
     if inside < MISSING || area < 1.0 {
         return None;
@@ -112,7 +113,7 @@ mod tests {
     use crate::geom::random;
 
     /// Both sides of a plate `thick` noise levels thick that ends at x = `end`, in a ball of radius 40 levels.
-    fn plate(thick: f64, end: f64, seed: u64) -> (Vec<Quadric>, Vec<DVec3>) {
+    fn plate(thick: f64, end: f64, seed: u64) -> (Vec<Quadric>, Points) {
         let normal = |k: u64| random::normal(random::unit(seed, 2 * k), random::unit(seed, 2 * k + 1));
         let points = (0..800u64)
             .map(|i| {

@@ -26,8 +26,8 @@ const GROWTH: f64 = 3.0;
 /// ... and where it would do more, a miss must be this much greater to count, as often as needed.
 const LESS: f64 = 1.4;
 
-/// A patch that finer cells leave with more than this part of its need is past help (a fourth is hoped for): none reach
-/// down a needle.
+/// A patch that finer cells leave with more than this part of its need is past help (a fourth is hoped for), and one
+/// that they leave with more folds: none reach down a needle, and cells finer than crumpled relief turn over with it.
 const HELPED: f64 = 0.7;
 /// Patches are tried alone if that takes at most this part of the points that refinement would add.
 const TRIAL: f64 = 0.5;
@@ -103,16 +103,26 @@ fn refined<E: From<GridError>>(
     let budget = ((GROWTH * total(&sizes) as f64) as usize).min(params.max_points);
     let mut suspects = all;
     let mut past_help = vec![false; patches.len()];
+    // What was wrong with the patches that asked for the last round.
+    let mut before: Vec<Option<Fault>> = vec![None; patches.len()];
     for round in 0..ROUNDS {
         if observer.cancelled() {
             return Err(GridError::Cancelled.into());
         }
-        let need = |p: usize, grid: &Grid| {
-            let folded = folds(grid, &patches[p]) > 0;
-            miss(grid, &patches[p]).0.max(if folded { FOLDED * allowed } else { 0.0 })
+        let fault = |p: usize, grid: &Grid| {
+            let folds = folds(grid, &patches[p]);
+            let floor = if folds > 0 { FOLDED * allowed } else { 0.0 };
+            Fault { folds, miss: miss(grid, &patches[p]).0.max(floor) }
         };
         suspects.retain(|&p| !past_help[p]);
-        let mut misses: Vec<f64> = suspects.par_iter().map(|&p| need(p, &grids[p])).collect();
+        let faults: Vec<Fault> = suspects.par_iter().map(|&p| fault(p, &grids[p])).collect();
+        for (&p, now) in suspects.iter().zip(&faults) {
+            past_help[p] = before[p].take().is_some_and(|before| !now.helped(before));
+        }
+        let wants = |past_help: &[bool]| -> Vec<f64> {
+            suspects.iter().zip(&faults).map(|(&p, f)| if past_help[p] { 0.0 } else { f.miss }).collect()
+        };
+        let misses = wants(&past_help);
         // Long chords carry one patch's need far: where that asks for too many points, only the worst are heeded.
         let wish = |misses: &[f64]| -> Result<Vec<Size>, E> {
             let mut limit = allowed;
@@ -130,16 +140,14 @@ fn refined<E: From<GridError>>(
         let start = FIRST_SHARE + share * round as f64;
         let needy: Vec<usize> = (0..suspects.len()).filter(|&k| misses[k] > allowed).collect();
         let tried: Vec<usize> = needy.iter().map(|&k| suspects[k]).collect();
+        needy.iter().for_each(|&k| before[suspects[k]] = Some(faults[k]));
         let added = total(&wanted).saturating_sub(total(&sizes));
         let trial: usize = tried.iter().map(|&p| wanted[p].0 * wanted[p].1).sum();
         if trial as f64 <= TRIAL * added as f64 {
             for (&k, grid) in needy.iter().zip(make(&tried, &wanted, &Part::new(observer, start, 0.0))?) {
-                if need(suspects[k], &grid) > HELPED * misses[k] {
-                    past_help[suspects[k]] = true;
-                    misses[k] = 0.0;
-                }
+                past_help[suspects[k]] = !fault(suspects[k], &grid).helped(faults[k]);
             }
-            wanted = wish(&misses)?;
+            wanted = wish(&wants(&past_help))?;
         }
         suspects = (0..patches.len()).filter(|&p| wanted[p] != sizes[p]).collect();
         if suspects.is_empty() {
@@ -151,6 +159,21 @@ fn refined<E: From<GridError>>(
         sizes = wanted;
     }
     Ok(grids)
+}
+
+/// What is wrong with a grid.
+#[derive(Clone, Copy)]
+struct Fault {
+    folds: usize,
+    /// Greatest miss of a vertex, and at least what a folded grid counts as, world units.
+    miss: f64,
+}
+
+impl Fault {
+    /// Whether finer cells were of use.
+    fn helped(self, before: Fault) -> bool {
+        self.miss <= HELPED * before.miss && self.folds <= before.folds
+    }
 }
 
 /// Sizes with more points along the chords of patches that miss more than `limit`.

@@ -1,0 +1,307 @@
+//! Many points at once: coordinates side by side, so that the processor works on several of them in one instruction.
+//!
+//! Every sum has a fixed number of lanes, so its bits do not depend on how wide the instructions are.
+
+use super::Quadric;
+use super::moments::{COUNT, Moments, PARENTS};
+use super::nest::LIMIT;
+use glam::DVec3;
+use pulp::{Arch, Simd, WithSimd};
+
+/// Lanes of a sum.
+const LANES: usize = 8;
+/// Points whose monomials are in the cache together.
+const BLOCK: usize = 64;
+
+/// Points, coordinate by coordinate.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Points {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    z: Vec<f64>,
+}
+
+impl Points {
+    pub(super) fn with_capacity(count: usize) -> Points {
+        let axis = || Vec::with_capacity(count);
+        Points { x: axis(), y: axis(), z: axis() }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.x.clear();
+        self.y.clear();
+        self.z.clear();
+    }
+
+    pub(super) fn push(&mut self, p: DVec3) {
+        self.x.push(p.x);
+        self.y.push(p.y);
+        self.z.push(p.z);
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.x.len()
+    }
+
+    pub(super) fn get(&self, i: usize) -> DVec3 {
+        DVec3::new(self.x[i], self.y[i], self.z[i])
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = DVec3> + '_ {
+        (0..self.len()).map(|i| self.get(i))
+    }
+
+    /// Leaves out the points that are not wanted.
+    pub(super) fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
+        for axis in [&mut self.x, &mut self.y, &mut self.z] {
+            let mut i = 0;
+            axis.retain(|_| {
+                i += 1;
+                wanted(i - 1)
+            });
+        }
+    }
+
+    /// First-order signed distance of every point to a quadric, as [`Quadric::distance`], in the units of the points.
+    pub(super) fn distances(&self, q: &Quadric, out: &mut Vec<f64>) {
+        out.resize(self.len(), 0.0);
+        Arch::new().dispatch(Distances { at: self.columns(), q, out });
+    }
+
+    /// Weighted sums of the monomials.
+    pub(super) fn moments(&self, weights: &[f64]) -> Moments {
+        Arch::new().dispatch(Sums { at: self.columns(), weights })
+    }
+
+    fn columns(&self) -> [&[f64]; 3] {
+        [&self.x, &self.y, &self.z]
+    }
+}
+
+impl FromIterator<DVec3> for Points {
+    fn from_iter<T: IntoIterator<Item = DVec3>>(points: T) -> Points {
+        let points = points.into_iter();
+        let mut all = Points::with_capacity(points.size_hint().0);
+        points.for_each(|p| all.push(p));
+        all
+    }
+}
+
+/// Sum of the squares of `values`, each times its weight.
+pub(super) fn weighted_squares(weights: &[f64], values: &[f64]) -> f64 {
+    Arch::new().dispatch(Squares { weights, values })
+}
+
+/// How the distances to a sheet are joined to those before, each times its sign.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Join {
+    /// The nearer of both sheets.
+    Nearest,
+    /// The minimum.
+    Least(f64),
+    /// The maximum.
+    Greatest(f64),
+}
+
+/// Sum over all points of the squares of joined distances, each at most the square of [`LIMIT`].
+/// * `rows` - distances to each sheet in noise levels; how the first is joined is of no meaning
+pub(super) fn joined_cost(rows: &[(&[f64], Join)]) -> f64 {
+    Arch::new().dispatch(Joined { rows })
+}
+
+struct Joined<'a> {
+    rows: &'a [(&'a [f64], Join)],
+}
+
+impl WithSimd for Joined<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let mut sums = [0.0; LANES];
+        let n = self.rows[0].0.len();
+        for first in (0..n).step_by(LANES) {
+            // Places past the end count nothing.
+            let load = |row: &[f64]| {
+                if let Some(whole) = row.get(first..first + LANES) {
+                    std::array::from_fn(|l| whole[l])
+                } else {
+                    std::array::from_fn(|l| row.get(first + l).copied().unwrap_or(0.0))
+                }
+            };
+            let mut v: [f64; LANES] = load(self.rows[0].0);
+            for (row, join) in &self.rows[1..] {
+                let r = load(row);
+                match join {
+                    Join::Nearest => (0..LANES).for_each(|l| v[l] = if r[l].abs() < v[l].abs() { r[l] } else { v[l] }),
+                    Join::Least(s) => (0..LANES).for_each(|l| v[l] = if s * r[l] < v[l] { s * r[l] } else { v[l] }),
+                    Join::Greatest(s) => (0..LANES).for_each(|l| v[l] = if s * r[l] > v[l] { s * r[l] } else { v[l] }),
+                }
+            }
+            for l in 0..LANES {
+                let square = v[l] * v[l];
+                sums[l] += if square < LIMIT * LIMIT { square } else { LIMIT * LIMIT };
+            }
+        }
+        sums.iter().sum()
+    }
+}
+
+struct Distances<'a> {
+    at: [&'a [f64]; 3],
+    q: &'a Quadric,
+    out: &'a mut [f64],
+}
+
+impl WithSimd for Distances<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (n, out) = (self.out.len(), self.out);
+        let [x, y, z] = self.at.map(|c| &c[..n]);
+        let (a, c, scale, inverse) = (self.q.a, self.q.center, self.q.scale, 1.0 / self.q.scale);
+        for i in 0..n {
+            let (x, y, z) = ((x[i] - c.x) * inverse, (y[i] - c.y) * inverse, (z[i] - c.z) * inverse);
+            let (hx, hy, hz) = (a[0] * x + a[1] * y + a[2] * z, a[3] * y + a[4] * z, a[5] * z);
+            let gx = a[0] * x + hx + a[6];
+            let gy = a[1] * x + a[3] * y + hy + a[7];
+            let gz = a[2] * x + a[4] * y + a[5] * z + hz + a[8];
+            let f = hx * x + hy * y + hz * z + a[6] * x + a[7] * y + a[8] * z + a[9];
+            let square = gx * gx + gy * gy + gz * gz;
+            let d = scale * f / square.sqrt();
+            out[i] = if square > 0.0 { d } else { f64::INFINITY };
+        }
+    }
+}
+
+struct Squares<'a> {
+    weights: &'a [f64],
+    values: &'a [f64],
+}
+
+impl WithSimd for Squares<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let mut lanes = [0.0; LANES];
+        let (w, v) = (self.weights.chunks_exact(LANES), self.values.chunks_exact(LANES));
+        let rest: f64 = w.remainder().iter().zip(v.remainder()).map(|(w, v)| w * v * v).sum();
+        for (w, v) in w.zip(v) {
+            for l in 0..LANES {
+                lanes[l] += w[l] * v[l] * v[l];
+            }
+        }
+        lanes.iter().sum::<f64>() + rest
+    }
+}
+
+struct Sums<'a> {
+    at: [&'a [f64]; 3],
+    weights: &'a [f64],
+}
+
+impl WithSimd for Sums<'_> {
+    type Output = Moments;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Moments {
+        let n = self.weights.len();
+        let mut lanes = [[0.0; LANES]; COUNT];
+        let mut column = [[0.0; BLOCK]; COUNT];
+        let mut at = [[0.0; BLOCK]; 3];
+        for first in (0..n).step_by(BLOCK) {
+            let count = BLOCK.min(n - first);
+            column[0][count..].fill(0.0);
+            column[0][..count].copy_from_slice(&self.weights[first..first + count]);
+            for (at, of) in at.iter_mut().zip(self.at) {
+                at[..count].copy_from_slice(&of[first..first + count]);
+            }
+            for k in 0..COUNT {
+                if k > 0 {
+                    let (before, after) = column.split_at_mut(k);
+                    let (parent, axis) = PARENTS[k];
+                    let (own, parent, axis) = (&mut after[0], &before[parent], &at[axis]);
+                    for i in 0..BLOCK {
+                        own[i] = parent[i] * axis[i];
+                    }
+                }
+                for chunk in column[k].chunks_exact(LANES) {
+                    for l in 0..LANES {
+                        lanes[k][l] += chunk[l];
+                    }
+                }
+            }
+        }
+        Moments(lanes.map(|l| l.iter().sum()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::random;
+
+    fn unit(seed: u64, i: usize) -> f64 {
+        random::unit(seed, i as u64) - 0.5
+    }
+
+    fn some(count: usize) -> Points {
+        (0..count).map(|i| DVec3::new(unit(1, i), unit(2, i), unit(3, i))).collect()
+    }
+
+    #[test]
+    fn distances_of_0_to_70_points_are_those_of_each_alone_to_1e_14() {
+        let a = [0.3, -0.5, 0.2, 0.9, 0.4, -0.6, 0.1, 0.7, -0.3, 0.05];
+        let q = Quadric { center: DVec3::new(0.2, -0.1, 0.3), scale: 0.7, a };
+        let mut found = Vec::new();
+        for count in 0..70 {
+            let points = some(count);
+            points.distances(&q, &mut found);
+            assert_eq!(found.len(), count);
+            for (p, d) in points.iter().zip(&found) {
+                assert!((d - q.distance(p).0).abs() < 1e-14 * (1.0 + d.abs()), "{d}");
+            }
+        }
+        // Where the gradient vanishes there is no direction to go.
+        let cone = Quadric { center: DVec3::ZERO, scale: 1.0, a: [1.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0] };
+        [DVec3::ZERO].into_iter().collect::<Points>().distances(&cone, &mut found);
+        assert_eq!(found, [f64::INFINITY]);
+    }
+
+    #[test]
+    fn sums_over_0_to_150_points_are_those_of_each_after_the_other_to_1e_12() {
+        for count in [0, 1, 7, 8, 63, 64, 65, 150] {
+            let points = some(count);
+            let weights: Vec<f64> = (0..count).map(|i| random::unit(4, i as u64)).collect();
+            let mut one = Moments::ZERO;
+            points.iter().zip(&weights).for_each(|(p, &w)| one.add(p, w));
+            let all = points.moments(&weights);
+            assert!(one.0.iter().zip(&all.0).all(|(a, b)| (a - b).abs() < 1e-12), "{count} points");
+            let values: Vec<f64> = points.iter().map(|p| p.x).collect();
+            assert!((weighted_squares(&weights, &values) - one.0[4]).abs() < 1e-12, "{count} points");
+        }
+    }
+
+    #[test]
+    fn joined_distances_cost_what_maxima_minima_and_nearest_do() {
+        let row = |seed: u64| (0..45).map(|i| 9.0 * unit(seed, i)).collect::<Vec<f64>>();
+        let rows = [row(5), row(6), row(7)];
+        let [a, b, c] = [0, 1, 2].map(|k| &rows[k][..]);
+        let cost = |v: f64| (v * v).min(LIMIT * LIMIT);
+        let nested: f64 = (0..45).map(|i| cost(a[i].max(-b[i]).min(c[i]))).sum();
+        let found = joined_cost(&[(a, Join::Nearest), (b, Join::Greatest(-1.0)), (c, Join::Least(1.0))]);
+        assert!((found - nested).abs() < 1e-12);
+        let nearest: f64 = (0..45).map(|i| cost(a[i].abs().min(b[i].abs()))).sum();
+        assert!((joined_cost(&[(a, Join::Nearest), (b, Join::Nearest)]) - nearest).abs() < 1e-12);
+    }
+
+    #[test]
+    fn points_that_are_not_wanted_leave_in_all_axes() {
+        let mut points = some(20);
+        let wanted = points.get(7);
+        points.keep(|i| i == 7);
+        assert_eq!(points.iter().collect::<Vec<_>>(), [wanted]);
+    }
+}
