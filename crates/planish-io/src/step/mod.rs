@@ -3,6 +3,7 @@
 //! 1. the sides of all patches are held against each other: every curve has one row of control points
 //! 2. patches joined by curves form components; one without a free curve is a solid, the others open shells
 //! 3. one face per patch, one edge per curve, one vertex per corner, shared by all that meet there
+//! 4. every edge brings its curve in the parameters of both surfaces (PCURVE), so no kernel has to project it
 //!
 //! The edge's curve is the boundary row of control points of the first patch along it, so a seam whose two
 //! rows are equal has no gap at all, and no kernel has to sew or to loosen a tolerance.
@@ -200,6 +201,7 @@ fn placement(e: &mut Entities) -> usize {
     e.add(format!("AXIS2_PLACEMENT_3D('',#{origin},#{z},#{x})"))
 }
 
+/// The entity of a B-spline surface with its knots; its number.
 fn surface(e: &mut Entities, surface: &Surface) -> usize {
     let columns: Vec<String> = (0..surface.cols)
         .map(|i| {

@@ -381,7 +381,7 @@ fn joined(sheets: &[(Quadric, DVec3, f64)], concave: u8, p: DVec3) -> (usize, f6
     nest::joined(sheets.iter().map(|s| s.0.distance(p).0), concave)
 }
 
-/// The points of the widest ball around a place, from its centre on.
+/// The points of the widest ball around a place, or every so many of them.
 fn widest(place: &Place, tree: &KdTree) -> Points {
     let radius = WIDTHS.into_iter().fold(0.0, f64::max) * HEARD * place.support;
     let mut points = Vec::new();

@@ -47,12 +47,16 @@ pub(super) fn close(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &mut 
         let suspects = search.suspects(seeds.take(), REACH * size);
         let mut busy = vec![false; source.len()];
         let mut loops = Vec::new();
+        // Where a loop nearby is cut in this round, or one is found, there may be more. Where there is none that is short,
+        // cuts elsewhere make none.
+        let mut again = Vec::new();
         for &seed in &suspects {
-            // A loop nearby is cut already: look again in the next round.
             if busy[seed as usize] {
+                again.push(seed);
                 continue;
             }
             let Some(found) = search.tight_loop(seed, REACH * size, size) else { continue };
+            again.push(seed);
             // Two loops around one handle would cut a piece off.
             let piece = search.piece(found[0], REACH * size);
             let vertices = || piece.iter().flat_map(|&t| triangles[t as usize]);
@@ -68,7 +72,7 @@ pub(super) fn close(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &mut 
         if loops.is_empty() {
             break;
         }
-        seeds = Some(suspects);
+        seeds = Some(again);
     }
     closed
 }
