@@ -20,6 +20,7 @@ mod creases;
 pub mod csg;
 pub mod directed;
 mod grid_field;
+mod kink;
 mod lattice;
 mod mesh_field;
 mod part;
