@@ -63,13 +63,14 @@ pub fn polish(
     seeds.extend(calls.iter().flat_map(|c| &c.1));
     seeds.extend(thin.iter().flat_map(|&t| mesh.triangles[t as usize]));
     if !untaken.is_empty() {
-        // Any vertex near by may be needed there.
-        let tree = KdTree::new(&untaken);
-        let mut found = Vec::new();
-        let mut near = |p: &DVec3| {
-            tree.nearest_within(*p, 1, size, &mut found);
-            !found.is_empty()
-        };
+        // Any vertex near by may be needed there. Corners by layers of their size: most vertices are near none.
+        let layer = |p: &DVec3| ((p.z - field.lattice.origin.z) / size).floor().max(0.0) as usize;
+        let mut layers: Vec<Vec<DVec3>> = vec![Vec::new(); untaken.iter().map(layer).max().unwrap_or(0) + 2];
+        for p in &untaken {
+            let at = layer(p);
+            layers[at.saturating_sub(1)..=at + 1].iter_mut().for_each(|layer| layer.push(*p));
+        }
+        let near = |p: &DVec3| layers.get(layer(p)).is_some_and(|l| l.iter().any(|c| c.distance(*p) < size));
         seeds.extend((0..mesh.points.len()).filter(|&v| near(&mesh.points[v])).map(|v| v as u32));
     }
     let mut lines = Lines::new(edges);
