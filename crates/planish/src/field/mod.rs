@@ -209,4 +209,10 @@ pub trait Creases: Sync {
     fn corners(&self) -> Vec<DVec3> {
         Vec::new()
     }
+
+    /// Where two features pass one face of a cell, which has one point for them: places on both and around, each with the
+    /// normals of both sides, where the source can list them.
+    fn crowded(&self) -> Vec<(DVec3, [DVec3; 2])> {
+        Vec::new()
+    }
 }
