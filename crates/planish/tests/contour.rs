@@ -6,7 +6,7 @@ mod zone;
 
 use planish::contour::{self, ContourParams, Meshed, Sampling};
 use planish::field::{GridParams as VolumeParams, Milling, Move, Part, ScalarGrid, Solid, Spacing, Tool};
-use planish::geom::{Aabb, random};
+use planish::geom::{Aabb, Bvh, random};
 use planish::mesh::{Diagnosis, FeatureKind, TriMesh, diagnose, self_intersections};
 use planish::{DVec3, Silent};
 use std::sync::Arc;
@@ -254,6 +254,44 @@ fn volumes_of_turned_boxes_have_their_edges_to_a_tenth_of_a_cell_with_97_percent
     let [length, found, all, good] = sum;
     assert!(found > 0.97 * length, "{found} of {length} of the edges are tagged");
     assert!(good > 0.97 * all, "{good} of {all} of the tagged edges are true");
+}
+
+/// A bar of length 1 with a square section of 1, one edge of which is cut off `width` from it, turned.
+fn chamfered(width: f64, turn: glam::DQuat) -> (TriMesh, Vec<[DVec3; 2]>) {
+    let section = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0 - width], [1.0 - width, 1.0], [0.0, 1.0]];
+    let points: Vec<DVec3> =
+        [0.0, 1.0].iter().flat_map(|z| section.iter().map(move |p| turn * DVec3::new(p[0], p[1], *z))).collect();
+    let mut triangles = Vec::new();
+    for k in 0..5u32 {
+        let next = (k + 1) % 5;
+        triangles.extend([[k, next, next + 5], [k, next + 5, k + 5]]);
+    }
+    for k in 1..4 {
+        triangles.extend([[0, k + 1, k], [5, k + 5, k + 6]]);
+    }
+    let lines = [2, 3].map(|k| [points[k], points[k + 5]]);
+    (TriMesh::new(points, triangles), lines.to_vec())
+}
+
+#[test]
+fn two_lines_half_a_cell_apart_are_both_met_within_a_fifth_of_a_cell_over_95_percent_of_their_length() {
+    let (mut near, mut all) = (0, 0);
+    for seed in 0..8 {
+        let r = |k: u64| random::unit(29, 8 * seed + k) - 0.5;
+        let turn = glam::DQuat::from_axis_angle(DVec3::new(r(0), r(1), r(2)).normalize(), std::f64::consts::TAU * r(3));
+        let (mesh, lines) = chamfered(0.5 / 40.0, turn);
+        let made = of_mesh(&mesh, 40);
+        certified("chamfer", &made.extracted.mesh);
+        let tree = Bvh::new(&made.extracted.mesh);
+        for [a, b] in lines {
+            for k in 0..500 {
+                let p = a.lerp(b, (k as f64 + 0.5) / 500.0);
+                near += (tree.closest(p).distance < 0.2 * made.lattice.step.x) as usize;
+                all += 1;
+            }
+        }
+    }
+    assert!(near * 100 > all * 95, "{near} of {all}");
 }
 
 #[test]
