@@ -7,8 +7,8 @@
 //! Each step is kept only if the mesh stays embedded ([`Local`]), so the certificate holds.
 //!
 //! 1. corners of the source that no vertex took     2. vertices that were clamped: together, one by one, merged
-//! 3. what is left: a part of the way     4. lines that follow those of the source, new vertices where one was missed, loose
-//! ends joined ([`super::lines`])
+//! 3. what is left: a part of the way     4. lines that follow those of the source, with new vertices where one was
+//!    missed, loose ends joined ([`super::lines`])
 //! 5. triangles without area: merged away
 
 use super::lines::{Lines, TAKEN, follow, insert_missing, join_ends};
