@@ -5,10 +5,11 @@ mod common;
 mod zone;
 
 use planish::contour::{self, ContourParams, Meshed, Sampling};
-use planish::field::{Milling, Move, Part, Solid, Spacing, Tool};
-use planish::geom::{Aabb, random};
+use planish::field::{GridParams as VolumeParams, Milling, Move, Part, ScalarGrid, Solid, Spacing, Tool};
+use planish::geom::{Aabb, Bvh, random};
 use planish::mesh::{Diagnosis, FeatureKind, TriMesh, diagnose, self_intersections};
 use planish::{DVec3, Silent};
+use std::sync::Arc;
 
 fn at(n: usize) -> Sampling {
     Sampling { spacing: Spacing::Resolution(n), memory: 4 << 30 }
@@ -159,6 +160,15 @@ fn off_segment(p: DVec3, [a, b]: [DVec3; 2]) -> f64 {
     p.distance(a.lerp(b, t))
 }
 
+/// Length of a segment, and how much of it is nearer than `near` to one of `by`.
+fn covered(segment: [DVec3; 2], by: &[[DVec3; 2]], near: f64) -> [f64; 2] {
+    let length = segment[0].distance(segment[1]);
+    let steps = (length / near).ceil().max(1.0) as usize;
+    let place = |s: usize| segment[0].lerp(segment[1], (s as f64 + 0.5) / steps as f64);
+    let hit = (0..steps).filter(|&s| by.iter().any(|&e| off_segment(place(s), e) < near)).count();
+    [length, length * hit as f64 / steps as f64]
+}
+
 /// A roof whose sides turn by `deg`, on a box, turned any way: length of the ridge and how much of it is tagged, length
 /// of tagged edges and how much of it is true.
 fn roof(deg: f64, seed: u64) -> [f64; 4] {
@@ -185,20 +195,11 @@ fn roof(deg: f64, seed: u64) -> [f64; 4] {
     let tagged: Vec<[DVec3; 2]> =
         made.extracted.tags.edges.iter().map(|e| e.map(|v| mesh.points[v as usize])).collect();
     let edges = edges_of(&planes);
-    let covered = |segment: [DVec3; 2], by: &mut dyn Iterator<Item = [DVec3; 2]>| {
-        let by: Vec<[DVec3; 2]> = by.collect();
-        let length = segment[0].distance(segment[1]);
-        let steps = (length / near).ceil().max(1.0) as usize;
-        let place = |s: usize| segment[0].lerp(segment[1], (s as f64 + 0.5) / steps as f64);
-        let hit = (0..steps).filter(|&s| by.iter().any(|&e| off_segment(place(s), e) < near)).count();
-        [length, length * hit as f64 / steps as f64]
-    };
     let ridge = edges.iter().find(|e| e.1 == [0, 1]).expect("the sides of the roof meet").0;
-    let [length, found] = covered(ridge, &mut tagged.iter().copied());
-    let [all, good] = tagged
-        .iter()
-        .map(|&e| covered(e, &mut edges.iter().map(|e| e.0)))
-        .fold([0.0; 2], |sum, x| [sum[0] + x[0], sum[1] + x[1]]);
+    let edges: Vec<[DVec3; 2]> = edges.into_iter().map(|e| e.0).collect();
+    let [length, found] = covered(ridge, &tagged, near);
+    let [all, good] =
+        tagged.iter().map(|&e| covered(e, &edges, near)).fold([0.0; 2], |sum, x| [sum[0] + x[0], sum[1] + x[1]]);
     [length, found, all, good]
 }
 
@@ -213,6 +214,84 @@ fn creases_of_15_to_90_degrees_turned_any_way_are_found_with_99_5_percent_recall
     let [length, found, all, good] = sum;
     assert!(found > 0.995 * length, "{found} of {length} of the ridges are tagged");
     assert!(good > 0.995 * all, "{good} of {all} of the tagged edges are true");
+}
+
+#[test]
+fn volumes_of_turned_boxes_have_their_edges_to_a_tenth_of_a_cell_with_97_percent_recall_and_precision() {
+    let (half, n) = (DVec3::new(0.7, 0.5, 0.6), 48);
+    let mut sum = [0.0; 4];
+    for seed in 0..8 {
+        let r = |k: u64| random::unit(17, 8 * seed + k) - 0.5;
+        let turn = glam::DQuat::from_axis_angle(DVec3::new(r(0), r(1), r(2)).normalize(), std::f64::consts::TAU * r(3));
+        let shift = DVec3::new(r(4), r(5), r(6)) * 0.1;
+        let step = 2.4 / n as f64;
+        let at =
+            |v: usize| DVec3::splat(-1.2) + step * DVec3::new((v % n) as f64, (v / n % n) as f64, (v / n / n) as f64);
+        // Up to its edges the greatest of the distances from the planes is the distance from the box.
+        let value = |v: usize| ((turn.inverse() * (at(v) - shift)).abs() - half).max_element() as f32;
+        let values = Arc::new((0..n * n * n).map(value).collect());
+        let grid = ScalarGrid { size: [n; 3], origin: DVec3::splat(-1.2), spacing: DVec3::splat(step), values };
+        let made =
+            contour::from_grid(&grid, &VolumeParams::default(), 1 << 30, &ContourParams::default(), &Silent).unwrap();
+        let mesh = &made.extracted.mesh;
+        certified("volume", mesh);
+        let planes: Vec<(DVec3, f64)> = [DVec3::X, DVec3::Y, DVec3::Z]
+            .into_iter()
+            .flat_map(|a| [a, -a].map(|n| (turn * n, half.dot(a) + (turn * n).dot(shift))))
+            .collect();
+        let edges: Vec<[DVec3; 2]> = edges_of(&planes).into_iter().map(|e| e.0).collect();
+        assert_eq!(edges.len(), 12);
+        let tagged: Vec<[DVec3; 2]> =
+            made.extracted.tags.edges.iter().map(|e| e.map(|v| mesh.points[v as usize])).collect();
+        for (of, by, k) in [(&edges, &tagged, 0), (&tagged, &edges, 2)] {
+            for &e in of {
+                let [all, good] = covered(e, by, 0.1 * step);
+                sum[k] += all;
+                sum[k + 1] += good;
+            }
+        }
+    }
+    let [length, found, all, good] = sum;
+    assert!(found > 0.97 * length, "{found} of {length} of the edges are tagged");
+    assert!(good > 0.97 * all, "{good} of {all} of the tagged edges are true");
+}
+
+/// A bar of length 1 with a square section of 1, one edge of which is cut off `width` from it, turned.
+fn chamfered(width: f64, turn: glam::DQuat) -> (TriMesh, Vec<[DVec3; 2]>) {
+    let section = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0 - width], [1.0 - width, 1.0], [0.0, 1.0]];
+    let points: Vec<DVec3> =
+        [0.0, 1.0].iter().flat_map(|z| section.iter().map(move |p| turn * DVec3::new(p[0], p[1], *z))).collect();
+    let mut triangles = Vec::new();
+    for k in 0..5u32 {
+        let next = (k + 1) % 5;
+        triangles.extend([[k, next, next + 5], [k, next + 5, k + 5]]);
+    }
+    for k in 1..4 {
+        triangles.extend([[0, k + 1, k], [5, k + 5, k + 6]]);
+    }
+    let lines = [2, 3].map(|k| [points[k], points[k + 5]]);
+    (TriMesh::new(points, triangles), lines.to_vec())
+}
+
+#[test]
+fn two_lines_half_a_cell_apart_are_both_met_within_a_fifth_of_a_cell_over_95_percent_of_their_length() {
+    let (mut near, mut all) = (0, 0);
+    for seed in 0..8 {
+        let r = |k: u64| random::unit(29, 8 * seed + k) - 0.5;
+        let turn = glam::DQuat::from_axis_angle(DVec3::new(r(0), r(1), r(2)).normalize(), std::f64::consts::TAU * r(3));
+        let (mesh, lines) = chamfered(0.5 / 40.0, turn);
+        let made = of_mesh(&mesh, 40);
+        certified("chamfer", &made.extracted.mesh);
+        let tree = Bvh::new(&made.extracted.mesh);
+        for [a, b] in lines {
+            for k in 0..500 {
+                let p = a.lerp(b, (k as f64 + 0.5) / 500.0);
+                near += (tree.closest(p).distance < 0.2 * made.lattice.step.x) as usize;
+                all += 1;
+            }
+        }
+    }
+    assert!(near * 100 > all * 95, "{near} of {all}");
 }
 
 #[test]

@@ -103,11 +103,28 @@ const fn ambiguous() -> [u8; 256] {
 }
 
 /// Loops of one cell, as a chain over its crossed edges.
+#[derive(Clone, Copy)]
 pub struct Chain {
     /// For each crossed edge the edge that follows in its loop.
     pub next: [u8; 12],
     /// The face in which the segment to it lies.
     pub face: [u8; 12],
+}
+
+/// [`chain`] with no faces joined.
+static CHAINS: [Chain; 256] = {
+    let mut table = [chain(0, 0); 256];
+    let mut config = 1;
+    while config < 256 {
+        table[config] = chain(config as u8, 0);
+        config += 1;
+    }
+    table
+};
+
+/// [`chain`], from a table where it can.
+pub fn links(config: u8, joined: u8) -> Chain {
+    if joined == 0 { CHAINS[config as usize] } else { chain(config, joined) }
 }
 
 /// The chain of a pattern of inside corners.

@@ -6,7 +6,7 @@
 
 use super::Thresholds;
 use super::caps::FACE_POINT;
-use super::cell::{AMBIGUOUS, FACE_EDGES, chain};
+use super::cell::{AMBIGUOUS, FACE_EDGES, links};
 use super::patch::{Wish, edge_point, joined};
 use super::walk::Cell;
 use crate::field::{Creases, Directed};
@@ -62,7 +62,7 @@ pub fn face_points<'a>(
         // The three faces at the least node; every face between two cells is one of these.
         let ambiguous = AMBIGUOUS[cell.config as usize];
         let low = ambiguous & 0b010101;
-        let links = chain(cell.config, if low == 0 { 0 } else { joined(field, cell, low) });
+        let links = links(cell.config, if low == 0 { 0 } else { joined(field, cell, low) });
         for axis in 0..3 {
             let face = 2 * axis;
             let mut found: [Option<(FacePoint, Option<DVec3>)>; 2] = [None, None];

@@ -60,6 +60,9 @@ pub fn solve(planes: &[(DVec3, DVec3)], near: DVec3, shape: Shape) -> DVec3 {
             None => groups.push((DVec3::new(d, 0.0, 0.0), n, 1.0)),
         }
     }
+    if let Some(x) = in_closed_form(&groups) {
+        return near + x;
+    }
     let mut a = DMat3::ZERO;
     let mut b = DVec3::ZERO;
     for (sum, n, count) in &groups {
@@ -77,6 +80,15 @@ pub fn solve(planes: &[(DVec3, DVec3)], near: DVec3, shape: Shape) -> DVec3 {
         }
     }
     near + x
+}
+
+/// The nearest point that two planes have in common, where they do not nearly coincide: what the singular values give.
+fn in_closed_form(groups: &[(DVec3, DVec3, f64)]) -> Option<DVec3> {
+    let [(d, m, k), (e, n, l)] = groups else { return None };
+    let (d, e, c) = (d.x / k, e.x / l, m.dot(*n));
+    // Squares of the singular values are 1 + c and 1 - c.
+    let apart = 1.0 - c * c;
+    (apart > RANK).then(|| (*m * (d - c * e) + *n * (e - c * d)) / apart)
 }
 
 /// Eigenvalues, descending, and unit eigenvectors of a symmetric matrix, by Jacobi rotations.

@@ -10,6 +10,10 @@ use glam::DVec3;
 pub const TAKEN: f64 = 1e-6;
 /// An edge follows a line of the source if it is nowhere farther from one, in cells.
 const ALONG: f64 = 0.1;
+/// A line of the source is missed where the mesh is farther from it than this, in cells, and is looked for as far as
+/// that.
+const MISSED: f64 = 0.02;
+const ALONG_SIDE: f64 = 0.75;
 /// Places on an edge at which that is asked.
 const PLACES: [f64; 3] = [0.25, 0.5, 0.75];
 
@@ -140,6 +144,26 @@ pub fn follow(
             kinds[v as usize] = FeatureKind::Edge;
         }
     }
+}
+
+/// Vertices for lines of the source that share the faces of cells with others: a face carries one point. Places where
+/// the mesh passes by become new vertices; returns them.
+pub fn insert_missing(
+    local: &mut Local,
+    lines: &Lines,
+    kinds: &mut Vec<FeatureKind>,
+    crowded: &[(DVec3, [DVec3; 2])],
+    size: f64,
+) -> Vec<u32> {
+    let fixed = |a: u32, b: u32| lines.beside(a).contains(&b);
+    let mut made = Vec::new();
+    for &place in crowded {
+        if let Some(v) = local.insert(place, [MISSED * size, ALONG_SIDE * size], fixed) {
+            kinds.push(FeatureKind::Edge);
+            made.push(v);
+        }
+    }
+    made
 }
 
 /// Joins loose ends of lines with what they end beside: over an edge that is there, or that a flip makes.

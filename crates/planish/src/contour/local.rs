@@ -1,11 +1,13 @@
-//! Local changes of an extracted mesh: vertices moved and merged, each kept only if the mesh stays embedded.
+//! Local changes of an extracted mesh: vertices moved, merged and added ([`insert`]), each kept only if the mesh stays embedded.
 //!
 //! A change is allowed if no triangle that it touches then meets any other triangle in more than they share, by exact
 //! signs; so the certificate of the extraction holds after every step. What may be near is known from the cells: a
 //! triangle that was never touched lies in its cell.
 
+mod insert;
+
 use crate::field::Directed;
-use crate::geom::predicates::triangles_meet;
+use crate::geom::predicates::Walled;
 use crate::mesh::{DEGENERATE_AREA, TriMesh};
 use glam::DVec3;
 
@@ -49,6 +51,8 @@ pub struct Local<'a> {
     /// Triangles that were looked at in the search of this number.
     seen: Vec<u32>,
     search: u32,
+    /// Room for the triangles of a check.
+    own: Vec<Placed>,
     least: f64,
 }
 
@@ -70,19 +74,19 @@ struct Flip {
     after: [[u32; 3]; 2],
 }
 
-/// A triangle with its box.
+/// A changed triangle with its box and what parts it from others.
 struct Placed {
     names: [u32; 3],
     p: [DVec3; 3],
     low: DVec3,
     high: DVec3,
+    walled: Walled,
 }
 
 impl Placed {
-    /// True if two triangles meet in more than they share.
-    fn meets(&self, other: &Placed) -> bool {
-        !(other.low.cmpgt(self.high).any() || other.high.cmplt(self.low).any())
-            && triangles_meet(self.p, self.names, other.p, other.names)
+    /// True if the triangle meets another with this box in more than they share.
+    fn meets(&self, p: [DVec3; 3], names: [u32; 3], [low, high]: [DVec3; 2]) -> bool {
+        !(low.cmpgt(self.high).any() || high.cmplt(self.low).any()) && self.walled.meets(p, names)
     }
 }
 
@@ -135,7 +139,23 @@ impl<'a> Local<'a> {
         }
         let (last, seen) = (vec![0; ny * nz], vec![0; mesh.triangles.len()]);
         let (strays, changes) = (Vec::new(), Vec::new());
-        Local { mesh, field, base, size, cells, rows, which, stars, last, strays, changes, seen, search: 0, least }
+        Local {
+            mesh,
+            field,
+            base,
+            size,
+            cells,
+            rows,
+            which,
+            stars,
+            last,
+            strays,
+            changes,
+            seen,
+            search: 0,
+            own: Vec::new(),
+            least,
+        }
     }
 
     /// Number of changes so far.
@@ -539,29 +559,38 @@ impl<'a> Local<'a> {
 
     /// True if the changed triangles, as they are now, meet nothing and not each other.
     fn is_embedded(&mut self, changed: &[u32]) -> bool {
-        self.search += 1;
-        changed.iter().for_each(|&t| self.seen[t as usize] = self.search);
-        let own: Vec<Placed> = changed.iter().map(|&t| self.placed(t)).collect();
-        // One look at the cells around all of them, unless they reach far.
-        let low = own.iter().fold(DVec3::INFINITY, |low, t| low.min(t.low));
-        let high = own.iter().fold(DVec3::NEG_INFINITY, |high, t| high.max(t.high));
-        let free = if (high - low).cmple(self.field.lattice.step * CLOSE).all() {
-            self.is_free(&own, low, high)
-        } else {
-            own.iter().all(|t| {
-                // What was seen at another triangle has to be seen again.
-                self.search += 1;
-                changed.iter().for_each(|&t| self.seen[t as usize] = self.search);
-                self.is_free(std::slice::from_ref(t), t.low, t.high)
-            })
+        let own = self.placed(changed);
+        let apart = |n: usize, s: &Placed| own[..n].iter().all(|t| !s.meets(t.p, t.names, [t.low, t.high]));
+        let embedded = own.iter().enumerate().all(|(n, s)| apart(n, s)) && {
+            // One look at the cells around all of them, unless they reach far.
+            let [low, high] = bounds(&own);
+            if (high - low).cmple(self.field.lattice.step * CLOSE).all() {
+                self.is_free(&own, low, high)
+            } else {
+                own.iter().all(|t| {
+                    // What was seen at another triangle has to be seen again.
+                    self.search += 1;
+                    changed.iter().for_each(|&t| self.seen[t as usize] = self.search);
+                    self.is_free(std::slice::from_ref(t), t.low, t.high)
+                })
+            }
         };
-        free && own.iter().enumerate().all(|(n, s)| own[..n].iter().all(|t| !s.meets(t)))
+        self.own = own;
+        embedded
     }
 
-    fn placed(&self, t: u32) -> Placed {
-        let names = self.mesh.triangles[t as usize];
-        let p = [self.position(names[0]), self.position(names[1]), self.position(names[2])];
-        Placed { names, p, low: p[0].min(p[1]).min(p[2]), high: p[0].max(p[1]).max(p[2]) }
+    /// The changed triangles as they are now; they count as seen in a new search.
+    fn placed(&mut self, changed: &[u32]) -> Vec<Placed> {
+        self.search += 1;
+        let mut own = std::mem::take(&mut self.own);
+        own.clear();
+        for &t in changed {
+            self.seen[t as usize] = self.search;
+            let (names, p) = (self.mesh.triangles[t as usize], self.mesh.corners(t as usize));
+            let (low, high) = (p[0].min(p[1]).min(p[2]), p[0].max(p[1]).max(p[2]));
+            own.push(Placed { names, p, low, high, walled: Walled::new(p, names) });
+        }
+        own
     }
 
     fn cell(&self, p: DVec3) -> [i64; 3] {
@@ -615,16 +644,14 @@ impl<'a> Local<'a> {
 
     /// Triangles that meet those given.
     fn in_the_way(&mut self, changed: &[u32]) -> Vec<u32> {
-        self.search += 1;
-        changed.iter().for_each(|&t| self.seen[t as usize] = self.search);
-        let own: Vec<Placed> = changed.iter().map(|&t| self.placed(t)).collect();
-        let low = own.iter().fold(DVec3::INFINITY, |low, t| low.min(t.low));
-        let high = own.iter().fold(DVec3::NEG_INFINITY, |high, t| high.max(t.high));
+        let own = self.placed(changed);
+        let [low, high] = bounds(&own);
         let mut found = Vec::new();
         self.search(&own, low, high, |t| {
             found.push(t);
             false
         });
+        self.own = own;
         found
     }
 
@@ -666,7 +693,15 @@ impl<'a> Local<'a> {
         {
             return false;
         }
-        let other = self.placed(t);
-        !(other.low.cmpgt(high).any() || other.high.cmplt(low).any()) && own.iter().any(|s| s.meets(&other))
+        let p = self.mesh.corners(t as usize);
+        let other = [p[0].min(p[1]).min(p[2]), p[0].max(p[1]).max(p[2])];
+        !(other[0].cmpgt(high).any() || other[1].cmplt(low).any())
+            && own.iter().any(|s| s.meets(p, self.mesh.triangles[t as usize], other))
     }
+}
+
+/// The box of triangles.
+fn bounds(own: &[Placed]) -> [DVec3; 2] {
+    let low = own.iter().fold(DVec3::INFINITY, |low, t| low.min(t.low));
+    [low, own.iter().fold(DVec3::NEG_INFINITY, |high, t| high.max(t.high))]
 }

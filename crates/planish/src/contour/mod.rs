@@ -245,11 +245,13 @@ pub fn extract(
         }
         cells
     };
+    let vertices = mesh.points.len();
     let polished =
         polish::polish(&mut mesh, field, base, cells, &wishes, creases, &mut kinds, &mut edges, limits.sharp);
     (counts.moved, counts.kept) = (polished.moved, polished.kept);
-    // Every hit is a vertex, but at the rim of what is known, in larger cells, and where vertices were merged.
-    let complete = !field.sides.unknown && octree.is_none() && mesh.triangles.len() == count;
+    // Every hit is a vertex, but at the rim of what is known, in larger cells, and where vertices were merged or added.
+    let unchanged = mesh.triangles.len() == count && mesh.points.len() == vertices;
+    let complete = !field.sides.unknown && octree.is_none() && unchanged;
     let mut extracted = Extracted { mesh, tags: tags(kinds, edges), counts };
     if !complete {
         drop_unused(&mut extracted);

@@ -7,7 +7,7 @@
 //! too, its fan is embedded like any other.
 
 use super::caps::Corner;
-use super::cell::{AMBIGUOUS, CROSSED, chain};
+use super::cell::{AMBIGUOUS, CROSSED, links};
 use super::patch::{self, Inner, Sheet};
 use super::walk::Cell;
 use crate::field::Directed;
@@ -43,7 +43,7 @@ pub fn candidate(cell: &Cell, base: [u32; 3]) -> Candidate {
     if AMBIGUOUS[cell.config as usize] != 0 {
         return (at, None);
     }
-    let links = chain(cell.config, 0);
+    let links = links(cell.config, 0);
     let crossed = CROSSED[cell.config as usize];
     let mut faces = [None; 6];
     let first = crossed.trailing_zeros() as usize;

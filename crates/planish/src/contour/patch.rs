@@ -8,7 +8,7 @@
 
 use super::Thresholds;
 use super::caps::{self, Corner, FACE_POINT};
-use super::cell::{AMBIGUOUS, CROSSED, EDGE_FACES, EDGES, chain, joined_by_hits, joined_by_values};
+use super::cell::{AMBIGUOUS, CROSSED, EDGE_FACES, EDGES, joined_by_hits, joined_by_values, links};
 use super::face::FacePoints;
 use super::feature::{Shape, classify, solve};
 use super::local::CellRange;
@@ -157,7 +157,7 @@ impl Patcher<'_> {
         scratch.ends.clear();
         let ambiguous = AMBIGUOUS[cell.config as usize];
         let joined = if ambiguous == 0 { 0 } else { joined(self.field, cell, ambiguous) };
-        let chain = chain(cell.config, joined);
+        let chain = links(cell.config, joined);
         let mut rest = CROSSED[cell.config as usize];
         while rest != 0 {
             let first = rest.trailing_zeros() as usize;

@@ -7,10 +7,11 @@
 //! Each step is kept only if the mesh stays embedded ([`Local`]), so the certificate holds.
 //!
 //! 1. corners of the source that no vertex took     2. vertices that were clamped: together, one by one, merged
-//! 3. what is left: a part of the way     4. lines that follow those of the source, loose ends joined ([`super::lines`])
+//! 3. what is left: a part of the way     4. lines that follow those of the source, with new vertices where one was
+//!    missed, loose ends joined ([`super::lines`])
 //! 5. triangles without area: merged away
 
-use super::lines::{Lines, TAKEN, follow, join_ends};
+use super::lines::{Lines, TAKEN, follow, insert_missing, join_ends};
 use super::local::{CellRange, GONE, Local};
 use super::patch::Wish;
 use crate::field::{Creases, Directed};
@@ -50,7 +51,7 @@ pub fn polish(
     cells: impl FnOnce() -> Vec<CellRange>,
     wishes: &[Wish],
     creases: Option<&dyn Creases>,
-    kinds: &mut [FeatureKind],
+    kinds: &mut Vec<FeatureKind>,
     edges: &mut Vec<[u32; 2]>,
     sharp: f64,
 ) -> Polished {
@@ -62,14 +63,17 @@ pub fn polish(
     let mut seeds: Vec<u32> = wishes.iter().map(|w| w.0).collect();
     seeds.extend(calls.iter().flat_map(|c| &c.1));
     seeds.extend(thin.iter().flat_map(|&t| mesh.triangles[t as usize]));
-    if !untaken.is_empty() {
-        // Any vertex near by may be needed there.
-        let tree = KdTree::new(&untaken);
-        let mut found = Vec::new();
-        let mut near = |p: &DVec3| {
-            tree.nearest_within(*p, 1, size, &mut found);
-            !found.is_empty()
-        };
+    let crowded = creases.map(|c| c.crowded()).unwrap_or_default();
+    let places: Vec<DVec3> = untaken.iter().copied().chain(crowded.iter().map(|c| c.0)).collect();
+    if !places.is_empty() {
+        // Any vertex near by may be needed there. Corners by layers of their size: most vertices are near none.
+        let layer = |p: &DVec3| ((p.z - field.lattice.origin.z) / size).floor().max(0.0) as usize;
+        let mut layers: Vec<Vec<DVec3>> = vec![Vec::new(); places.iter().map(layer).max().unwrap_or(0) + 2];
+        for p in &places {
+            let at = layer(p);
+            layers[at.saturating_sub(1)..=at + 1].iter_mut().for_each(|layer| layer.push(*p));
+        }
+        let near = |p: &DVec3| layers.get(layer(p)).is_some_and(|l| l.iter().any(|c| c.distance(*p) < size));
         seeds.extend((0..mesh.points.len()).filter(|&v| near(&mesh.points[v])).map(|v| v as u32));
     }
     let mut lines = Lines::new(edges);
@@ -133,6 +137,7 @@ pub fn polish(
     let kept = open.len();
     gather(&mut local, &mut lines, kinds, &corners, size);
     if let Some(creases) = creases.filter(|c| !c.corners().is_empty()) {
+        came.extend(insert_missing(&mut local, &lines, kinds, &crowded, size));
         follow(&mut local, &mut lines, kinds, creases, &corners, &came, size, sharp);
     }
     join_ends(&mut local, &mut lines, kinds, sharp);

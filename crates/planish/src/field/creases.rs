@@ -5,10 +5,11 @@
 //! kept by plane and cell.
 
 use super::{Creases, Lattice};
-use crate::geom::Bvh;
+use crate::geom::{Bvh, KdTree};
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 /// Sharp edges of one mesh on one lattice.
@@ -23,6 +24,8 @@ pub struct MeshCreases {
     /// The same of all edges that bend, and the vertices where they meet, sorted by cell.
     bends: Option<Bvh>,
     knots: Vec<([i64; 3], DVec3)>,
+    /// Places where lines share faces of cells, with the normals beside them.
+    crowded: Vec<(DVec3, [DVec3; 2])>,
 }
 
 #[derive(Clone, Copy)]
@@ -34,6 +37,8 @@ struct Cut {
     normals: [DVec3; 2],
     /// False for a bend that is no feature.
     tagged: bool,
+    /// Edge of the mesh: one of its two half-edges.
+    edge: u32,
 }
 
 /// A sharp line that turns by more than this at a vertex has a corner there (cosine of 35 degrees).
@@ -50,6 +55,10 @@ const FAINT_AGREE: f64 = 0.95;
 /// Normals of the hits and of the faces beside the edge agree if their cosine is above this: facets of curved surfaces
 /// turn within a cell.
 const AGREE: f64 = 0.75;
+/// Around a face that several lines pass, they are told apart within this distance, in cells.
+const CROWD: f64 = 2.0;
+/// Cuts of one edge that are farther apart than this, in cells, have another place between them.
+const HALF: f64 = 0.5;
 /// The lines are followed within this distance of the guess, in cells.
 const REACH: f64 = 0.9;
 
@@ -88,12 +97,12 @@ impl MeshCreases {
         let ends = |h: u32| [mesh.origin(h), mesh.origin(next(h))];
         for &h in &sharp_edges {
             edges.push(ends(h));
-            cut(mesh, ends(h), normals(h), true, lattice, &mut cuts);
+            cut(mesh, h, normals(h), true, lattice, &mut cuts);
         }
         let mut bent = edges.clone();
         for &(_, h) in &faint_edges {
             bent.push(ends(h));
-            cut(mesh, ends(h), normals(h), false, lattice, &mut cuts);
+            cut(mesh, h, normals(h), false, lattice, &mut cuts);
         }
         for list in &mut cuts {
             list.sort_by(|a, b| {
@@ -115,8 +124,45 @@ impl MeshCreases {
         let corners_of_lines = by_cell(corners(mesh, &edges));
         let knots = by_cell(corners(mesh, &bent));
         let (lines, bends) = (tree(&edges), tree(&bent));
-        MeshCreases { lattice: *lattice, cuts, corners: corners_of_lines, lines, bends, knots }
+        let crowded = crowded(mesh, lattice, &cuts);
+        MeshCreases { lattice: *lattice, cuts, corners: corners_of_lines, lines, bends, knots, crowded }
     }
+}
+
+/// Where two lines pass one face, places on all lines around with the normals beside them. Lines of edges shorter than a
+/// cell turn too much within it, and where more than two pass, a smaller voxel is the way.
+fn crowded(mesh: &TriMesh, lattice: &Lattice, cuts: &[Vec<Cut>; 3]) -> Vec<(DVec3, [DVec3; 2])> {
+    let size = lattice.step.max_element();
+    let ends = |h: u32| [mesh.origin(h), mesh.origin(next(h))].map(|v| mesh.points[v as usize]);
+    let is_long = |c: &Cut| {
+        let [a, b] = ends(c.edge);
+        a.distance(b) > size
+    };
+    let faces = cuts.iter().flat_map(|cuts| cuts.chunk_by(|a, b| a.key == b.key));
+    let lines = |face: &&[Cut]| {
+        let mut lines = face.iter().filter(|c| c.tagged);
+        lines.clone().count() == 2 && lines.all(is_long)
+    };
+    let shared: Vec<DVec3> = faces.filter(lines).flatten().map(|c| c.p).collect();
+    if shared.is_empty() {
+        return Vec::new();
+    }
+    let tree = KdTree::new(&shared);
+    let mut found = Vec::new();
+    let mut near = |p: DVec3| {
+        tree.nearest_within(p, 1, CROWD * size, &mut found);
+        !found.is_empty()
+    };
+    let mut all: Vec<&Cut> = cuts.iter().flatten().filter(|c| c.tagged && near(c.p)).collect();
+    // And half way between two of one edge: cells are longer across.
+    let order = |a: &Cut, b: &Cut| a.p.to_array().partial_cmp(&b.p.to_array()).unwrap_or(Ordering::Equal);
+    all.sort_by(|a, b| a.edge.cmp(&b.edge).then_with(|| order(a, b)));
+    let halves: Vec<_> = all
+        .windows(2)
+        .filter(|c| c[0].edge == c[1].edge && c[0].p.distance(c[1].p) > HALF * size)
+        .map(|c| ((c[0].p + c[1].p) / 2.0, c[0].normals))
+        .collect();
+    all.iter().map(|c| (c.p, c.normals)).chain(halves).collect()
 }
 
 /// Adds to lines that end the faint edge that goes on most nearly straight and is the sharpest, again and again.
@@ -163,8 +209,8 @@ fn cell_of(lattice: &Lattice, p: DVec3) -> [i64; 3] {
 }
 
 /// Cuts an edge with all planes between its ends.
-fn cut(mesh: &TriMesh, ends: [u32; 2], normals: [DVec3; 2], tagged: bool, lattice: &Lattice, cuts: &mut [Vec<Cut>; 3]) {
-    let [a, b] = ends.map(|v| mesh.points[v as usize]);
+fn cut(mesh: &TriMesh, edge: u32, normals: [DVec3; 2], tagged: bool, lattice: &Lattice, cuts: &mut [Vec<Cut>; 3]) {
+    let [a, b] = [mesh.origin(edge), mesh.origin(next(edge))].map(|v| mesh.points[v as usize]);
     for axis in 0..3 {
         let (low, high) = (a[axis].min(b[axis]), a[axis].max(b[axis]));
         let to_plane = |x: f64| (x - lattice.origin[axis]) / lattice.step[axis];
@@ -175,7 +221,7 @@ fn cut(mesh: &TriMesh, ends: [u32; 2], normals: [DVec3; 2], tagged: bool, lattic
             let s = if high > low { ((level - a[axis]) / (b[axis] - a[axis])).clamp(0.0, 1.0) } else { 0.5 };
             let mut p = a.lerp(b, s);
             p[axis] = level;
-            cuts[axis].push(Cut { key: key(lattice, axis, plane as i64, p), p, normals, tagged });
+            cuts[axis].push(Cut { key: key(lattice, axis, plane as i64, p), p, normals, tagged, edge });
             plane += 1.0;
         }
     }
@@ -295,5 +341,9 @@ impl Creases for MeshCreases {
 
     fn corners(&self) -> Vec<DVec3> {
         self.corners.iter().map(|c| c.1).collect()
+    }
+
+    fn crowded(&self) -> Vec<(DVec3, [DVec3; 2])> {
+        self.crowded.clone()
     }
 }

@@ -1,13 +1,15 @@
 //! Scalar grids (volume images) as directed fields.
 //!
 //! [K01] §4.1: hits by linear interpolation along the edges, exactly where the trilinear interpolant passes them.
-//! Gradients by one of the paper's two estimates; the first keeps features sharper, the second is smoother.
+//! Gradients by one of the paper's two estimates; the first keeps features sharper, the second is smoother. Departs from
+//! [K01]: both blend what lies on the two sides of a sharp edge; hits and gradients there come from one of them ([`kink`](super)).
 //!
 //! The numbers are read once, from where they are: a slab of planes at a time, every row as words of 64 signs. Edges that
 //! change side are the bits in which two words differ (in the spirit of flying edges, Schroeder et al. 2015), and their
 //! hits are made while the planes around them are still in the cache.
 
 use super::directed::{self, Directed, Hit, Hits, Sides, Thin};
+use super::kink::{Around, is_bent};
 use super::{FieldError, Lattice};
 use crate::observe::Observer;
 use glam::DVec3;
@@ -33,8 +35,10 @@ pub struct ScalarGrid {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum GradientRule {
-    /// Of the trilinear interpolant: the exact difference along the edge
+    /// As trilinear, but beside sharp edges from the side on which the numbers go on straight; hits, too
     #[default]
+    OneSided,
+    /// Of the trilinear interpolant: the exact difference along the edge
     Trilinear,
     /// Central differences at the nodes, interpolated: smoother
     Central,
@@ -67,7 +71,7 @@ pub struct GridParams {
 
 impl Default for GridParams {
     fn default() -> Self {
-        GridParams { iso: 0.0, body: Body::Below, gradient: GradientRule::Trilinear, close: true }
+        GridParams { iso: 0.0, body: Body::Below, gradient: GradientRule::OneSided, close: true }
     }
 }
 
@@ -278,7 +282,8 @@ impl Slabs<'_> {
 }
 
 fn hit(levels: &Levels, lattice: &Lattice, axis: usize, at: [usize; 3], rule: GradientRule) -> Hit {
-    if let Some(hit) = (rule == GradientRule::Trilinear).then(|| inner_hit(levels, lattice, axis, at)).flatten() {
+    let central = rule == GradientRule::Central;
+    if let Some(hit) = (!central).then(|| inner_hit(levels, lattice, axis, at, rule)).flatten() {
         return hit;
     }
     let mut end = at;
@@ -287,7 +292,7 @@ fn hit(levels: &Levels, lattice: &Lattice, axis: usize, at: [usize; 3], rule: Gr
     let (f0, f1) = (get(at), get(end));
     let t = f0 / (f0 - f1);
     // Central differences at a node, one-sided at the border and beside what is not known.
-    let central = |p: [usize; 3], a: usize| {
+    let difference = |p: [usize; 3], a: usize| {
         let (mut low, mut high) = (p, p);
         low[a] = p[a].saturating_sub(1);
         high[a] = (p[a] + 1).min(lattice.cells[a]);
@@ -300,10 +305,10 @@ fn hit(levels: &Levels, lattice: &Lattice, axis: usize, at: [usize; 3], rule: Gr
     };
     let mut normal = DVec3::ZERO;
     for a in 0..3 {
-        normal[a] = if a == axis && rule == GradientRule::Trilinear {
+        normal[a] = if a == axis && !central {
             (f1 - f0) / lattice.step[a]
         } else {
-            central(at, a) * (1.0 - t) + central(end, a) * t
+            difference(at, a) * (1.0 - t) + difference(end, a) * t
         };
     }
     let mut fallback = DVec3::ZERO;
@@ -311,28 +316,41 @@ fn hit(levels: &Levels, lattice: &Lattice, axis: usize, at: [usize; 3], rule: Gr
     Hit { t: directed::clear(t), normal: normal.try_normalize().unwrap_or(fallback) }
 }
 
-/// [`hit`] by the trilinear rule on an edge with known samples all around: the same numbers by fewer steps.
-fn inner_hit(levels: &Levels, lattice: &Lattice, axis: usize, at: [usize; 3]) -> Option<Hit> {
+/// [`hit`] by the trilinear rule on an edge with known samples all around: the same numbers by fewer steps. Beside a kink
+/// by the one-sided rule, if there are samples for two steps all around.
+fn inner_hit(levels: &Levels, lattice: &Lattice, axis: usize, at: [usize; 3], rule: GradientRule) -> Option<Hit> {
     let size = levels.size;
-    for a in 0..3 {
-        if at[a] < 1 + levels.pad || at[a] + 2 + levels.pad + (a == axis) as usize > size[a] + 2 * levels.pad {
-            return None;
-        }
+    let has = |steps: usize| {
+        let beyond = |a: usize| at[a] + 1 + steps + levels.pad + (a == axis) as usize;
+        (0..3).all(|a| at[a] >= steps + levels.pad && beyond(a) <= size[a] + 2 * levels.pad)
+    };
+    if !has(1) {
+        return None;
     }
-    let step = [1, size[0], size[0] * size[1]];
-    let low = (at[2] - levels.pad) * step[2] + (at[1] - levels.pad) * step[1] + at[0] - levels.pad;
-    let high = low + step[axis];
+    let stride = [1, size[0], size[0] * size[1]];
+    let low = (at[2] - levels.pad) * stride[2] + (at[1] - levels.pad) * stride[1] + at[0] - levels.pad;
+    let high = low + stride[axis];
     let get = |n: usize| levels.level(levels.values[n]) as f64;
     let (f0, f1) = (get(low), get(high));
     let t = f0 / (f0 - f1);
     let mut normal = DVec3::ZERO;
     normal[axis] = (f1 - f0) / lattice.step[axis];
-    for a in [(axis + 1) % 3, (axis + 2) % 3] {
-        let central = |n: usize| (get(n + step[a]) - get(n - step[a])) / (2.0 * lattice.step[a]);
-        normal[a] = central(low) * (1.0 - t) + central(high) * t;
-    }
+    let beside = [(axis + 1) % 3, (axis + 2) % 3].map(|a| {
+        let [below, above] = [[low, high].map(|n| get(n - stride[a])), [low, high].map(|n| get(n + stride[a]))];
+        let central = |k: usize| (above[k] - below[k]) / (2.0 * lattice.step[a]);
+        normal[a] = central(0) * (1.0 - t) + central(1) * t;
+        (a, below, above)
+    });
     if normal.is_nan() {
         return None;
+    }
+    let length = normal.length();
+    let bent = |(a, below, above): &(usize, [f64; 2], [f64; 2])| is_bent(*below, *above, t, length * lattice.step[*a]);
+    if rule == GradientRule::OneSided && beside.iter().any(bent) && has(2) {
+        let (t, gradient) = Around { get: &get, ends: [low, high], stride, step: lattice.step, axis }.hit();
+        if let Some(normal) = gradient.try_normalize() {
+            return Some(Hit { t: directed::clear(t), normal });
+        }
     }
     Some(Hit { t: directed::clear(t), normal: normal.try_normalize()? })
 }

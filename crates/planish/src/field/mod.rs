@@ -20,6 +20,7 @@ mod creases;
 pub mod csg;
 pub mod directed;
 mod grid_field;
+mod kink;
 mod lattice;
 mod mesh_field;
 mod part;
@@ -206,6 +207,12 @@ pub trait Creases: Sync {
 
     /// The corners that are known, where features meet, bend or end; none where the source cannot list them.
     fn corners(&self) -> Vec<DVec3> {
+        Vec::new()
+    }
+
+    /// Where two features pass one face of a cell, which has one point for them: places on both and around, each with the
+    /// normals of both sides, where the source can list them.
+    fn crowded(&self) -> Vec<(DVec3, [DVec3; 2])> {
         Vec::new()
     }
 }

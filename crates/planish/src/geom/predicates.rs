@@ -28,20 +28,12 @@ pub fn orient3d(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
 /// common name any common point beside that corner, with two any common point beside that edge. Two triangles of the
 /// same three names always meet.
 pub fn triangles_meet(p: [DVec3; 3], p_names: [u32; 3], q: [DVec3; 3], q_names: [u32; 3]) -> bool {
-    let mut shared = [(0, 0); 3];
-    let mut count = 0;
-    for (i, a) in p_names.iter().enumerate() {
-        if let Some(j) = q_names.iter().position(|b| a == b) {
-            shared[count] = (i, j);
-            count += 1;
-        }
-    }
-    let bits = |of: fn((usize, usize)) -> usize| shared[..count].iter().fold(0, |bits, &s| bits | 1 << of(s));
-    let (of_p, of_q) = (bits(|s| s.0), bits(|s| s.1));
-    if count < 3 && (is_clearly_apart(p, q, of_p, of_q) || is_clearly_apart(q, p, of_q, of_p)) {
+    let shared = Shared::new(p_names, q_names);
+    let Shared { of_p, of_q, .. } = shared;
+    if shared.count < 3 && (is_clearly_apart(p, q, of_p, of_q) || is_clearly_apart(q, p, of_q, of_p)) {
         return false;
     }
-    meets_exactly(p, q, &shared[..count])
+    meets_exactly(p, q, &shared.pairs[..shared.count])
 }
 
 /// [`triangles_meet`] by exact signs alone.
@@ -74,30 +66,104 @@ const TRIPLE: f64 = 64.0 * f64::EPSILON;
 /// What may be lost where products fall below all numbers.
 const TINY: f64 = 1e-280;
 
+/// Normal of a plane with the size of its rounding: that of a sum of products of differences from a point of the plane.
+#[derive(Clone, Copy, Debug)]
+struct Plane {
+    normal: DVec3,
+    size: f64,
+}
+
+impl Plane {
+    fn new(a: DVec3, b: DVec3) -> Plane {
+        Plane { normal: a.cross(b), size: TRIPLE * a.abs().max_element() * b.abs().max_element() }
+    }
+
+    /// The side on which `d` lies, if it is certain, else 0.
+    fn side(&self, d: DVec3) -> i32 {
+        let (s, bound) = (self.normal.dot(d), self.size * d.abs().max_element() + TINY);
+        (s > bound) as i32 - (s < -bound) as i32
+    }
+}
+
+/// A triangle with its plane and those through its edges along its normal. Most other triangles are told apart from it
+/// by one of them, without exact arithmetic.
+#[derive(Clone, Copy, Debug)]
+pub struct Walled {
+    p: [DVec3; 3],
+    names: [u32; 3],
+    own: Plane,
+    /// Through the edge from corner k to the next; `None` if it is not certain that the third corner lies inside.
+    walls: [Option<Plane>; 3],
+}
+
+impl Walled {
+    /// The triangle with corners `p` of these names.
+    pub fn new(p: [DVec3; 3], names: [u32; 3]) -> Walled {
+        let own = Plane::new(p[1] - p[0], p[2] - p[0]);
+        let walls = [0, 1, 2].map(|k| {
+            let wall = Plane::new(p[(k + 1) % 3] - p[k], own.normal);
+            (wall.side(p[(k + 2) % 3] - p[k]) == -1).then_some(wall)
+        });
+        Walled { p, names, own, walls }
+    }
+
+    /// [`triangles_meet`] of this one and another.
+    pub fn meets(&self, q: [DVec3; 3], q_names: [u32; 3]) -> bool {
+        let shared = Shared::new(self.names, q_names);
+        if shared.count < 3 && (self.parts(q, &shared) || is_clearly_apart(q, self.p, shared.of_q, shared.of_p)) {
+            return false;
+        }
+        meets_exactly(self.p, q, &shared.pairs[..shared.count])
+    }
+
+    /// [`is_clearly_apart`].
+    fn parts(&self, q: [DVec3; 3], shared: &Shared) -> bool {
+        let own = |k: &usize| shared.of_q >> k & 1 == 0;
+        let sides: i32 = (0..3).filter(own).map(|k| self.own.side(q[k] - self.p[0])).sum();
+        let on_edge = |k: usize| shared.of_p >> ((k + 2) % 3) & 1 == 0;
+        sides.unsigned_abs() as usize == 3 - shared.count
+            || (0..3).any(|k| match &self.walls[k] {
+                Some(wall) => on_edge(k) && (0..3).filter(own).all(|j| wall.side(q[j] - self.p[k]) == 1),
+                None => false,
+            })
+    }
+}
+
+/// What two triangles have in common.
+struct Shared {
+    /// Corners of the first with those of the second that have their names.
+    pairs: [(usize, usize); 3],
+    count: usize,
+    /// Bits of the corners of each.
+    of_p: u32,
+    of_q: u32,
+}
+
+impl Shared {
+    fn new(p: [u32; 3], q: [u32; 3]) -> Shared {
+        let mut shared = Shared { pairs: [(0, 0); 3], count: 0, of_p: 0, of_q: 0 };
+        for (i, a) in p.iter().enumerate() {
+            if let Some(j) = q.iter().position(|b| a == b) {
+                shared.pairs[shared.count] = (i, j);
+                shared.count += 1;
+                shared.of_p |= 1 << i;
+                shared.of_q |= 1 << j;
+            }
+        }
+        shared
+    }
+}
+
 /// True if a plane certainly parts two triangles but for the corners that they share: the plane of `p`, or one through
-/// an edge of `p` along its normal. Most pairs are told apart by this, without exact arithmetic.
+/// an edge of `p` along its normal.
 /// * `of_p`, `of_q` - bits of the corners that the other one has, too
 fn is_clearly_apart(p: [DVec3; 3], q: [DVec3; 3], of_p: u32, of_q: u32) -> bool {
-    let size = |d: DVec3| d.abs().max_element();
-    // The sign of <m, d> where m = a x b, if it is certain, else 0.
-    let side = |m: DVec3, ab: f64, d: DVec3| {
-        let (s, bound) = (m.dot(d), TRIPLE * ab * size(d) + TINY);
-        if s > bound {
-            1
-        } else if s < -bound {
-            -1
-        } else {
-            0
-        }
-    };
-    let (a, b) = (p[1] - p[0], p[2] - p[0]);
-    let n = a.cross(b);
+    let plane = Plane::new(p[1] - p[0], p[2] - p[0]);
     let own = |k: &usize| of_q >> k & 1 == 0;
-    let ab = size(a) * size(b);
     let (mut all, mut sides) = (0, 0);
     for k in (0..3).filter(own) {
         all += 1;
-        sides += side(n, ab, q[k] - p[0]);
+        sides += plane.side(q[k] - p[0]);
     }
     if i32::abs(sides) == all {
         return true;
@@ -107,9 +173,8 @@ fn is_clearly_apart(p: [DVec3; 3], q: [DVec3; 3], of_p: u32, of_q: u32) -> bool 
         if of_p >> ((k + 2) % 3) & 1 != 0 {
             return false;
         }
-        let e = p[(k + 1) % 3] - p[k];
-        let (m, en) = (e.cross(n), size(e) * size(n));
-        side(m, en, p[(k + 2) % 3] - p[k]) == -1 && (0..3).filter(own).all(|j| side(m, en, q[j] - p[k]) == 1)
+        let wall = Plane::new(p[(k + 1) % 3] - p[k], plane.normal);
+        wall.side(p[(k + 2) % 3] - p[k]) == -1 && (0..3).filter(own).all(|j| wall.side(q[j] - p[k]) == 1)
     })
 }
 
@@ -264,6 +329,7 @@ mod tests {
             }
             let exact = meets_exactly(p, q, &shared);
             assert_eq!(triangles_meet(p, [0, 1, 2], q, names), exact, "{n}: {p:?} {q:?} {names:?}");
+            assert_eq!(Walled::new(p, [0, 1, 2]).meets(q, names), exact, "{n}: {p:?} {q:?} {names:?}");
             (apart, meet) = (apart + !exact as u32, meet + exact as u32);
         }
         assert!(apart > 100_000 && meet > 30_000, "{apart} {meet}");
