@@ -36,8 +36,8 @@ const AWAY: f64 = 0.25;
 const BIAS: f64 = 0.5;
 /// Points of a cell at most: these many tell the sheets apart.
 const ENOUGH: usize = 200;
-/// And at most of the widest ball that sheets are fitted again to: they leave less than a tenth of the noise to chance.
-const PLENTY: usize = 1500;
+/// And at most of the widest ball that sheets are fitted again to: they leave a tenth of the noise to chance.
+const PLENTY: usize = 1000;
 /// Candidates at most.
 const ASKED: usize = 16;
 /// A cell with one sheet is taken as it is if its points cost at most this much each, in squared noise levels, and what

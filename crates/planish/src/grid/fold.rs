@@ -9,7 +9,6 @@ use super::Fault;
 use super::locate::Spot;
 use super::net::{Net, cell_corners, turns_over};
 use glam::DVec3;
-use std::collections::BTreeMap;
 
 /// Cells to each side over which the normal is averaged.
 const REACH: usize = 2;
@@ -132,8 +131,8 @@ pub fn open_folds(net: &mut Net, strictly: bool, cancelled: &(dyn Fn() -> bool +
 /// The points around folded cells, and how their cells are to be.
 struct Region {
     nodes: Vec<usize>,
-    /// For each cell of the net around a node the normal that it is seen along.
-    normals: BTreeMap<usize, DVec3>,
+    /// For each cell of the net the normal that it is seen along, if it is around a node.
+    normals: Vec<DVec3>,
     /// Mean lengths of the edges along u and v: a cell is to have these.
     size: [f64; 2],
     /// What an area that is not positive is taken for, over that of such a cell.
@@ -162,14 +161,17 @@ impl Region {
             let flat = sheet.least_sine(c, [around; 2]) >= sheet.least_sine(c, [own; 2]);
             if flat { around } else { own }
         };
-        let cells = nodes.iter().flat_map(|&k| cells_around(cols, k));
-        let normals = cells.map(|c| (c, better(c))).collect();
+        let mut cells: Vec<usize> = nodes.iter().flat_map(|&k| cells_around(cols, k)).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        let mut normals = vec![DVec3::ZERO; (cols - 1) * (rows - 1)];
+        cells.iter().for_each(|&c| normals[c] = better(c));
         let mean = |stride: usize| {
             let lengths = nodes.iter().map(|&k| net.points[k].distance(net.points[k + stride]));
             (lengths.sum::<f64>() / nodes.len() as f64).max(f64::MIN_POSITIVE)
         };
         let mut region = Region { size: [mean(1), mean(cols)], nodes, normals, least: 0.0 };
-        let corners = region.normals.keys().flat_map(|&c| (0..4).map(move |k| (c, k)));
+        let corners = cells.iter().flat_map(|&c| (0..4).map(move |k| (c, k)));
         let worst = corners.filter_map(|(c, k)| region.corner(net, c, k)).map(|x| x.1).fold(0.0, f64::min);
         region.least = LEAST_AREA.hypot(worst * FOLDED_SHARE);
         region
@@ -185,7 +187,7 @@ impl Region {
         let at = |n: usize| net.points[q[n % 4]];
         let (e, f) = (at(k + 1) - at(k), at(k + 3) - at(k));
         let [a, b] = [self.size[k % 2], self.size[(k + 1) % 2]];
-        Some((e.length_squared() / (a * a) + f.length_squared() / (b * b), e.cross(f).dot(self.normals[&c]) / (a * b)))
+        Some((e.length_squared() / (a * a) + f.length_squared() / (b * b), e.cross(f).dot(self.normals[c]) / (a * b)))
     }
 
     /// Energy of the corners that the place of inner point `k` decides.
@@ -196,7 +198,7 @@ impl Region {
             let own = [2, 3, 1, 0][n];
             for corner in (0..4).filter(|&x| x != (own + 2) % 4) {
                 if let Some((squares, area)) = self.corner(net, c, corner) {
-                    sum += squares / (area + area.hypot(self.least));
+                    sum += squares / (area + (area * area + self.least * self.least).sqrt());
                 }
             }
         }
