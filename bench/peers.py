@@ -7,7 +7,7 @@
 Points lie evenly by area, with normal noise in three directions, in percent of the diagonal. Every chain is a process
 of its own; its CPU seconds are those from points in memory to a mesh (of planish: with reading and writing). Distances both
 ways in percent of the diagonal, angles in degrees; the zone is within 1 % of a true edge above 40 degrees. Chains of the
-others: normals from 30 neighbours, then what is named, with the settings that did best on a fandisk.
+others: normals from 30 neighbours (MeshLib's own by radius), then what is named, with one setting for all noise.
 """
 import argparse
 import importlib
