@@ -198,3 +198,54 @@ fn an_e57_grid_without_a_pose_was_seen_from_its_origin_and_a_heap_of_points_from
         assert_eq!(seen, if grid { vec![DVec3::ZERO] } else { vec![] });
     }
 }
+
+/// A view of four points, the last at z 2.
+const VIEW: &str = "ply\nformat ascii 1.0\nobj_info num_cols 2\nelement vertex 4\nproperty float x\nproperty float y\n\
+    property float z\nproperty float confidence\nelement range_grid 1\nproperty list uchar int vertex_indices\nend_header\n\
+    0 0 0 .5\n1 0 0 .5\n0 1 0 .5\n0 0 2 .5\n1 0\n";
+
+#[test]
+fn views_with_poses_become_one_scan_with_a_scanner_each() {
+    let folder = folder();
+    std::fs::write(folder.path().join("a.ply"), VIEW).unwrap();
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    std::io::Write::write_all(&mut packed, VIEW.as_bytes()).unwrap();
+    std::fs::write(folder.path().join("b.ply.gz"), packed.finish().unwrap()).unwrap();
+    // The second view was taken a quarter turn about y: its z axis is x of the scan. The quaternion is the inverse.
+    let half = 0.5f64.sqrt();
+    let conf = format!(
+        "camera 0 0 1\nmesh none 0 0 0 0 0 0 1\nbmesh a.ply 0 0 0 0 0 0 1\nbmesh b.ply 1 0 0 0 {} 0 {half}\n",
+        -half
+    );
+    let path = folder.path().join("all.conf");
+    std::fs::write(&path, conf).unwrap();
+    assert!(is_scan(&path));
+    let scan = read(&path).unwrap();
+    assert_eq!(scan.seen_by, [0, 0, 0, 0, 1, 1, 1, 1]);
+    assert!((scan.points[3] - DVec3::new(0.0, 0.0, 2.0)).length() < 1e-12);
+    assert!((scan.points[7] - DVec3::new(3.0, 0.0, 0.0)).length() < 1e-12, "{}", scan.points[7]);
+    assert!(scan.scanners[0].z > 10.0 && scan.scanners[1].x > 10.0, "{:?}", scan.scanners);
+    assert_eq!(scan.attribute("confidence", 1).unwrap().values, [0.5; 8]);
+}
+
+#[test]
+fn wrong_sets_of_views_are_told_with_the_line() {
+    let folder = folder();
+    std::fs::write(folder.path().join("a.ply"), VIEW).unwrap();
+    std::fs::write(folder.path().join("cut.ply"), &VIEW[..VIEW.len() - 20]).unwrap();
+    let path = folder.path().join("all.conf");
+    for (conf, told) in [
+        ("", "the file is empty"),
+        ("camera 0 0 1\n", "no line names a view"),
+        ("bmesh a.ply 0 0 0 0 0 0 1\nbmesh b.ply 0 0 0 0 0 0 1\n", "\"b.ply\" that it refers to cannot be read"),
+        ("bmesh ../a.ply 0 0 0 0 0 0 1\n", "outside the folder of the file"),
+        ("bmesh a.ply 0 0 0 0 0 0\n", "no name with a translation and a quaternion (line 1)"),
+        ("bmesh a.ply 0 0 0 0 0 0 0\n", "is no pose (line 1)"),
+        ("bmesh a.ply 0 0 nan 0 0 0 1\n", "is no pose (line 1)"),
+        ("bmesh cut.ply 0 0 0 0 0 0 1\n", "\"cut.ply\" that it refers to cannot be read"),
+    ] {
+        std::fs::write(&path, conf).unwrap();
+        let error = read(&path).unwrap_err().to_string();
+        assert!(error.contains(told), "{conf:?}: {error}");
+    }
+}

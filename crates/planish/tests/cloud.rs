@@ -253,6 +253,22 @@ fn a_plate_four_noise_levels_thick_has_two_sides_that_look_away_from_each_other(
 }
 
 #[test]
+fn views_of_a_ball_that_lie_aside_of_each_other_are_one_surface_that_points_outward() {
+    let ball = sphere(30_000);
+    let noise = |seed, i: usize| 0.002 * DVec3::from_array([0, 1, 2].map(|k| normal(seed, (3 * i + k) as u64)));
+    // The second view covers a third of the ball and lies five noise levels farther in.
+    let first = ball.iter().enumerate().map(|(i, p)| *p + noise(3, i));
+    let second = ball.iter().enumerate().filter(|(_, p)| p.x > 0.35).map(|(i, p)| {
+        let turned = DQuat::from_rotation_x(0.01) * *p;
+        0.99 * turned + noise(5, i)
+    });
+    let samples = clean(first.chain(second).collect());
+    let wrong = samples.samples.iter().filter(|s| s.normal.dot(s.center) < 0.5).count();
+    assert!(wrong * 500 < samples.samples.len(), "{wrong} of {}", samples.samples.len());
+    assert!(samples.gap.is_infinite(), "{}", samples.gap);
+}
+
+#[test]
 fn a_hole_in_a_sphere_is_closed_within_a_tenth_of_the_radius_or_left_open() {
     let points: Vec<DVec3> =
         scan_of(&shapes::sphere(1.0, 5), 20_000, 0.002, 1).into_iter().filter(|p| p.z < 0.9).collect();

@@ -9,6 +9,7 @@ mod las;
 mod npy;
 mod pcd;
 mod table;
+mod views;
 
 use crate::{Place, ReadError, WriteError, atomic, ply};
 use glam::DVec3;
@@ -26,7 +27,7 @@ pub struct ScanOptions {
 }
 
 /// Extensions that always mean a scan.
-pub const SCAN_EXTENSIONS: [&str; 10] = ["e57", "las", "laz", "pcd", "xyz", "txt", "csv", "asc", "pts", "npz"];
+pub const SCAN_EXTENSIONS: [&str; 11] = ["e57", "las", "laz", "pcd", "xyz", "txt", "csv", "asc", "pts", "npz", "conf"];
 /// Extensions that can be written.
 pub const WRITTEN_SCANS: [&str; 5] = ["ply", "las", "laz", "e57", "xyz"];
 
@@ -43,7 +44,7 @@ pub fn is_scan(path: &Path) -> bool {
     }
 }
 
-/// Reads a scan: E57, LAS, LAZ, PLY, PCD, XYZ, TXT, CSV, ASC, PTS, NPY, NPZ.
+/// Reads a scan: E57, LAS, LAZ, PLY, PCD, XYZ, TXT, CSV, ASC, PTS, NPY, NPZ, and CONF with the PLY views that it names.
 /// # Errors
 /// Everything that [`ReadError`] lists. No file makes it panic.
 pub fn read_scan(path: impl AsRef<Path>, options: &ScanOptions) -> Result<Cloud, ReadError> {
@@ -62,6 +63,7 @@ pub fn read_scan(path: impl AsRef<Path>, options: &ScanOptions) -> Result<Cloud,
             Cloud { points: mesh.points, attributes: mesh.attributes, ..Cloud::default() }
         }
         "npy" | "npz" => npy::read(&bytes)?,
+        "conf" => views::read(&bytes, path)?,
         "xyz" | "txt" | "csv" | "asc" | "pts" => table::read(&bytes, &extension, options.columns.as_deref())?,
         _ => {
             let known = SCAN_EXTENSIONS.iter().chain(&["ply", "npy"]).map(|e| format!(".{e}")).collect::<Vec<_>>();

@@ -173,7 +173,15 @@ fn accompanied(fits: Vec<Fit>) -> Vec<Fit> {
                 .count()
         })
         .collect();
-    fits.into_iter().zip(company).filter(|(_, c)| *c >= COMPANY).map(|(f, _)| f).collect()
+    let mut fits: Vec<Fit> = fits.into_iter().zip(company).filter(|(_, c)| *c >= COMPANY).map(|(f, _)| f).collect();
+    // A sheet whose other one is dropped is no side of a plate.
+    for i in 0..fits.len() {
+        let same_site = |j: usize| fits.get(j).is_some_and(|g| g.site == fits[i].site);
+        if !same_site(i.wrapping_sub(1)) && !same_site(i + 1) {
+            fits[i].gap = f64::INFINITY;
+        }
+    }
+    fits
 }
 
 fn fit_site(

@@ -4,7 +4,8 @@
 //! Implicit Quadric Regression*, 2003.
 //! 1. order, duplicates: [`Cloud`]                   2. noise and radius of the fits (§6.1): `survey`, `sites`
 //! 3. fits in rising irregularity (§5, fig. 7; §4.1, §6.2): `front`, `fit`
-//! 4. orientation (§7, fig. 12): `link`, `orient`     5. points on the surface, outliers, segments: `project`
+//! 4. orientation (§7, fig. 12): `link`, `orient`, `wind`; views that lie aside of each other are one sheet: `views`
+//! 5. points on the surface, outliers, segments: `project`
 //!
 //! The blend (§4.2, eq. 4) is `field::SampleField`. Where a step departs from the paper its file says so.
 
@@ -27,6 +28,8 @@ mod scanner;
 mod sites;
 mod strays;
 mod survey;
+mod views;
+mod wind;
 
 pub use blend::{Blend, Blended};
 pub use cells::Cell;
@@ -40,6 +43,7 @@ use crate::mesh::Attribute;
 use crate::observe::Observer;
 use glam::DVec3;
 use orient::Hints;
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -207,6 +211,9 @@ pub struct Samples {
 /// Fewest different points: those of the smallest ball.
 pub const FEWEST: usize = 18;
 
+/// Times that sheets which turn out to be one surface, seen twice, are fitted anew.
+const JOINS: usize = 4;
+
 /// Fits oriented samples to a scan.
 /// # Errors
 /// [`CloudError`] for too few or collinear points, no surface, or if cancelled.
@@ -214,22 +221,32 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
     let (points, ids) = distinct(cloud)?;
     let (points, ids, tree) = strays::without(points, ids);
     let part = |from: f64, to: f64| Part { observer, from, to };
-    let sites = sites::choose(&points, &tree, &part(0.0, 0.45)).ok_or(CloudError::Cancelled)?;
+    let mut sites = sites::choose(&points, &tree, &part(0.0, 0.45)).ok_or(CloudError::Cancelled)?;
     if sites.point.is_empty() {
         return Err(CloudError::NoSurface { points: points.len() });
     }
-    let fits = front::grow(&points, &tree, &sites, &part(0.45, 0.85)).ok_or(CloudError::Cancelled)?;
-    if fits.is_empty() {
-        return Err(CloudError::NoSurface { points: points.len() });
-    }
-    let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
-    let fit_tree = KdTree::new(&centers);
-    let votes = link::votes(&fits, &fit_tree);
-    let areas: Vec<f64> = fits.iter().map(|f| f.owned as f64 * sites.survey[f.site as usize].spacing.powi(2)).collect();
-    let normals = (!params.ignore_normals).then(|| given_normals(cloud, &ids, &fits, &sites)).flatten();
-    let toward = toward_scanner(cloud, &ids, &fits, &sites);
-    let hints = Hints { toward: toward.as_deref(), normals: normals.as_deref(), areas: &areas };
-    let oriented = orient::orient(&fits, &votes, &hints);
+    let mut round = 0;
+    let (fits, areas, oriented) = loop {
+        let fits = front::grow(&points, &tree, &sites, &part(0.45, 0.85)).ok_or(CloudError::Cancelled)?;
+        if fits.is_empty() {
+            return Err(CloudError::NoSurface { points: points.len() });
+        }
+        let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
+        let votes = link::votes(&fits, &KdTree::new(&centers));
+        let areas: Vec<f64> =
+            fits.iter().map(|f| f.owned as f64 * sites.survey[f.site as usize].spacing.powi(2)).collect();
+        let known = |of: &Direction| of_fits(&fits, &points, &tree, |i| of(ids[i as usize] as usize));
+        let toward = toward_scanner(cloud).map(|of| known(&of));
+        let normals = given_normals(cloud).filter(|_| !params.ignore_normals).map(|of| known(&of));
+        let hints = Hints { toward: toward.as_deref(), normals: normals.as_deref(), areas: &areas };
+        let oriented = orient::orient(&fits, &votes, &hints);
+        let twice = if round < JOINS { views::aside(&fits, &oriented.sign, &hints) } else { Vec::new() };
+        if twice.is_empty() {
+            break (fits, areas, oriented);
+        }
+        round += 1;
+        sites.join(&tree, &twice);
+    };
     let samples: Vec<Sample> = fits
         .iter()
         .enumerate()
@@ -333,31 +350,43 @@ fn distinct(cloud: &Cloud) -> Result<(Vec<DVec3>, Vec<u32>), CloudError> {
     Ok((points, ids))
 }
 
-/// Normals of the file at the sites of the fits, if there are any.
-fn given_normals(cloud: &Cloud, ids: &[u32], fits: &[front::Fit], sites: &sites::Sites) -> Option<Vec<DVec3>> {
-    let normals = cloud.attribute("normal", 3)?;
-    Some(
-        fits.iter()
-            .map(|f| {
-                let i = ids[sites.point[f.site as usize] as usize] as usize;
-                DVec3::from_array([0, 1, 2].map(|k| normals.values[3 * i + k] as f64)).normalize_or_zero()
-            })
-            .collect(),
-    )
+/// What a file tells of the outside at a point of it: a unit vector, or zero.
+type Direction<'a> = dyn Fn(usize) -> DVec3 + Sync + 'a;
+
+/// Normals of the file, if there are any.
+fn given_normals(cloud: &Cloud) -> Option<Box<Direction<'_>>> {
+    let normals = &cloud.attribute("normal", 3)?.values;
+    Some(Box::new(move |i| DVec3::from_array([0, 1, 2].map(|k| normals[3 * i + k] as f64)).normalize_or_zero()))
 }
 
-/// Direction to the scanner at the sites of the fits, if scanners are known.
-fn toward_scanner(cloud: &Cloud, ids: &[u32], fits: &[front::Fit], sites: &sites::Sites) -> Option<Vec<DVec3>> {
+/// Directions to the scanners, if they are known.
+fn toward_scanner(cloud: &Cloud) -> Option<Box<Direction<'_>>> {
     if cloud.scanners.is_empty() || (cloud.seen_by.is_empty() && cloud.scanners.len() != 1) {
         return None;
     }
-    Some(
-        fits.iter()
-            .map(|f| {
-                let i = ids[sites.point[f.site as usize] as usize] as usize;
-                let by = cloud.seen_by.get(i).copied().unwrap_or(0) as usize;
-                cloud.scanners.get(by).map_or(DVec3::ZERO, |s| (*s - f.center).normalize_or_zero())
-            })
-            .collect(),
-    )
+    Some(Box::new(|i| {
+        let by = cloud.seen_by.get(i).copied().unwrap_or(0) as usize;
+        cloud.scanners.get(by).map_or(DVec3::ZERO, |s| (*s - cloud.points[i]).normalize_or_zero())
+    }))
+}
+
+/// Points around a fit that are asked what the file tells of them.
+const TOLD: usize = 16;
+
+/// What the file tells of the outside at every fit: the mean over its points, and not over those of another sheet there.
+fn of_fits(fits: &[front::Fit], points: &[DVec3], tree: &KdTree, of: impl Fn(u32) -> DVec3 + Sync) -> Vec<DVec3> {
+    (0..fits.len())
+        .into_par_iter()
+        .map_init(Vec::new, |near, i| {
+            let f = &fits[i];
+            let same_site = |j: &usize| fits.get(*j).is_some_and(|g| g.site == f.site);
+            let others: Vec<usize> = [i.wrapping_sub(1), i + 1].into_iter().filter(same_site).collect();
+            tree.nearest(f.center, TOLD, near);
+            let own = near.iter().map(|n| n.1).filter(|&p| {
+                let off = |g: &front::Fit| g.quadric.distance(points[p as usize]).0.abs();
+                others.iter().all(|&j| off(f) <= off(&fits[j]))
+            });
+            own.map(&of).sum::<DVec3>().normalize_or_zero()
+        })
+        .collect()
 }

@@ -3,13 +3,15 @@
 //! [X03] §7, fig. 12, solved globally: all meetings of samples are signed votes.
 //! 1. the signs of a maximum spanning tree of the votes; then samples and whole patches turn while that satisfies more
 //! 2. parts without a vote between them: scanner positions where known; else closed parts by the winding number of the
-//!    larger ones around them; open parts upwards
+//!    larger ones around them; open parts by it, too, if they fill a hole of others, else upwards
+//! 3. patches that scanners, normals or the winding number of all contradict turn (`wind`)
 //!
 //! Departs from [X03]: patches are not merged one after the other, where a single wrong meeting turns a whole patch.
 
 use super::dipoles::Dipoles;
 use super::front::Fit;
 use super::link::{Vote, components, middle, root};
+use super::wind::wind;
 use glam::DVec3;
 
 /// What decides between inside and outside.
@@ -35,13 +37,15 @@ pub(super) struct Oriented {
 }
 
 /// Samples whose votes may turn in one sweep, at most this often.
-const SWEEPS: usize = 12;
+pub(super) const SWEEPS: usize = 12;
 /// A part whose normals cancel to this share of its area may be closed.
 const CANCELS: f64 = 0.15;
 /// And its volume is above this share of what its area and size allow.
 const HOLLOW: f64 = 0.05;
 /// Scanner positions and normals of the file decide a part if their sum is above this share of its area.
-const DECIDED: f64 = 0.05;
+pub(super) const DECIDED: f64 = 0.05;
+/// An open part is in a hole of the others if their winding number differs this much between its sides.
+const STEP: f64 = 0.1;
 
 /// Orients the samples.
 pub(super) fn orient(fits: &[Fit], votes: &[Vote], hints: &Hints) -> Oriented {
@@ -61,6 +65,7 @@ pub(super) fn orient(fits: &[Fit], votes: &[Vote], hints: &Hints) -> Oriented {
             (fits[i].center, sign[i] * hints.areas[i] * fits[i].normal)
         }));
     }
+    wind(&mut sign, fits, votes, hints);
     let confidence = confidence(&sign, votes);
     Oriented { sign, part, confidence, closed }
 }
@@ -121,12 +126,7 @@ fn improve(sign: &mut [f64], votes: &[Vote]) {
                 turned += 1;
             }
         }
-        // Patches: samples joined by satisfied smooth votes.
-        let agreed = votes
-            .iter()
-            .filter(|v| v.smooth && v.sign * sign[v.a as usize] * sign[v.b as usize] > 0.0)
-            .map(|v| (v.a, v.b));
-        let patch = components(sign.len(), agreed);
+        let patch = patches(sign, votes);
         let mut balance = vec![0.0; sign.len()];
         for v in votes {
             let (a, b) = (patch[v.a as usize], patch[v.b as usize]);
@@ -152,6 +152,12 @@ fn improve(sign: &mut [f64], votes: &[Vote]) {
             break;
         }
     }
+}
+
+/// Patches: samples joined by satisfied smooth votes, as a label per sample.
+pub(super) fn patches(sign: &[f64], votes: &[Vote]) -> Vec<u32> {
+    let agreed = votes.iter().filter(|v| v.smooth && v.sign * sign[v.a as usize] * sign[v.b as usize] > 0.0);
+    components(sign.len(), agreed.map(|v| (v.a, v.b)))
 }
 
 /// Numbers the parts by falling area, ties by the least sample.
@@ -191,6 +197,17 @@ fn decide(own: &[u32], fits: &[Fit], sign: &mut [f64], hints: &Hints, settled: &
         let inside = sum(&|i| around.number(fits[i].center, 0.0)) / area.max(1e-300);
         // Inside a body a closed part is a cavity, whose outside is its own inside.
         verdict = if inside > 0.5 { -volume } else { volume };
+    }
+    if verdict == 0.0 && !settled.is_empty() {
+        // An open part in a hole of what is settled has the inside of that behind it.
+        let around = Dipoles::new(settled);
+        let step = sum(&|i| {
+            let aside = sign[i] * fits[i].radius * fits[i].normal;
+            around.number(fits[i].center - aside, 0.0) - around.number(fits[i].center + aside, 0.0)
+        });
+        if step.abs() > STEP * area {
+            verdict = step;
+        }
     }
     if verdict == 0.0 {
         verdict = total.z;

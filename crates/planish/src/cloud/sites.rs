@@ -59,7 +59,7 @@ pub(super) fn in_pieces<T: Send>(
 /// Chooses and surveys the sites of points in the order of their tree. `None` if cancelled.
 pub(super) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -> Option<Sites> {
     let scouts: Vec<u32> = (0..points.len() as u32).step_by(SCOUT.min(points.len() / 8 + 1)).collect();
-    let blank = Prior { noise: 0.0 };
+    let blank = Prior { noise: 0.0, one: false };
     let first = in_pieces(scouts.len(), (0.0, 0.2), observer, |s, i| {
         survey(tree, points[scouts[i] as usize], f64::INFINITY, blank, s)
     })?;
@@ -120,7 +120,7 @@ fn regions(points: &[DVec3], tree: &KdTree, known: &[Survey]) -> Vec<(f64, f64, 
                 noises.sort_unstable_by(f64::total_cmp);
                 let middle = radii[radii.len() / 2];
                 // A scout in a crease sees next to nothing; sites there stand as for half of the usual radius.
-                let prior = Prior { noise: noises[noises.len() / 2] };
+                let prior = Prior { noise: noises[noises.len() / 2], one: false };
                 (least.max(USUAL * middle), REACH * most, prior)
             },
         )
@@ -145,6 +145,23 @@ const SUPPORT: f64 = 1.15;
 const SUPPORT_GAPS: f64 = 2.3;
 
 impl Sites {
+    /// Surveys sites again whose two sheets, so far apart, are one surface.
+    pub(super) fn join(&mut self, tree: &KdTree, twice: &[(u32, f64)]) {
+        let fresh: Vec<(Prior, Option<Survey>)> = twice
+            .par_iter()
+            .map_init(Scratch::default, |scratch, &(site, apart)| {
+                let old = &self.survey[site as usize];
+                let prior = Prior { noise: old.noise.hypot(apart / 2.0), one: true };
+                (prior, survey(tree, old.quadric.center, f64::INFINITY, prior, scratch))
+            })
+            .collect();
+        for (&(site, _), (prior, new)) in twice.iter().zip(fresh) {
+            self.prior[site as usize] = prior;
+            let survey = &mut self.survey[site as usize];
+            *survey = new.unwrap_or(Survey { layer: None, ..*survey });
+        }
+    }
+
     /// Radius within which a site takes part in the blend.
     pub(super) fn support(&self, site: usize) -> f64 {
         (SUPPORT * self.survey[site].radius).max(SUPPORT_GAPS * self.gap[site])

@@ -66,6 +66,8 @@ pub(super) struct Scratch {
 pub(super) struct Prior {
     /// Noise of the region, world units; 0 where nothing is known.
     pub noise: f64,
+    /// Two sheets side by side are one surface there, seen twice.
+    pub one: bool,
 }
 
 /// Surveys the surface near one point.
@@ -130,7 +132,7 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
             let ball = GROWTH.powi(j as i32);
             let (noise, excess) = bias(&height, &scratch.y, ball);
             let count = scratch.y.len();
-            let layers = split(&height, &scratch.y);
+            let layers = if prior.one { None } else { split(&height, &scratch.y) };
             let (noise, excess) = match &layers {
                 None => (noise.max(floor / r0), excess),
                 // Each sheet has half of the points, and its bias is not measured: that of both together is.

@@ -1,0 +1,115 @@
+//! Patches that look the wrong way as a whole.
+//!
+//! Where a patch and the rest of a scan meet in votes of opposite points alone, as horns do whose roots no view has seen, one
+//! wrong vote turns all of it. What the file knows of the outside decides; else the winding number: on a surface it is one
+//! half, and a patch adds its share to that of the rest, which with the other sign it would take away (Barill et al. 2018).
+
+use super::Dipoles;
+use super::front::Fit;
+use super::link::Vote;
+use super::orient::{DECIDED, Hints, SWEEPS, patches};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Least number of samples of a patch that is asked, and how many of them at most.
+const FEWEST: usize = 30;
+const ASKED: usize = 1000;
+/// Samples within this many radii of the place say nothing of its winding number: their planes go through it.
+const SKIP: f64 = 0.25;
+/// Product of a patch's own winding number and of what the rest has above one half, from which it turns: where it looks the
+/// right way both have opposite signs, and at the faces of a body about zero.
+const GAIN: f64 = 0.008;
+
+/// Turns patches over, one after the other, the most certain first.
+pub(super) fn wind(sign: &mut [f64], fits: &[Fit], votes: &[Vote], hints: &Hints) {
+    for _ in 0..SWEEPS {
+        let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        patches(sign, votes).iter().enumerate().for_each(|(i, &p)| members.entry(p).or_default().push(i));
+        let dipole = |i: usize| (fits[i].center, sign[i] * hints.areas[i] * fits[i].normal);
+        let all = Dipoles::new(&(0..fits.len()).map(dipole).collect::<Vec<_>>());
+        let gain = |own: &[usize]| -> f64 {
+            let area: f64 = own.iter().map(|&i| hints.areas[i]).sum();
+            for known in [hints.toward, hints.normals].into_iter().flatten() {
+                let outward: f64 = own.iter().map(|&i| dipole(i).1.dot(known[i])).sum();
+                if outward.abs() > DECIDED * area {
+                    return -outward / area;
+                }
+            }
+            let alone = Dipoles::new(&own.iter().map(|&i| dipole(i)).collect::<Vec<_>>());
+            let (mut gain, mut asked) = (0.0, 0.0);
+            for &i in own.iter().step_by(own.len().div_ceil(ASKED)) {
+                asked += hints.areas[i];
+                // Between two sheets side by side the number of samples says nothing.
+                if fits[i].gap.is_finite() {
+                    continue;
+                }
+                let [all, own] = [&all, &alone].map(|d| d.number(fits[i].center, SKIP * fits[i].radius));
+                gain += hints.areas[i] * own * (all - own - 0.5);
+            }
+            gain / f64::max(asked, 1e-300)
+        };
+        let gains: Vec<(f64, &Vec<usize>)> =
+            members.par_iter().filter(|m| m.1.len() >= FEWEST).map(|(_, own)| (gain(own), own)).collect();
+        let best = gains.into_iter().max_by(|a, b| a.0.total_cmp(&b.0).then(b.1[0].cmp(&a.1[0])));
+        let Some((_, own)) = best.filter(|b| b.0 > GAIN) else { break };
+        own.iter().for_each(|&i| sign[i] = -sign[i]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::Quadric;
+    use glam::DVec3;
+
+    /// A ball of samples that look outwards, those above `z` joined among themselves, the others, too, and both not.
+    fn ball(z: f64) -> (Vec<Fit>, Vec<Vote>) {
+        let fits: Vec<Fit> = (0..2000)
+            .map(|k| {
+                let h = 1.0 - (2 * k + 1) as f64 / 2000.0;
+                let (s, c) = (2.399963 * k as f64).sin_cos();
+                let normal = DVec3::new((1.0 - h * h).sqrt() * c, (1.0 - h * h).sqrt() * s, h);
+                Fit {
+                    quadric: Quadric::plane(normal, 1.0, normal),
+                    center: normal,
+                    normal,
+                    radius: 0.1,
+                    noise: 0.01,
+                    error: 1e-3,
+                    irregularity: 0.0,
+                    class: 0,
+                    site: k,
+                    sheets: 1,
+                    gap: f64::INFINITY,
+                    owned: 10,
+                }
+            })
+            .collect();
+        let votes = (1..2000u32)
+            .filter(|&b| (fits[b as usize].center.z > z) == (fits[b as usize - 1].center.z > z))
+            .map(|b| Vote { a: b - 1, b, sign: 1.0, weight: 1.0, smooth: true })
+            .collect();
+        (fits, votes)
+    }
+
+    fn turned(z: f64, toward: Option<&[DVec3]>) -> Vec<f64> {
+        let (fits, votes) = ball(z);
+        let areas = vec![4.0 * std::f64::consts::PI / 2000.0; 2000];
+        let mut sign: Vec<f64> = fits.iter().map(|f| if f.center.z > z { -1.0 } else { 1.0 }).collect();
+        wind(&mut sign, &fits, &votes, &Hints { toward, normals: None, areas: &areas });
+        sign
+    }
+
+    #[test]
+    fn a_cap_of_a_ball_that_looks_inwards_turns_over_whether_small_or_large() {
+        for z in [0.8, 0.0, -0.5] {
+            assert!(turned(z, None).iter().all(|s| *s == 1.0), "{z}");
+        }
+    }
+
+    #[test]
+    fn scanners_come_before_the_winding_number() {
+        let center: Vec<DVec3> = ball(0.0).0.iter().map(|f| -f.center).collect();
+        assert!(turned(0.5, Some(&center)).iter().all(|s| *s == -1.0));
+    }
+}
