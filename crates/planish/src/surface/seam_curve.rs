@@ -44,15 +44,21 @@ struct Condition {
     value: f64,
 }
 
-/// Moves a curve so that at its ends it runs in the planes there and bends as they say.
+/// Moves a curve so that at its ends it runs in the planes there and, if asked to, bends as they say.
 /// `index` is that of the curve.
-pub(crate) fn constrain(index: usize, curve: &[DVec3], planes: [Vec<Plane>; 2], direction: &Direction) -> Vec<DVec3> {
+pub(crate) fn constrain(
+    index: usize,
+    curve: &[DVec3],
+    planes: [Vec<Plane>; 2],
+    bends: bool,
+    direction: &Direction,
+) -> Vec<DVec3> {
     let mut moved = curve.to_vec();
     if planes.iter().all(Vec::is_empty) {
         return moved;
     }
     // Without the bends if those distort the curve, as it was if its tangents would.
-    for bent in [true, false] {
+    for bent in [bends, false] {
         for _ in 0..PASSES {
             moved = meet(curve, &conditions(index, &moved, &planes, bent), direction);
         }

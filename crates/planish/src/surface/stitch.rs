@@ -107,7 +107,10 @@ pub fn stitch(
             if uses[c].is_empty() {
                 Vec::new()
             } else {
-                constrain(c, &fitted[c], ends, directions.get(nodes[c], counts[c]))
+                // How a feature bends is its own affair: by the planes of two faces at once it would leave its nodes, and the
+                // patches beside it would turn their slopes after it.
+                let bends = is_smooth(&network.curves[c]);
+                constrain(c, &fitted[c], ends, bends, directions.get(nodes[c], counts[c]))
             }
         })
         .collect();

@@ -1,0 +1,164 @@
+//! Sharp lines of a mesh made of a noisy scan, moved to where their flanks meet.
+//!
+//! Where two sheets of a scan meet, each has the points of one side only, so the surface is least sure right beside a sharp line,
+//! and the line itself is where two unsure sheets meet. But most flanks go on smoothly for many cells. So
+//! 1. each side of each vertex of a line gets an estimate from far around ([`flanks`](super::flanks));
+//! 2. the vertex goes to where its flanks meet, those within some cells of the line towards the flanks beside them;
+//! 3. who turns a triangle over, or makes two meet, goes back half of the way, or all of it.
+
+use super::flanks::{Lines, ScanScale, Seen};
+use super::{FeatureTags, TriMesh, self_intersections};
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+/// The flanks are followed within so many cells of the line, fully within half of that.
+const REACH: f64 = 4.0;
+/// A vertex of a line moves by so many noise levels at most: farther off is not where it was seen.
+const FARTHEST: f64 = 2.0;
+/// Others are drawn less the farther they are from the flank, beyond one noise level not at all: that is structure.
+const STRUCTURE: f64 = 1.0;
+/// Variance of a flank's slope that counts as none: half a degree.
+const SURE: f64 = 8e-5;
+/// Damping of the place where flanks meet: two at less than two degrees have none.
+const DAMPING: f64 = 1e-3;
+/// Steps of Newton's method for that place.
+const STEPS: usize = 4;
+/// A triangle may turn so far from what is expected of it (cosine) if it was no farther before.
+const TURNED: f64 = 0.7;
+/// A triangle keeps so much of its area.
+const AREA: f64 = 0.1;
+/// Rounds in which vertices go back half of the way, and rounds in all.
+const HALVES: usize = 6;
+const ROUNDS: usize = 24;
+
+/// Moves the lines of `tags` to where the surfaces beside them meet, and what is within four cells of them onto these surfaces.
+/// Returns the number of vertices that moved.
+///
+/// No triangle turns over, and none comes to meet another. A mesh without noise stays as it is.
+pub fn fair_lines(mesh: &mut TriMesh, tags: &FeatureTags, scale: &ScanScale) -> usize {
+    let usable = [scale.noise, scale.spacing, scale.cell].iter().all(|x| *x > 0.0 && x.is_finite());
+    if tags.edges.is_empty() || !usable {
+        return 0;
+    }
+    let Wishes { moves, expected } = wishes(&Lines::new(mesh, &tags.edges), scale);
+    settle(mesh, &moves, &expected)
+}
+
+struct Wishes {
+    /// Vertices and where they should be, ascending.
+    moves: Vec<(u32, DVec3)>,
+    /// For each triangle its normal by the flanks; zero away from them.
+    expected: Vec<DVec3>,
+}
+
+fn wishes(lines: &Lines, scale: &ScanScale) -> Wishes {
+    let mesh = lines.mesh;
+    let flanks = lines.flanks(scale);
+    let reach = REACH * scale.cell;
+    // What each flank says of the faces beside it.
+    let beside: Vec<Vec<Vec<u32>>> = flanks
+        .par_iter()
+        .map_init(
+            || Seen::new(mesh.triangles.len()),
+            |seen, (_, flanks)| {
+                let one = |f: &super::flanks::Flank, seen: &mut Seen| {
+                    let near = |t: u32| mesh.corners(t as usize).iter().any(|p| p.distance(f.at) < reach);
+                    lines.grow(&f.sector, seen, |t| near(t) && lines.is_facing(t, f))
+                };
+                flanks.iter().map(|f| one(f, seen)).collect()
+            },
+        )
+        .collect();
+    let count = mesh.points.len();
+    let mut expected = vec![DVec3::ZERO; mesh.triangles.len()];
+    let (mut sum, mut weight, mut least) = (vec![DVec3::ZERO; count], vec![0.0; count], vec![f64::INFINITY; count]);
+    let mut last = vec![usize::MAX; count];
+    let all = flanks.iter().flat_map(|(_, f)| f).zip(beside.iter().flatten());
+    for (n, (flank, faces)) in all.enumerate() {
+        for &t in faces {
+            let corners = mesh.corners(t as usize);
+            let center = corners.into_iter().sum::<DVec3>() / 3.0;
+            let near = (1.0 - center.distance(flank.at) / reach).max(0.0);
+            expected[t as usize] += flank.normal(center) * near.powi(4);
+            for (v, p) in mesh.triangles[t as usize].map(|v| v as usize).into_iter().zip(corners) {
+                let far = p.distance(flank.at) / reach;
+                // Once for each flank.
+                if far >= 1.0 || lines.on_line[v] || std::mem::replace(&mut last[v], n) == n {
+                    continue;
+                }
+                let w = (1.0 - far * far).powi(2) / (flank.variance + SURE);
+                let off = flank.distance(p);
+                let t = off / (STRUCTURE * scale.noise);
+                // Tukey's weight.
+                let keep = (1.0 - t * t).max(0.0).powi(2);
+                sum[v] -= flank.normal(p) * (off * w * keep);
+                weight[v] += w;
+                least[v] = least[v].min(far);
+            }
+        }
+    }
+    let mut moves: Vec<(u32, DVec3)> = (0..count)
+        .filter(|&v| weight[v] > 0.0)
+        .map(|v| {
+            let t = (2.0 * least[v] - 1.0).max(0.0);
+            (v as u32, mesh.points[v] + sum[v] / weight[v] * (1.0 - t * t * (3.0 - 2.0 * t)))
+        })
+        .collect();
+    moves.extend(flanks.iter().filter_map(|(v, flanks)| {
+        let from = mesh.points[*v as usize];
+        let mut p = from;
+        for _ in 0..STEPS {
+            let (mut matrix, mut rhs) = (DMat3::from_diagonal(DVec3::splat(DAMPING)), DVec3::ZERO);
+            for flank in flanks {
+                let n = flank.normal(p);
+                matrix += DMat3::from_cols(n * n.x, n * n.y, n * n.z);
+                rhs -= n * flank.distance(p);
+            }
+            p += matrix.inverse() * rhs;
+        }
+        (p.distance(from) <= FARTHEST * scale.noise).then_some((*v, p))
+    }));
+    moves.sort_unstable_by_key(|m| m.0);
+    expected.iter_mut().for_each(|n| *n = n.normalize_or_zero());
+    Wishes { moves, expected }
+}
+
+/// Moves vertices as far as the triangles allow; returns how many moved.
+fn settle(mesh: &mut TriMesh, moves: &[(u32, DVec3)], expected: &[DVec3]) -> usize {
+    let before = mesh.points.clone();
+    let mut share = vec![0.0; mesh.points.len()];
+    moves.iter().for_each(|m| share[m.0 as usize] = 1.0);
+    let touched: Vec<u32> = (0..mesh.triangles.len() as u32)
+        .filter(|&t| mesh.triangles[t as usize].iter().any(|&v| share[v as usize] > 0.0))
+        .collect();
+    let was: Vec<(DVec3, f64)> = touched.iter().map(|&t| (mesh.normal(t as usize), mesh.area(t as usize))).collect();
+    for round in 0..ROUNDS {
+        for &(v, p) in moves {
+            mesh.points[v as usize] = before[v as usize].lerp(p, share[v as usize]);
+        }
+        let moved = |t: u32, share: &[f64]| mesh.triangles[t as usize].iter().any(|&v| share[v as usize] > 0.0);
+        let is_bad = |(&t, (normal, area)): (&u32, &(DVec3, f64))| {
+            let (now, wanted) = (mesh.normal(t as usize), expected[t as usize]);
+            // What is expected leaves room; where nothing is, the triangle itself is.
+            let wanted = if wanted == DVec3::ZERO { *normal } else { wanted };
+            let upright = now.dot(wanted) > TURNED.min(normal.dot(wanted) - 1e-9);
+            moved(t, &share) && !(upright && mesh.area(t as usize) >= AREA * area)
+        };
+        let mut bad: Vec<u32> =
+            touched.par_iter().zip(&was).filter(|x| is_bad(*x)).map(|(&t, _)| t).collect();
+        let mut left = if round < HALVES { 0.5 } else { 0.0 };
+        if bad.is_empty() {
+            bad = self_intersections(mesh).into_iter().flatten().filter(|&t| moved(t, &share)).collect();
+            left = 0.0;
+        }
+        if bad.is_empty() {
+            return share.iter().filter(|&&s| s > 0.0).count();
+        }
+        let mut back: Vec<u32> = bad.iter().flat_map(|&t| mesh.triangles[t as usize]).collect();
+        back.sort_unstable();
+        back.dedup();
+        back.iter().for_each(|&v| share[v as usize] *= left);
+    }
+    mesh.points = before;
+    0
+}
