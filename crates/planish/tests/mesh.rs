@@ -629,3 +629,95 @@ fn two_triangles_that_touch_in_a_point_come_apart_with_their_attributes() {
     assert!(!diagnose(&mesh).manifold && diagnose(&parted).manifold);
     assert_eq!(part_fans(&shapes::sphere(1.0, 2)).0.points.len(), shapes::sphere(1.0, 2).points.len());
 }
+
+/// A cube of side 1 with cells of 1/32, as a scan with noise of half a cell leaves it: the faces wavy by a tenth of the noise,
+/// leaning outwards by some degrees within two cells of the edges, and the edges off by a third of it.
+fn scanned_cube() -> (TriMesh, FeatureTags, ScanScale) {
+    let n = 32;
+    let mut mesh = shapes::cuboid(DVec3::ONE, n);
+    let adjacency = Adjacency::new(&mesh);
+    let sharp = sharp_edges(&mesh, &adjacency, 40.0);
+    let ends = |h: usize| [mesh.origin(h as u32), mesh.origin(next(h as u32))];
+    let tags = FeatureTags::from_edges(mesh.points.len(), (0..sharp.len()).filter(|&h| sharp[h]).map(ends));
+    let scale = ScanScale { noise: 0.5 / n as f64, spacing: 0.6 / n as f64, cell: 1.0 / n as f64 };
+    for (v, p) in mesh.points.iter_mut().enumerate() {
+        let r = |k: u64| random::normal(random::unit(5, 6 * v as u64 + k), random::unit(5, 6 * v as u64 + k + 1));
+        let on = p.abs().cmpge(DVec3::splat(0.5 - 1e-9));
+        let outwards = DVec3::select(on, p.signum(), DVec3::ZERO);
+        if tags.vertices[v] != FeatureKind::None {
+            *p += outwards * DVec3::new(r(0), r(2), r(4)) * (0.3 * scale.noise);
+        } else {
+            let rim = 0.5 - DVec3::select(on, DVec3::ZERO, p.abs()).max_element();
+            let lean = 0.1 * (1.0 - rim / (2.0 * scale.cell)).max(0.0) * scale.cell;
+            *p += outwards * (0.1 * scale.noise * r(0) + lean);
+        }
+    }
+    (mesh, tags, scale)
+}
+
+/// Root mean squares of how far the vertices of lines are from the edges of the unit cube, and how far the angles across its
+/// edges, between the mean normals up to two cells away, are from 90 degrees.
+fn line_errors(mesh: &TriMesh, tags: &FeatureTags) -> (f64, f64) {
+    let rms = |errors: &[f64]| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    let on_line = |v: &usize| tags.vertices[*v] == FeatureKind::Edge;
+    let off = |p: DVec3| {
+        let mut d = (p.abs() - 0.5).to_array();
+        d.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+        d[0].hypot(d[1])
+    };
+    let offs: Vec<f64> = (0..mesh.points.len()).filter(on_line).map(|v| off(mesh.points[v])).collect();
+    let centers: Vec<DVec3> =
+        (0..mesh.triangles.len()).map(|t| mesh.corners(t).into_iter().sum::<DVec3>() / 3.0).collect();
+    let mut angles = Vec::new();
+    for k in 2..30 {
+        // Along the edge at x = y = 1/2.
+        let z = k as f64 / 32.0 - 0.5;
+        let side = |axis: usize| {
+            let other = 1 - axis;
+            let near = |t: &usize| {
+                let c = centers[*t];
+                let n = mesh.normal(*t);
+                (c.z - z).abs() < 1.0 / 32.0 && c[other] > 0.5 - 2.0 / 32.0 && c[axis] > 0.3 && n[axis] > 0.7
+            };
+            (0..centers.len()).filter(near).map(|t| mesh.area_vector(t)).sum::<DVec3>()
+        };
+        angles.push(side(0).angle_between(side(1)).to_degrees() - 90.0);
+    }
+    (rms(&offs), rms(&angles))
+}
+
+#[test]
+fn lines_of_a_scanned_cube_come_three_times_as_near_and_their_angles_within_a_third() {
+    let (mut mesh, tags, scale) = scanned_cube();
+    let before = line_errors(&mesh, &tags);
+    let moved = fair_lines(&mut mesh, &tags, &scale);
+    let after = line_errors(&mesh, &tags);
+    assert!(moved > 1000, "{moved} moved");
+    assert!(after.0 < before.0 / 3.0, "lines off by {before:?} before, {after:?} after");
+    assert!(after.1 < before.1 / 3.0, "angles off by {before:?} before, {after:?} after");
+    assert!(self_intersections(&mesh).is_empty());
+    assert!(diagnose(&mesh).watertight);
+}
+
+#[test]
+fn lines_of_an_exact_cube_stay_where_they_are_within_1e_9() {
+    let (_, tags, scale) = scanned_cube();
+    let exact = shapes::cuboid(DVec3::ONE, 32);
+    let mut mesh = exact.clone();
+    fair_lines(&mut mesh, &tags, &scale);
+    let most = exact.points.iter().zip(&mesh.points).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    assert!(most < 1e-9, "{most:e}");
+    // Nothing is known of a mesh that was not scanned.
+    assert_eq!(fair_lines(&mut mesh, &tags, &ScanScale { noise: 0.0, ..scale }), 0);
+}
+
+#[test]
+fn lines_are_faired_to_the_bit_on_1_and_4_threads() {
+    let run = |threads| {
+        let (mut mesh, tags, scale) = scanned_cube();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| fair_lines(&mut mesh, &tags, &scale));
+        mesh
+    };
+    assert_eq!(run(1), run(4));
+}

@@ -370,6 +370,40 @@ fn features_stay_sharp_while_the_smooth_seams_between_them_become_smooth() {
     }
 }
 
+/// A square tube of 4 x 2 patches; its edges are wavy features, its sides rough away from them.
+fn rough_tube() -> Patchwork {
+    let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, y)| DVec3::new(x, y, 0.0));
+    let mut work = sheet(4, 2, [true, false], [25, 25], |x, y| {
+        let i = x.floor().min(x.ceil() - 1.0).max(0.0);
+        let (a, b, t) = (corners[i as usize % 4], corners[(i as usize + 1) % 4], x - i);
+        let wave = 0.03 * t * (1.0 - t) * (7.0 * x + 9.0 * y).sin();
+        a.lerp(b, t) * (1.0 + 0.02 * (11.0 * y).sin()) + DVec3::Z * y + (b - a).cross(DVec3::Z) * wave
+    });
+    for curve in &mut work.network.curves {
+        if curve.kind == CurveKind::Smooth && curve.corners[0] % 4 == curve.corners[1] % 4 {
+            curve.kind = CurveKind::Feature;
+        }
+    }
+    work
+}
+
+#[test]
+fn stitching_leaves_features_within_one_and_a_half_times_the_distance_from_their_nodes_that_they_had() {
+    let work = rough_tube();
+    let (before, after) = stitched(&work, 8);
+    // Side 3 of every patch is a feature.
+    let rms = |all: &[Surface]| {
+        let off = |(s, g): (&Surface, &Grid)| -> Vec<f64> {
+            let v = |j: usize| j as f64 / (g.rows - 1) as f64;
+            (0..g.rows).map(|j| s.jet(0.0, v(j)).point.distance_squared(g.points[j * g.cols])).collect()
+        };
+        let all: Vec<f64> = all.iter().zip(&work.grids).flat_map(off).collect();
+        (all.iter().sum::<f64>() / all.len() as f64).sqrt()
+    };
+    let (was, is) = (rms(&before), rms(&after));
+    assert!(is < 1.5 * was, "{was:e} to {is:e}");
+}
+
 #[test]
 fn stitching_moves_with_the_model_within_1e_12_of_its_size() {
     let turn = glam::DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.8);

@@ -21,8 +21,6 @@ const STRUCTURE: f64 = 1.0;
 const SURE: f64 = 8e-5;
 /// Damping of the place where flanks meet: two at less than two degrees have none.
 const DAMPING: f64 = 1e-3;
-/// Steps of Newton's method for that place.
-const STEPS: usize = 4;
 /// A triangle may turn so far from what is expected of it (cosine) if it was no farther before.
 const TURNED: f64 = 0.7;
 /// A triangle keeps so much of its area.
@@ -51,6 +49,26 @@ struct Wishes {
     expected: Vec<DVec3>,
 }
 
+/// What all flanks around say of one side of a vertex on a line.
+#[derive(Clone, Default)]
+struct Shared {
+    /// The last that was heard, counted from 1.
+    last: usize,
+    weight: f64,
+    normal: DVec3,
+    off: f64,
+}
+
+impl Shared {
+    fn add(&mut self, n: usize, weight: f64, normal: DVec3, off: f64) {
+        if std::mem::replace(&mut self.last, n + 1) != n + 1 {
+            self.weight += weight;
+            self.normal += normal * weight;
+            self.off += off * weight;
+        }
+    }
+}
+
 fn wishes(lines: &Lines, scale: &ScanScale) -> Wishes {
     let mesh = lines.mesh;
     let flanks = lines.flanks(scale);
@@ -73,6 +91,14 @@ fn wishes(lines: &Lines, scale: &ScanScale) -> Wishes {
     let mut expected = vec![DVec3::ZERO; mesh.triangles.len()];
     let (mut sum, mut weight, mut least) = (vec![DVec3::ZERO; count], vec![0.0; count], vec![f64::INFINITY; count]);
     let mut last = vec![usize::MAX; count];
+    // Of each corner on a line the flank there, and what all flanks say of that one.
+    let mut own = vec![usize::MAX; 3 * mesh.triangles.len()];
+    for (n, (v, flank)) in flanks.iter().flat_map(|(v, f)| f.iter().map(move |f| (*v, f))).enumerate() {
+        for h in flank.sector.iter().flat_map(|&t| 3 * t..3 * t + 3).filter(|&h| mesh.origin(h) == v) {
+            own[h as usize] = n;
+        }
+    }
+    let mut shared = vec![Shared::default(); flanks.iter().map(|f| f.1.len()).sum()];
     let all = flanks.iter().flat_map(|(_, f)| f).zip(beside.iter().flatten());
     for (n, (flank, faces)) in all.enumerate() {
         for &t in faces {
@@ -80,14 +106,24 @@ fn wishes(lines: &Lines, scale: &ScanScale) -> Wishes {
             let center = corners.into_iter().sum::<DVec3>() / 3.0;
             let near = (1.0 - center.distance(flank.at) / reach).max(0.0);
             expected[t as usize] += flank.normal(center) * near.powi(4);
-            for (v, p) in mesh.triangles[t as usize].map(|v| v as usize).into_iter().zip(corners) {
+            for (k, p) in corners.into_iter().enumerate() {
+                let v = mesh.triangles[t as usize][k] as usize;
                 let far = p.distance(flank.at) / reach;
-                // Once for each flank.
-                if far >= 1.0 || lines.on_line[v] || std::mem::replace(&mut last[v], n) == n {
+                if far >= 1.0 {
                     continue;
                 }
                 let w = (1.0 - far * far).powi(2) / (flank.variance + SURE);
                 let off = flank.distance(p);
+                if lines.on_line[v] {
+                    if let Some(shared) = shared.get_mut(own[3 * t as usize + k]) {
+                        shared.add(n, w, flank.normal(p), off);
+                    }
+                    continue;
+                }
+                // Once for each flank.
+                if std::mem::replace(&mut last[v], n) == n {
+                    continue;
+                }
                 let t = off / (STRUCTURE * scale.noise);
                 // Tukey's weight.
                 let keep = (1.0 - t * t).max(0.0).powi(2);
@@ -104,20 +140,21 @@ fn wishes(lines: &Lines, scale: &ScanScale) -> Wishes {
             (v as u32, mesh.points[v] + sum[v] / weight[v] * (1.0 - t * t * (3.0 - 2.0 * t)))
         })
         .collect();
-    moves.extend(flanks.iter().filter_map(|(v, flanks)| {
+    let mut at = 0;
+    for (v, flanks) in &flanks {
         let from = mesh.points[*v as usize];
-        let mut p = from;
-        for _ in 0..STEPS {
-            let (mut matrix, mut rhs) = (DMat3::from_diagonal(DVec3::splat(DAMPING)), DVec3::ZERO);
-            for flank in flanks {
-                let n = flank.normal(p);
-                matrix += DMat3::from_cols(n * n.x, n * n.y, n * n.z);
-                rhs -= n * flank.distance(p);
-            }
-            p += matrix.inverse() * rhs;
+        let (mut matrix, mut rhs) = (DMat3::from_diagonal(DVec3::splat(DAMPING)), DVec3::ZERO);
+        for shared in &shared[at..at + flanks.len()] {
+            let n = shared.normal.normalize_or_zero();
+            matrix += DMat3::from_cols(n * n.x, n * n.y, n * n.z);
+            rhs -= n * (shared.off / shared.weight.max(f64::MIN_POSITIVE));
         }
-        (p.distance(from) <= FARTHEST * scale.noise).then_some((*v, p))
-    }));
+        at += flanks.len();
+        let way = matrix.inverse() * rhs;
+        if way.length() <= FARTHEST * scale.noise {
+            moves.push((*v, from + way));
+        }
+    }
     moves.sort_unstable_by_key(|m| m.0);
     expected.iter_mut().for_each(|n| *n = n.normalize_or_zero());
     Wishes { moves, expected }
@@ -144,8 +181,7 @@ fn settle(mesh: &mut TriMesh, moves: &[(u32, DVec3)], expected: &[DVec3]) -> usi
             let upright = now.dot(wanted) > TURNED.min(normal.dot(wanted) - 1e-9);
             moved(t, &share) && !(upright && mesh.area(t as usize) >= AREA * area)
         };
-        let mut bad: Vec<u32> =
-            touched.par_iter().zip(&was).filter(|x| is_bad(*x)).map(|(&t, _)| t).collect();
+        let mut bad: Vec<u32> = touched.par_iter().zip(&was).filter(|x| is_bad(*x)).map(|(&t, _)| t).collect();
         let mut left = if round < HALVES { 0.5 } else { 0.0 };
         if bad.is_empty() {
             bad = self_intersections(mesh).into_iter().flatten().filter(|&t| moved(t, &share)).collect();

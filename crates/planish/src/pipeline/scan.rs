@@ -122,9 +122,9 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
 /// A surface fitted to a scan follows its mesh to this share of the noise, within these shares of the diagonal.
 const FIT_NOISE: f64 = 0.5;
 const FIT_CLOSEST: f64 = 2e-4;
-/// Smoothing at noise of a thousandth of the diagonal and above; below it goes with the square of the noise, as in Wiener's
-/// filter. More of it flattens patches beside their seams.
-const FIT_SMOOTHING: f64 = 0.1;
+/// Smoothing at noise of a thousandth of the diagonal; it goes with the square of the noise, as in Wiener's filter. Less leaves
+/// the noise beside sharp edges, more flattens what bends there.
+const FIT_SMOOTHING: f64 = 0.05;
 
 /// How surfaces are fitted to the mesh of a scan.
 pub fn fit_params_for(samples: &Samples) -> FitParams {
@@ -134,7 +134,7 @@ pub fn fit_params_for(samples: &Samples) -> FitParams {
         Resolution::Tolerance(most) => Resolution::Tolerance((FIT_NOISE * noise).max(FIT_CLOSEST).min(most)),
         other => other,
     };
-    let smoothing = (FIT_SMOOTHING * (noise / 1e-3).powi(2)).clamp(usual.smoothing, FIT_SMOOTHING);
+    let smoothing = (FIT_SMOOTHING * (noise / 1e-3).powi(2)).clamp(usual.smoothing, 1.0);
     FitParams { resolution, smoothing, ..usual }
 }
 
