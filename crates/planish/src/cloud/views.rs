@@ -44,7 +44,8 @@ pub(super) fn aside(fits: &[Fit], sign: &[f64], hints: &Hints) -> Vec<(u32, f64)
         .map(|i| (fits[i].center, sign[i] * hints.areas[i] * fits[i].normal))
         .collect();
     // Of each pair the way that it looks as one surface, 1 or -1 for the normal of its first sheet, 0 while it is a plate.
-    let mut way: Vec<f64> = (0..pairs.len()).map(|k| seen_from(fits, pairs[k], hints)).collect();
+    let told: Vec<Option<f64>> = pairs.iter().map(|&i| seen(fits, i, hints)).collect();
+    let mut way: Vec<f64> = told.iter().map(|t| t.unwrap_or(0.0)).collect();
     let mut fresh: Vec<usize> = (0..pairs.len()).filter(|&k| way[k] != 0.0).collect();
     // What is one surface helps to tell what is around it.
     for _ in 0..ROUNDS {
@@ -68,7 +69,7 @@ pub(super) fn aside(fits: &[Fit], sign: &[f64], hints: &Hints) -> Vec<(u32, f64)
                 (step.abs() > f64::max(STEP, SHARE * (1.0 - own))).then_some(step.signum())
             })
         };
-        let asked = (0..pairs.len()).into_par_iter().filter(|&k| way[k] == 0.0);
+        let asked = (0..pairs.len()).into_par_iter().filter(|&k| told[k].is_none() && way[k] == 0.0);
         let found: Vec<(usize, f64)> = asked.filter_map(|k| Some((k, looks(k)?))).collect();
         if found.is_empty() {
             break;
@@ -79,13 +80,13 @@ pub(super) fn aside(fits: &[Fit], sign: &[f64], hints: &Hints) -> Vec<(u32, f64)
     (0..pairs.len()).filter(|&k| way[k] != 0.0).map(|k| (fits[pairs[k]].site, fits[pairs[k]].gap)).collect()
 }
 
-/// The way that two sheets look which scanners see from the same side; zero where they do not tell.
-fn seen_from(fits: &[Fit], first: usize, hints: &Hints) -> f64 {
-    let (f, g) = (&fits[first], &fits[first + 1]);
-    let Some(toward) = hints.toward else { return 0.0 };
+/// The way that two sheets look as one surface if scanners see them from the same side, zero for a plate; `None` where they
+/// do not tell.
+fn seen(fits: &[Fit], first: usize, hints: &Hints) -> Option<f64> {
+    let (f, g, toward) = (&fits[first], &fits[first + 1], hints.toward?);
     let (a, b) = (toward[first].dot(f.normal), toward[first + 1].dot(g.normal));
-    let same = a.abs().min(b.abs()) > GRAZING && a * b * f.normal.dot(g.normal) > 0.0;
-    if same { a.signum() } else { 0.0 }
+    let same = a * b * f.normal.dot(g.normal) > 0.0;
+    (a.abs().min(b.abs()) > GRAZING).then_some(if same { a.signum() } else { 0.0 })
 }
 
 #[cfg(test)]
