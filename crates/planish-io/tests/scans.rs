@@ -93,6 +93,20 @@ fn pcd(data: &str, body: &[u8]) -> Vec<u8> {
 }
 
 #[test]
+fn the_origin_is_the_viewpoint_of_a_pcd_whose_points_lie_before_it() {
+    let folder = folder();
+    let path = folder.path().join("a.pcd");
+    for (points, seen) in
+        [("1 2 3 0\n4 5 6 0\n", true), ("-1 2 3 0\n4 -5 -6 0\n", false), ("1e6 0 0 0\n1e6 1 1 0\n", false)]
+    {
+        std::fs::write(&path, pcd("ascii", points.as_bytes())).unwrap();
+        let cloud = read(&path).unwrap();
+        assert_eq!(cloud.scanners.len(), usize::from(seen), "{points}");
+        assert_eq!(cloud.seen_by.len(), 2 * usize::from(seen), "{points}");
+    }
+}
+
+#[test]
 fn pcd_is_read_as_text_binary_and_compressed() {
     let folder = folder();
     let rgb = f32::from_bits(0x00ff_8000);

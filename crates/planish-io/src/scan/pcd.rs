@@ -6,6 +6,9 @@ use crate::{Place, ReadError};
 use glam::{DQuat, DVec3};
 use planish::cloud::Cloud;
 
+/// A viewpoint at the origin is believed within this many sizes of the cloud.
+const FARTHEST: f64 = 10.0;
+
 struct Field {
     name: String,
     size: usize,
@@ -192,7 +195,11 @@ fn assemble(fields: &[Field], table: Vec<Vec<f64>>, count: usize, axes: [usize; 
         let turn = DQuat::from_xyzw(a, b, c, w);
         let known = turn.is_finite() && (turn.length() - 1.0).abs() < 1e-3;
         let at = DVec3::new(x, y, z);
-        if known && (at != DVec3::ZERO || (w - 1.0).abs() > 1e-9) {
+        // Writers that know no viewpoint put the origin there. It is one if the points lie before it, and not a world away.
+        let bounds = cloud.bounds();
+        let nearest = at.clamp(bounds.min, bounds.max).distance(at);
+        let told = at != DVec3::ZERO || (w - 1.0).abs() > 1e-9;
+        if known && (told || (nearest > 0.0 && nearest < FARTHEST * bounds.diagonal())) {
             // The points are in the frame of the sensor already moved by the writer; only the position is told.
             cloud.scanners = vec![at];
             cloud.seen_by = vec![0; cloud.points.len()];

@@ -4,7 +4,7 @@
 //! 1. the signs of a maximum spanning tree of the votes; then samples and whole patches turn while that satisfies more
 //! 2. parts without a vote between them: scanner positions where known; else closed parts by the winding number of the
 //!    larger ones around them; open parts by it, too, if they fill a hole of others, else upwards
-//! 3. patches that scanners, normals or the winding number of all contradict turn (`wind`)
+//! 3. patches that scanners, normals or, in closed parts, the winding number of all contradict turn (`wind`)
 //!
 //! Departs from [X03]: patches are not merged one after the other, where a single wrong meeting turns a whole patch.
 
@@ -65,7 +65,7 @@ pub(super) fn orient(fits: &[Fit], votes: &[Vote], hints: &Hints) -> Oriented {
             (fits[i].center, sign[i] * hints.areas[i] * fits[i].normal)
         }));
     }
-    wind(&mut sign, fits, votes, hints);
+    wind(&mut sign, fits, votes, hints, |i| closed[part[i] as usize]);
     let confidence = confidence(&sign, votes);
     Oriented { sign, part, confidence, closed }
 }

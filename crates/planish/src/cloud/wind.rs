@@ -21,7 +21,15 @@ const SKIP: f64 = 0.25;
 const GAIN: f64 = 0.008;
 
 /// Turns patches over, one after the other, the most certain first.
-pub(super) fn wind(sign: &mut [f64], fits: &[Fit], votes: &[Vote], hints: &Hints) {
+///
+/// * `is_closed` - whether a sample belongs to a closed part: on an open one the winding number is anything
+pub(super) fn wind(
+    sign: &mut [f64],
+    fits: &[Fit],
+    votes: &[Vote],
+    hints: &Hints,
+    is_closed: impl Fn(usize) -> bool + Sync,
+) {
     for _ in 0..SWEEPS {
         let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         patches(sign, votes).iter().enumerate().for_each(|(i, &p)| members.entry(p).or_default().push(i));
@@ -34,6 +42,9 @@ pub(super) fn wind(sign: &mut [f64], fits: &[Fit], votes: &[Vote], hints: &Hints
                 if outward.abs() > DECIDED * area {
                     return -outward / area;
                 }
+            }
+            if !is_closed(own[0]) {
+                return 0.0;
             }
             let alone = Dipoles::new(&own.iter().map(|&i| dipole(i)).collect::<Vec<_>>());
             let (mut gain, mut asked) = (0.0, 0.0);
@@ -92,24 +103,29 @@ mod tests {
         (fits, votes)
     }
 
-    fn turned(z: f64, toward: Option<&[DVec3]>) -> Vec<f64> {
+    fn turned(z: f64, toward: Option<&[DVec3]>, closed: bool) -> Vec<f64> {
         let (fits, votes) = ball(z);
         let areas = vec![4.0 * std::f64::consts::PI / 2000.0; 2000];
         let mut sign: Vec<f64> = fits.iter().map(|f| if f.center.z > z { -1.0 } else { 1.0 }).collect();
-        wind(&mut sign, &fits, &votes, &Hints { toward, normals: None, areas: &areas });
+        wind(&mut sign, &fits, &votes, &Hints { toward, normals: None, areas: &areas }, |_| closed);
         sign
     }
 
     #[test]
     fn a_cap_of_a_ball_that_looks_inwards_turns_over_whether_small_or_large() {
         for z in [0.8, 0.0, -0.5] {
-            assert!(turned(z, None).iter().all(|s| *s == 1.0), "{z}");
+            assert!(turned(z, None, true).iter().all(|s| *s == 1.0), "{z}");
         }
+    }
+
+    #[test]
+    fn a_bowl_in_an_open_scan_stays_as_it_is() {
+        assert!(turned(0.8, None, false).iter().any(|s| *s == -1.0));
     }
 
     #[test]
     fn scanners_come_before_the_winding_number() {
         let center: Vec<DVec3> = ball(0.0).0.iter().map(|f| -f.center).collect();
-        assert!(turned(0.5, Some(&center)).iter().all(|s| *s == -1.0));
+        assert!(turned(0.5, Some(&center), true).iter().all(|s| *s == -1.0));
     }
 }
