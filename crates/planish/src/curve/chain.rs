@@ -230,11 +230,34 @@ pub(crate) fn between(mesh: &TriMesh, adjacency: &Adjacency, a: &FacePoint, b: &
         faces(a).into_iter().find(|f| other.contains(f))
     };
     let Some(face) = shared else {
-        return if t < 0.5 { *a } else { *b };
+        // A place beside an edge by rounding is on it.
+        return match (weight_beside(adjacency, a, b.face), weight_beside(adjacency, b, a.face)) {
+            (Some((u, k)), Some((w, _))) if u <= w => between(mesh, adjacency, &on_edge(a, k), b, t),
+            (_, Some((_, k))) => between(mesh, adjacency, a, &on_edge(b, k), t),
+            _ if t < 0.5 => *a,
+            _ => *b,
+        };
     };
     let (x, y) = (on_face(mesh, a, face), on_face(mesh, b, face));
     let bary = std::array::from_fn(|k| x[k] + (y[k] - x[k]) * t);
     FacePoint { face, bary }
+}
+
+/// The weight that keeps a place off the edge to the face `other`, and its index.
+fn weight_beside(adjacency: &Adjacency, p: &FacePoint, other: u32) -> Option<(f64, usize)> {
+    let apart = |k: &usize| {
+        let o = adjacency.opposite[3 * p.face as usize + (k + 1) % 3];
+        o != crate::mesh::NONE && o / 3 == other
+    };
+    (0..3).find(apart).map(|k| (p.bary[k], k))
+}
+
+/// A place moved on to the edge where weight `k` is zero.
+fn on_edge(p: &FacePoint, k: usize) -> FacePoint {
+    let mut bary = p.bary;
+    bary[k] = 0.0;
+    let sum: f64 = bary.iter().sum();
+    FacePoint { face: p.face, bary: bary.map(|b| b / sum) }
 }
 
 /// Weights of a place on another face that it lies on.
