@@ -147,7 +147,7 @@ pub struct Demo {
 #[derive(Args, Debug)]
 pub struct Run {
     /// A mesh (PLY, OBJ, STL, GLB, glTF) or a scan (E57, LAS, LAZ, PLY without faces, PCD, XYZ, TXT, CSV, ASC, PTS, NPY,
-    /// NPZ)
+    /// NPZ, CONF)
     pub input: PathBuf,
     /// Folder for the products; made if missing
     #[arg(short, long, value_name = "DIR")]
@@ -200,7 +200,7 @@ impl HoleArgs {
 /// `planish clean`
 #[derive(Args, Debug)]
 pub struct Clean {
-    /// The scan: E57, LAS, LAZ, PLY, PCD, XYZ, TXT, CSV, ASC, PTS, NPY or NPZ
+    /// The scan: E57, LAS, LAZ, PLY, PCD, XYZ, TXT, CSV, ASC, PTS, NPY, NPZ or CONF
     pub scan: PathBuf,
     /// The points: .ply or .xyz (all columns), .las, .laz or .e57
     #[arg(short, long, value_name = "FILE")]
