@@ -254,6 +254,7 @@ fn wrong_sets_of_views_are_told_with_the_line() {
         ("bmesh a.ply 0 0 0 0 0 0 1\nbmesh b.ply 0 0 0 0 0 0 1\n", "\"b.ply\" that it refers to cannot be read"),
         ("bmesh ../a.ply 0 0 0 0 0 0 1\n", "outside the folder of the file"),
         ("bmesh a.ply 0 0 0 0 0 0\n", "no name with a translation and a quaternion (line 1)"),
+        ("\nbmesh a.ply 0 0 x 0 0 0 0 1\n", "no name with a translation and a quaternion (line 2)"),
         ("bmesh a.ply 0 0 0 0 0 0 0\n", "is no pose (line 1)"),
         ("bmesh a.ply 0 0 nan 0 0 0 1\n", "is no pose (line 1)"),
         ("bmesh cut.ply 0 0 0 0 0 0 1\n", "\"cut.ply\" that it refers to cannot be read"),

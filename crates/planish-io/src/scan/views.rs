@@ -36,7 +36,7 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Cloud, ReadError> {
         if mesh.points.is_empty() {
             continue;
         }
-        let before = cloud.points.len();
+        let first = cloud.scanners.is_empty();
         cloud.seen_by.extend(std::iter::repeat_n(cloud.scanners.len() as u32, mesh.points.len()));
         cloud.scanners.push(place(bounds.center() + AWAY * bounds.diagonal() * DVec3::Z));
         cloud.points.extend(mesh.points.iter().map(|&p| place(p)));
@@ -51,7 +51,7 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Cloud, ReadError> {
         });
         // What not all views have is no attribute of the scan.
         let fresh: Vec<_> = turned.collect();
-        if before == 0 {
+        if first {
             cloud.attributes = fresh;
             continue;
         }
@@ -68,15 +68,14 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Cloud, ReadError> {
 
 /// The views of the lines `bmesh`, or of the lines `mesh`.
 fn named(bytes: &[u8]) -> Result<Vec<View>, ReadError> {
-    let (mut lines, mut views, mut at) = (Lines::new(bytes, 0, 1), Vec::new(), 0);
+    let (mut lines, mut views) = (Lines::new(bytes, 0, 1), Vec::new());
     while let Some(line) = lines.next_line() {
-        at += 1;
         let words: Vec<&[u8]> = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
         let Some(kind @ (b"bmesh" | b"mesh")) = words.first().copied() else { continue };
-        let place = Place::Line(at);
-        let pose: Vec<f64> =
-            words[1..].iter().skip(1).filter_map(|w| std::str::from_utf8(w).ok()?.parse().ok()).collect();
-        let &[x, y, z, i, j, k, w] = &pose[..] else {
+        let place = Place::Line(lines.number());
+        let number = |w: &&[u8]| -> Option<f64> { std::str::from_utf8(w).ok()?.parse().ok() };
+        let pose: Option<Vec<f64>> = words.iter().skip(2).map(number).collect();
+        let Some(&[x, y, z, i, j, k, w]) = pose.as_deref() else {
             let what = format!("\"{}\" is no name with a translation and a quaternion", shown(line));
             return Err(ReadError::Syntax { what, place });
         };
