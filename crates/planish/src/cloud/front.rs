@@ -126,6 +126,11 @@ pub(super) fn grow(points: &[DVec3], tree: &KdTree, sites: &Sites, observer: &dy
     Some(supported(points, closed))
 }
 
+/// The other sheet of the site of a fit, if it has one: both stand side by side.
+pub(super) fn other_sheet(fits: &[Fit], i: usize) -> Option<usize> {
+    [i.wrapping_sub(1), i + 1].into_iter().find(|&j| fits.get(j).is_some_and(|g| g.site == fits[i].site))
+}
+
 /// Drops sheets that hardly any point is nearest to.
 fn supported(points: &[DVec3], fits: Vec<Fit>) -> Vec<Fit> {
     let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
@@ -176,8 +181,7 @@ fn accompanied(fits: Vec<Fit>) -> Vec<Fit> {
     let mut fits: Vec<Fit> = fits.into_iter().zip(company).filter(|(_, c)| *c >= COMPANY).map(|(f, _)| f).collect();
     // A sheet whose other one is dropped is no side of a plate.
     for i in 0..fits.len() {
-        let same_site = |j: usize| fits.get(j).is_some_and(|g| g.site == fits[i].site);
-        if !same_site(i.wrapping_sub(1)) && !same_site(i + 1) {
+        if other_sheet(&fits, i).is_none() {
             fits[i].gap = f64::INFINITY;
         }
     }

@@ -379,12 +379,11 @@ fn of_fits(fits: &[front::Fit], points: &[DVec3], tree: &KdTree, of: impl Fn(u32
         .into_par_iter()
         .map_init(Vec::new, |near, i| {
             let f = &fits[i];
-            let same_site = |j: &usize| fits.get(*j).is_some_and(|g| g.site == f.site);
-            let others: Vec<usize> = [i.wrapping_sub(1), i + 1].into_iter().filter(same_site).collect();
+            let other = front::other_sheet(fits, i);
             tree.nearest(f.center, TOLD, near);
             let own = near.iter().map(|n| n.1).filter(|&p| {
                 let off = |g: &front::Fit| g.quadric.distance(points[p as usize]).0.abs();
-                others.iter().all(|&j| off(f) <= off(&fits[j]))
+                other.is_none_or(|j| off(f) <= off(&fits[j]))
             });
             own.map(&of).sum::<DVec3>().normalize_or_zero()
         })

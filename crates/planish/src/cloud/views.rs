@@ -5,7 +5,7 @@
 //! leaves a hole there, and the number goes from outside to inside through it.
 
 use super::Dipoles;
-use super::front::Fit;
+use super::front::{Fit, other_sheet};
 use super::orient::Hints;
 use crate::geom::KdTree;
 use glam::DVec3;
@@ -29,10 +29,8 @@ const ROUNDS: usize = 8;
 /// * `sign` - 1 or -1 for the normal of every fit
 pub(super) fn aside(fits: &[Fit], sign: &[f64], hints: &Hints) -> Vec<(u32, f64)> {
     let layered = |i: usize| fits[i].gap.is_finite();
-    let pairs: Vec<usize> = (1..fits.len())
-        .map(|i| i - 1)
-        .filter(|&i| fits[i].site == fits[i + 1].site && layered(i) && layered(i + 1))
-        .collect();
+    let pairs: Vec<usize> =
+        (0..fits.len()).filter(|&i| layered(i) && other_sheet(fits, i) == Some(i + 1) && layered(i + 1)).collect();
     if pairs.is_empty() {
         return Vec::new();
     }
