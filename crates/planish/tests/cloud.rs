@@ -133,6 +133,23 @@ fn two_balls_half_a_radius_apart_are_two_segments_that_point_outward() {
 }
 
 #[test]
+fn two_balls_that_touch_or_have_a_gap_of_two_noise_levels_are_two_segments() {
+    let shape = shapes::sphere(1.0, 5);
+    let noise = 0.005;
+    for gap in [0.0, 2.0 * noise] {
+        let mut points = scan_of(&shape, 20_000, noise, 1);
+        points.extend(scan_of(&shape, 20_000, noise, 7).into_iter().map(|p| p + DVec3::X * (2.0 + gap)));
+        let samples = clean(points);
+        assert_eq!(samples.closed, [true, true], "gap {gap}");
+        // Where they are closer than six noise levels nobody knows whose a sample is, and at the rim of that a few lie across.
+        let clear = samples.samples.iter().filter(|s| (s.center.x - 1.0 - gap / 2.0).abs() > 3.0 * noise);
+        let apart: Vec<bool> = clear.map(|s| (s.segment == 1) == (s.center.x > 1.0 + gap / 2.0)).collect();
+        let agreed = apart.iter().filter(|a| **a).count() as f64 / apart.len() as f64;
+        assert!((agreed - 0.5).abs() > 0.49, "gap {gap}: {agreed} of the samples are in the segment of their ball");
+    }
+}
+
+#[test]
 fn a_terrain_points_up() {
     let points: Vec<DVec3> = (0..20_000u64)
         .map(|i| {

@@ -4,7 +4,7 @@
 //! these functions keeps edges sharp, and where one site errs its neighbours outvote it. A plate ends where its points do
 //! (`rim`), and a cell that faces the wrong way beside cells of several sheets is left hardly a say.
 
-use super::fit::sheet;
+use super::fit::{Ball, sheet};
 use super::front::{PRICE, VARIATION_PRICE};
 use super::nest::{self, LIMIT, Seen, cost, nest};
 use super::points::Points;
@@ -434,9 +434,8 @@ fn refined(
             }
             let ones = vec![1.0; own.len()];
             let noise = place.noise / radius;
-            let Some(found) = sheet(place.center, radius, own, &ones, Some(&old.0), noise, Some(1)) else {
-                return *old;
-            };
+            let ball = Ball { center: place.center, scale: radius, points: own, weights: &ones, guides: &[], noise };
+            let Some(found) = sheet(&ball, &old.0, 1) else { return *old };
             let middle = place.center + radius * own.iter().sum::<DVec3>() / own.len() as f64;
             let foot = found.quadric.project(middle).0;
             let fresh = found.quadric.normalized_at(foot);

@@ -4,6 +4,7 @@
 //! Implicit Equations*, 1991: the normalisation of family B.
 //! 1. frame: smallest eigenvector of the covariance, then the gradient of the height field
 //! 2. family A: a plane or a height-field quadric; family B: a general quadric by inverse iteration
+//!    (with the Hermite term of fitted neighbours, `guides`)
 //! 3. choice by AICc on first-order distances; robust weights from the residuals, then again from 1.
 //!
 //! Departs from [X03]: the singular vector of the algebraic distance is biased and changes under rigid motion, so family
@@ -14,14 +15,13 @@
 
 use super::Quadric;
 use super::dense;
+use super::guides::{self, Guide};
 use super::moments::Moments;
 use super::points::{Points, weighted_squares};
 use glam::DVec3;
 
 /// Points closer to zero than this many noise levels keep their weight (Tukey's biweight, 95 % efficiency).
 const TUKEY: f64 = 4.685;
-/// Rounds of robust weights.
-const ROUNDS: usize = 3;
 /// Family B is tried when the fourth-order term of the height field is above this share of the residual.
 const ORDER_FOUR_SHARE: f64 = 0.2;
 /// A general quadric has one sheet in its ball if its gradient varies by less than its own length; else it may be a
@@ -167,8 +167,9 @@ fn ridge<const N: usize>(g: &mut [[f64; N]; N]) {
 }
 
 /// The general quadric of least squared values under Taubin's constraint, near the quadric `start`.
-pub(super) fn general(m: &Moments, start: &[f64; 10]) -> Option<[f64; 10]> {
+pub(super) fn general(m: &Moments, guides: &[Guide], start: &[f64; 10]) -> Option<[f64; 10]> {
     let mut matrix = m.matrix();
+    guides::add(guides, &mut matrix);
     let n = m.gradient_matrix();
     let trace: f64 = (0..10).map(|i| matrix[i][i]).sum();
     for i in 0..10 {
@@ -205,40 +206,41 @@ pub(super) struct Sheet {
     pub parameters: f64,
 }
 
-/// Fits a sheet to points in local coordinates around `center` with unit `scale`.
+/// What a sheet is fitted to, in local coordinates around `center` with unit `scale`.
+#[derive(Clone, Copy)]
+pub(super) struct Ball<'a> {
+    pub center: DVec3,
+    pub scale: f64,
+    pub points: &'a Points,
+    /// Weight of every point.
+    pub weights: &'a [f64],
+    pub guides: &'a [Guide],
+    /// Standard deviation of the points.
+    pub noise: f64,
+}
+
+/// Fits a sheet.
 ///
-/// * `own` - weight of every point
-/// * `start` - a first guess whose residuals give the first robust weights, or `None`
-/// * `noise` - standard deviation of the points in local units
-pub(super) fn sheet(
-    center: DVec3,
-    scale: f64,
-    points: &Points,
-    own: &[f64],
-    start: Option<&Quadric>,
-    noise: f64,
-    rounds: Option<usize>,
-) -> Option<Sheet> {
-    let mut model = start.map(|q| (localized(q, center, scale), 6.0));
-    let (mut weights, mut distances) = (own.to_vec(), Vec::new());
+/// * `start` - a first guess, whose residuals give the first robust weights
+/// * `rounds` - how often the weights follow the fit
+pub(super) fn sheet(ball: &Ball, start: &Quadric, rounds: usize) -> Option<Sheet> {
+    let Ball { center, scale, points, noise, .. } = *ball;
+    let mut model = localized(start, center, scale);
+    let (mut weights, mut distances) = (ball.weights.to_vec(), Vec::new());
     let mut last = None;
-    for _ in 0..rounds.unwrap_or(ROUNDS) {
-        if let Some((q, _)) = &model {
-            points.distances(q, &mut distances);
-            for ((w, own), d) in weights.iter_mut().zip(own).zip(&distances) {
-                *w = own * tukey(d / noise);
-            }
+    for _ in 0..rounds {
+        points.distances(&model, &mut distances);
+        for ((w, own), d) in weights.iter_mut().zip(ball.weights).zip(&distances) {
+            *w = own * tukey(d / noise);
         }
         let m = points.moments(&weights);
         if m.weight() < FEWEST {
             return None;
         }
-        let frame = match &model {
-            Some((q, _)) => Frame::of(q.value(m.mean()).1.normalize_or(DVec3::Z)),
-            None => Frame::of_moments(&m),
-        };
-        let chosen = choose(&m, frame, points, &weights, noise, &mut distances)?;
-        model = Some((Quadric { center: DVec3::ZERO, scale: 1.0, a: chosen.0 }, chosen.1));
+        let felt = Ball { weights: &weights, guides: &guides::heeded(ball.guides, &model, noise), ..*ball };
+        let frame = Frame::of(model.value(m.mean()).1.normalize_or(DVec3::Z));
+        let chosen = choose(&m, &felt, frame, &mut distances)?;
+        model = Quadric { center: DVec3::ZERO, scale: 1.0, a: chosen.0 };
         last = Some((chosen, m.weight()));
     }
     let ((a, parameters, rss), weight) = last?;
@@ -252,25 +254,24 @@ pub(super) fn localized(q: &Quadric, center: DVec3, scale: f64) -> Quadric {
     Quadric { center: (q.center - center) / scale, scale: q.scale / scale, a: q.a }
 }
 
-/// The model of least AICc: coefficients, parameters and weighted sum of squared distances.
-fn choose(
-    m: &Moments,
-    frame: Frame,
-    points: &Points,
-    weights: &[f64],
-    noise: f64,
-    distances: &mut Vec<f64>,
-) -> Option<([f64; 10], f64, f64)> {
+/// The model of least AICc: coefficients, parameters and weighted sum of squared distances of the points.
+///
+/// The score counts the guides, too: a model whose gradient disagrees with the normals around is worth less ([X03] §6.2).
+fn choose(m: &Moments, felt: &Ball, frame: Frame, distances: &mut Vec<f64>) -> Option<([f64; 10], f64, f64)> {
+    let Ball { points, weights, guides, noise, .. } = *felt;
     let mut squared = |a: &[f64; 10]| {
-        points.distances(&Quadric { center: DVec3::ZERO, scale: 1.0, a: *a }, distances);
-        weighted_squares(weights, distances)
+        let model = Quadric { center: DVec3::ZERO, scale: 1.0, a: *a };
+        points.distances(&model, distances);
+        (weighted_squares(weights, distances), guides::squares(guides, &model))
     };
     let matrix = m.matrix();
     let curved = framed_height(&matrix, frame)?;
     let n = m.weight();
     let flat = plane(m, Frame::of_moments(m));
-    let score = |rss: f64, p: f64| n * (rss / n).max(1e-30).ln() + 2.0 * p * n / (n - p - 1.0).max(0.5);
-    let flat_rss = squared(&flat);
+    let all = n + guides::weight(guides);
+    let score = |rss: (f64, f64), p: f64| {
+        all * ((rss.0 + rss.1) / all).max(1e-30).ln() + 2.0 * p * all / (all - p - 1.0).max(0.5)
+    };
     let a = curved.implicit();
     let rss = squared(&a);
     let mut best = (a, 6.0, rss);
@@ -278,8 +279,8 @@ fn choose(
     let reach = points.iter().map(DVec3::length_squared).fold(0.0, f64::max).sqrt();
     let order_four = bend.powi(3) * reach.powi(4) / 8.0;
     if n > 12.0
-        && order_four > ORDER_FOUR_SHARE * (rss / n).sqrt().min(noise)
-        && let Some(b) = general(m, &a)
+        && order_four > ORDER_FOUR_SHARE * (rss.0 / n).sqrt().min(noise)
+        && let Some(b) = general(m, guides, &a)
     {
         let general_rss = squared(&b);
         // A general quadric may have come out inside out; the sign of the height field is kept.
@@ -289,10 +290,12 @@ fn choose(
             best = (if along < 0.0 { b.map(|x| -x) } else { b }, 9.0, general_rss);
         }
     }
+    let flat_rss = squared(&flat);
     if score(flat_rss, 3.0) < score(best.2, best.1) {
         best = (flat, 3.0, flat_rss);
     }
-    Some(best)
+    let (model, parameters, (rss, _)) = best;
+    Some((model, parameters, rss))
 }
 
 /// Tukey's biweight of a residual in noise levels.

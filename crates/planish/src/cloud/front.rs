@@ -12,7 +12,8 @@
 //! on its own fit, which is the seed jump of [X03]. Supports follow from the data and not from factors c_i.
 
 use super::Quadric;
-use super::fit::{Sheet, kernel, localized, sheet};
+use super::fit::{Ball, Sheet, kernel, localized, sheet};
+use super::guides::guides;
 use super::layers;
 use super::nest::{LIMIT, Seen, cost, nest};
 use super::points::Points;
@@ -55,7 +56,7 @@ const ASKED: usize = 16;
 /// Fitted neighbours are sought within this many radii.
 const FARTHEST: f64 = 3.0;
 /// Fits that guide others have an expected error below this share of the noise.
-const SURE: f64 = 0.35;
+pub(super) const SURE: f64 = 0.35;
 /// A carried-on sheet begins with the ball that it has, at most this many times that of the site.
 const CARRIED: f64 = 3.0;
 /// Points of less weight are left out.
@@ -80,6 +81,8 @@ pub(super) struct Fit {
     pub radius: f64,
     /// Standard deviation of the points around it.
     pub noise: f64,
+    /// That over the noise of the region, at least 1.
+    pub thickness: f64,
     /// Expected error.
     pub error: f64,
     pub irregularity: f64,
@@ -116,14 +119,21 @@ pub(super) fn grow(points: &[DVec3], tree: &KdTree, sites: &Sites, observer: &dy
         start = end;
         let centers: Vec<DVec3> = closed.iter().map(|f| f.center).collect();
         let closed_tree = KdTree::new(&centers);
-        let snapshot = &closed;
+        let snapshot = Closed { fits: &closed, tree: &closed_tree };
         let fitted = in_pieces(open.len(), (span[0], span[1]), observer, |_, k| {
             let site = open[k] as usize;
-            fit_site(tree, sites, site, irregularity[site], class as u8, snapshot, &closed_tree)
+            fit_site(tree, sites, site, irregularity[site], class as u8, snapshot)
         })?;
         closed.extend(fitted.into_iter().flatten());
     }
     Some(supported(points, closed))
+}
+
+/// What is fitted already.
+#[derive(Clone, Copy)]
+struct Closed<'a> {
+    fits: &'a [Fit],
+    tree: &'a KdTree,
 }
 
 /// The other sheet of the site of a fit, if it has one: both stand side by side.
@@ -188,15 +198,7 @@ fn accompanied(fits: Vec<Fit>) -> Vec<Fit> {
     fits
 }
 
-fn fit_site(
-    tree: &KdTree,
-    sites: &Sites,
-    site: usize,
-    irregularity: f64,
-    class: u8,
-    closed: &[Fit],
-    closed_tree: &KdTree,
-) -> Vec<Fit> {
+fn fit_site(tree: &KdTree, sites: &Sites, site: usize, irregularity: f64, class: u8, closed: Closed) -> Vec<Fit> {
     let survey = &sites.survey[site];
     let p = survey.quadric.center;
     let noise = sites.prior[site].noise.min(survey.noise).max(1e-300);
@@ -205,23 +207,24 @@ fn fit_site(
     } else if class == 0 {
         vec![Start { sheet: survey.quadric, at: p, radius: survey.radius }]
     } else {
-        choose(tree, survey.radius, sites.gap[site] / APART, survey.quadric, noise, closed, closed_tree)
+        choose(tree, survey.radius, sites.gap[site] / APART, survey.quadric, noise, closed)
     };
     let sheets = starts.len() as u8;
     let all: Vec<Quadric> = starts.iter().map(|s| s.sheet).collect();
     let mut fits: Vec<Fit> = starts
         .into_iter()
         .enumerate()
-        .filter_map(|(k, Start { sheet: start, at, radius })| {
+        .filter_map(|(k, start)| {
             let others: Vec<Quadric> = (0..all.len()).filter(|&i| i != k).map(|i| all[i]).collect();
-            let (s, radius, error) = widen(tree, at, radius, &start, &others, noise)?;
-            let (center, normal) = s.quadric.project(at);
+            let (s, radius, error) = widen(tree, closed, &start, &others, noise)?;
+            let (center, normal) = s.quadric.project(start.at);
             Some(Fit {
                 quadric: s.quadric.normalized_at(center),
                 center,
                 normal,
                 radius,
                 noise: s.rms,
+                thickness: (s.rms / sites.prior[site].noise.max(1e-300)).max(1.0),
                 error,
                 irregularity,
                 class,
@@ -250,15 +253,7 @@ fn fit_site(
 const SIDE_BY_SIDE: f64 = 0.866;
 
 /// The sheets that explain the points around a site, each with the middle of the points that are nearest to it there.
-fn choose(
-    tree: &KdTree,
-    radius: f64,
-    usual: f64,
-    own: Quadric,
-    noise: f64,
-    closed: &[Fit],
-    closed_tree: &KdTree,
-) -> Vec<Start> {
+fn choose(tree: &KdTree, radius: f64, usual: f64, own: Quadric, noise: f64, closed: Closed) -> Vec<Start> {
     let p = own.center;
     let alone = vec![Start { sheet: own, at: p, radius }];
     // A crease has a narrow ball because one sheet is no model there; with the right sheets a usual ball will do.
@@ -273,11 +268,11 @@ fn choose(
         return alone;
     }
     let mut near = Vec::new();
-    closed_tree.within(p, FARTHEST * wide, |i, _, d2| near.push((d2, i)));
+    closed.tree.within(p, FARTHEST * wide, |i, _, d2| near.push((d2, i)));
     near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut asked: Vec<(Quadric, f64)> = Vec::new();
     for &(_, i) in &near {
-        let f = &closed[i as usize];
+        let f = &closed.fits[i as usize];
         if f.error > SURE * noise {
             continue;
         }
@@ -337,20 +332,14 @@ struct Start {
 }
 
 /// Fits a sheet from a first guess and widens its ball while its own points show no bias: sheet, radius, expected error.
-fn widen(
-    tree: &KdTree,
-    p: DVec3,
-    radius: f64,
-    start: &Quadric,
-    others: &[Quadric],
-    noise: f64,
-) -> Option<(Sheet, f64, f64)> {
+fn widen(tree: &KdTree, closed: Closed, start: &Start, others: &[Quadric], noise: f64) -> Option<(Sheet, f64, f64)> {
+    let p = start.at;
     let mut best: Option<(Sheet, f64, f64)> = None;
-    let mut guess = *start;
+    let mut guess = start.sheet;
     let (mut ball, mut weights) = (Points::default(), Vec::new());
     let (mut own, mut other, mut all) = (Vec::new(), Vec::new(), Vec::new());
     for step in 0..=STEPS {
-        let r = radius * WIDEN.powi(step as i32);
+        let r = start.radius * WIDEN.powi(step as i32);
         ball.clear();
         weights.clear();
         tree.within(p, r, |_, q, _| {
@@ -380,8 +369,9 @@ fn widen(
         if step > 0 && ball.len() > PLENTY && r > WIDE_ENOUGH * noise {
             break;
         }
-        let Some(found) = sheet(p, r, &ball, &weights, Some(&guess), noise / r, Some(if step == 0 { 2 } else { 1 }))
-        else {
+        let guides = guides(closed.fits, closed.tree, p, r, noise);
+        let part = Ball { center: p, scale: r, points: &ball, weights: &weights, guides: &guides, noise: noise / r };
+        let Some(found) = sheet(&part, &guess, if step == 0 { 2 } else { 1 }) else {
             if best.is_none() && step < STEPS {
                 continue;
             }

@@ -23,7 +23,7 @@ const LAYERS: f64 = 4.0;
 /// A sheet goes on at most this share of the gap aside.
 const SIDE: f64 = 0.4;
 
-/// Power of the ratio of the noise of two samples in the weight of their vote.
+/// Power of the ratio of the noise of two samples, and of that of the region to theirs, in the weight of their vote.
 const THICK: i32 = 6;
 
 /// What one sample says of another.
@@ -67,7 +67,8 @@ fn vote(fits: &[Fit], i: usize, j: usize) -> Option<Vote> {
     let (e, m) = g.quadric.distance(f.center);
     let turn = n.dot(g.normal) + m.dot(f.normal);
     // A fit through two sheets at once is thicker than what is around it, and speaks for neither.
-    let alike = (f.noise.min(g.noise) / f.noise.max(g.noise).max(1e-300)).powi(THICK).max(1e-6);
+    let ratio = f.noise.min(g.noise) / f.noise.max(g.noise).max(1e-300) / (f.thickness * g.thickness);
+    let alike = ratio.powi(THICK).max(1e-6);
     let near = (1.0 - apart / (2.0 * reach)).max(0.01) * alike;
     // The two sides of a plate or a gap that were found as such look away from each other, and nothing speaks louder.
     if f.site == g.site && f.gap.is_finite() && g.gap.is_finite() {
@@ -117,7 +118,7 @@ pub(super) fn components(count: usize, pairs: impl Iterator<Item = (u32, u32)>) 
     (0..count as u32).map(|i| root(&mut parent, i)).collect()
 }
 
-pub(super) fn root(parent: &mut [u32], mut i: u32) -> u32 {
+fn root(parent: &mut [u32], mut i: u32) -> u32 {
     while parent[i as usize] != i {
         parent[i as usize] = parent[parent[i as usize] as usize];
         i = parent[i as usize];

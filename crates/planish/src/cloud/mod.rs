@@ -4,8 +4,9 @@
 //! Implicit Quadric Regression*, 2003.
 //! 1. order, duplicates: [`Cloud`]                   2. noise and radius of the fits (§6.1): `survey`, `sites`
 //! 3. fits in rising irregularity (§5, fig. 7; §4.1, §6.2): `front`, `fit`
-//! 4. orientation (§7, fig. 12): `link`, `orient`, `wind`; views that lie aside of each other are one sheet: `views`
-//! 5. points on the surface, outliers, segments: `project`
+//! 4. orientation (§7, fig. 12): `link`, `orient`, `wind`; bodies: `segments`; views that lie aside of each other are one
+//!    sheet: `views`
+//! 5. points on the surface, outliers: `project`
 //!
 //! The blend (§4.2, eq. 4) is `field::SampleField`. Where a step departs from the paper its file says so.
 
@@ -15,6 +16,7 @@ mod dense;
 mod dipoles;
 mod fit;
 mod front;
+mod guides;
 mod layers;
 mod link;
 mod moments;
@@ -25,6 +27,7 @@ mod project;
 mod quadric;
 mod rim;
 mod scanner;
+mod segments;
 mod sites;
 mod strays;
 mod survey;
@@ -266,7 +269,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
                 irregularity: f.irregularity,
                 class: f.class,
                 sheets: f.sheets,
-                segment: oriented.part[i],
+                segment: oriented.segment[i],
                 confidence: oriented.confidence[i],
             }
         })

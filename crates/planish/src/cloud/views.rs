@@ -101,6 +101,7 @@ mod tests {
             normal,
             radius: 2.0 * STEP,
             noise: 0.003,
+            thickness: 1.0,
             error: 1e-4,
             irregularity: 0.0,
             class: 0,

@@ -86,6 +86,7 @@ mod tests {
                     normal,
                     radius: 0.1,
                     noise: 0.01,
+                    thickness: 1.0,
                     error: 1e-3,
                     irregularity: 0.0,
                     class: 0,
