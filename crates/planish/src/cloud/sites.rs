@@ -17,6 +17,17 @@ const USUAL: f64 = 0.8;
 const SCOUT: usize = 24;
 /// A fit may be this much wider than the scouts around saw.
 const REACH: f64 = 1.7;
+/// Scouts that tell the radii of a region.
+const SCOUTS: usize = 15;
+/// Scouts that are sure of their noise and tell that of a region, and the share of them that says less: what shape there
+/// is around adds to some of them, never takes away.
+const SURE_SCOUTS: usize = 40;
+const BELOW: f64 = 0.2;
+/// The nearest ones of them: what is this many times less than their middle is the noise of another region.
+const NEAREST: usize = 8;
+const ANOTHER: f64 = 1.35;
+/// Noise is known if at least this share of all scouts are sure.
+const ENOUGH: f64 = 0.05;
 /// Points per piece of parallel work between two looks at the observer.
 pub(super) const CHUNK: usize = 512;
 
@@ -59,30 +70,28 @@ pub(super) fn in_pieces<T: Send>(
 /// Chooses and surveys the sites of points in the order of their tree. `None` if cancelled.
 pub(super) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -> Option<Sites> {
     let scouts: Vec<u32> = (0..points.len() as u32).step_by(SCOUT.min(points.len() / 8 + 1)).collect();
-    let blank = Prior { noise: 0.0, one: false };
+    let blank = Prior { noise: 0.0, sure: false, one: false };
     let first = in_pieces(scouts.len(), (0.0, 0.2), observer, |s, i| {
         survey(tree, points[scouts[i] as usize], f64::INFINITY, blank, s)
     })?;
     // A narrow ball has little noise by chance; with the noise of those around the scouts look again.
     let (known, places): (Vec<Survey>, Vec<DVec3>) =
         first.iter().zip(&scouts).filter_map(|(s, &i)| Some(((*s)?, points[i as usize]))).unzip();
-    let priors = (!known.is_empty()).then(|| (known, KdTree::new(&places)));
-    let seen = match priors {
-        Some((known, scout_tree)) => {
-            let regions = regions(&scouts.iter().map(|&i| points[i as usize]).collect::<Vec<_>>(), &scout_tree, &known);
+    let seen = match known.is_empty() {
+        false => {
+            let regions = regions(&scouts.iter().map(|&i| points[i as usize]).collect::<Vec<_>>(), &places, &known);
             in_pieces(scouts.len(), (0.2, 0.4), observer, |s, i| {
                 survey(tree, points[scouts[i] as usize], f64::INFINITY, regions[i].2, s)
             })?
         }
-        None => first,
+        true => first,
     };
     let (known, places): (Vec<Survey>, Vec<DVec3>) =
         seen.into_iter().zip(&scouts).filter_map(|(s, &i)| Some((s?, points[i as usize]))).unzip();
     if known.is_empty() {
         return Some(Sites { owner: vec![u32::MAX; points.len()], ..Sites::default() });
     }
-    let scout_tree = KdTree::new(&places);
-    let regions = regions(points, &scout_tree, &known);
+    let regions = regions(points, &places, &known);
     let chosen = cover(points, tree, |i| APART * regions[i].0);
     let surveys = in_pieces(chosen.len(), (0.4, 1.0), observer, |s, i| {
         let at = chosen[i] as usize;
@@ -101,9 +110,13 @@ pub(super) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
     Some(sites)
 }
 
-/// For each point the least radius around, the farthest that a fit may reach, and the region: middles of the scouts.
-fn regions(points: &[DVec3], tree: &KdTree, known: &[Survey]) -> Vec<(f64, f64, Prior)> {
-    const SCOUTS: usize = 15;
+/// For each point the least radius around, the farthest that a fit may reach, and the region, from the scouts around.
+///
+/// Where a plate or a rib is as thin as the noise every scout takes it for noise; those that are sure of theirs are a
+/// little farther off.
+fn regions(points: &[DVec3], places: &[DVec3], known: &[Survey]) -> Vec<(f64, f64, Prior)> {
+    let tree = KdTree::new(places);
+    let certain = certain_noise(places, known);
     points
         .par_iter()
         .map_init(
@@ -119,12 +132,35 @@ fn regions(points: &[DVec3], tree: &KdTree, known: &[Survey]) -> Vec<(f64, f64, 
                 radii.sort_unstable_by(f64::total_cmp);
                 noises.sort_unstable_by(f64::total_cmp);
                 let middle = radii[radii.len() / 2];
+                let prior = match &certain {
+                    Some(noise) => Prior { noise: noise[near[0].1 as usize], sure: true, one: false },
+                    None => Prior { noise: noises[noises.len() / 2], sure: false, one: false },
+                };
                 // A scout in a crease sees next to nothing; sites there stand as for half of the usual radius.
-                let prior = Prior { noise: noises[noises.len() / 2], one: false };
                 (least.max(USUAL * middle), REACH * most, prior)
             },
         )
         .collect()
+}
+
+/// The noise at every scout by those around that are sure of theirs; `None` if these are few.
+fn certain_noise(places: &[DVec3], known: &[Survey]) -> Option<Vec<f64>> {
+    let (certain, at): (Vec<f64>, Vec<DVec3>) =
+        known.iter().zip(places).filter(|k| k.0.sure).map(|k| (k.0.noise, *k.1)).unzip();
+    if certain.len() < SURE_SCOUTS || (certain.len() as f64) < ENOUGH * known.len() as f64 {
+        return None;
+    }
+    let tree = KdTree::new(&at);
+    let of = |near: &mut Vec<(f64, u32)>, p: &DVec3| {
+        tree.nearest(*p, SURE_SCOUTS, near);
+        let mut said: Vec<f64> = near.iter().map(|n| certain[n.1 as usize]).collect();
+        said[..NEAREST].sort_unstable_by(f64::total_cmp);
+        let least = said[NEAREST / 2] / ANOTHER;
+        said.retain(|&n| n >= least);
+        said.sort_unstable_by(f64::total_cmp);
+        said[(BELOW * said.len() as f64) as usize]
+    };
+    Some(places.par_iter().map_init(Vec::new, of).collect())
 }
 
 /// Points in their order such that none is within `gap(point)` of an earlier one and all are within that of one.
@@ -151,7 +187,7 @@ impl Sites {
             .par_iter()
             .map_init(Scratch::default, |scratch, &(site, apart)| {
                 let old = &self.survey[site as usize];
-                let prior = Prior { noise: old.noise.hypot(apart / 2.0), one: true };
+                let prior = Prior { noise: old.noise.hypot(apart / 2.0), sure: false, one: true };
                 (prior, survey(tree, old.quadric.center, f64::INFINITY, prior, scratch))
             })
             .collect();

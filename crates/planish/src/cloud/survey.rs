@@ -6,6 +6,7 @@
 //!    beyond noise is bias, what is left inside the sectors is noise
 //! 3. two sheets close together where the residuals have a dip (`layers`)
 //! 4. the ball of least variance plus squared bias
+//! 5. the scatter is the noise for sure where nothing speaks of more: no bias, and fourth moments as of a normal spread
 //!
 //! Departs from [X03]: no feature size is set by hand, and the noise is measured in every place by itself.
 
@@ -27,12 +28,22 @@ const BALLS: usize = 12;
 const STRIDE: usize = 3;
 /// A ball must be this many noise levels wide: below it the points fill a volume.
 const NOISE_RADII: f64 = 4.0;
+/// Where the noise is known the search begins with this many: what scatters more in such a ball is its shape. So do those
+/// who go first, and who of them is sure of the noise is asked afterwards.
+const KNOWN_RADII: f64 = 3.0;
+/// But a ball is this many times as wide as its own scatter: one full of points is sqrt(5) times.
+const NO_VOLUME: f64 = 2.6;
 /// The search ends when the error has grown to this many times the least one.
 const HOPELESS: f64 = 6.0;
 /// Share of the noise of the region that every place has at least.
 const KNOWN: f64 = 0.8;
 /// Scatter above this many times the usual noise is more than noise: another sheet, or relief finer than the sectors.
 const THICKER: f64 = 1.15;
+/// The scatter of a place is noise for sure if the ball has this many points, the averages of its sectors hold less than so
+/// much beyond noise, and its fourth moment is that of a normal distribution within so many standard deviations.
+const MANY: f64 = 100.0;
+const UNBIASED: f64 = 6.0;
+const NORMAL: f64 = 2.0;
 /// Parameters of a height field: its error at the centre is about this times the noise over the points.
 const PARAMETERS: f64 = 6.0;
 
@@ -51,6 +62,8 @@ pub(super) struct Survey {
     pub quadric: Quadric,
     /// A second sheet close to it: then this is the sheet of the place itself, and both are one plate or one gap.
     pub layer: Option<Quadric>,
+    /// All the scatter is noise: one sheet without bias, normally spread.
+    pub sure: bool,
 }
 
 /// Buffers of one thread.
@@ -66,6 +79,8 @@ pub(super) struct Scratch {
 pub(super) struct Prior {
     /// Noise of the region, world units; 0 where nothing is known.
     pub noise: f64,
+    /// Places around were sure of it: what scatters more is no noise.
+    pub sure: bool,
     /// Two sheets side by side are one surface there, seen twice.
     pub one: bool,
 }
@@ -83,10 +98,11 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
         return None;
     }
     let floor = KNOWN * prior.noise;
+    let start = if prior.sure { KNOWN_RADII * prior.noise } else { NOISE_RADII * floor };
     let mut p = p;
-    if NOISE_RADII * floor > r0 {
+    if start > r0 {
         // A point aside of the surface sees one side of the noise; the search begins on the plane of its ball.
-        r0 = NOISE_RADII * floor;
+        r0 = start;
         for _ in 0..2 {
             let mut m = Moments::ZERO;
             tree.within(p, r0, |_, q, _| m.add((q - p) / r0, 1.0));
@@ -130,7 +146,7 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
             }
             let Some(height) = framed_height(&sums.matrix(), Frame::of_moments(&sums)) else { continue };
             let ball = GROWTH.powi(j as i32);
-            let (noise, excess) = bias(&height, &scratch.y, ball);
+            let Scatter { noise, excess, kurtosis } = bias(&height, &scratch.y, ball);
             let count = scratch.y.len();
             let layers = if prior.one { None } else { split(&height, &scratch.y) };
             let (noise, excess) = match &layers {
@@ -138,7 +154,14 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
                 // Each sheet has half of the points, and its bias is not measured: that of both together is.
                 Some(l) => (l.noise.max(floor / r0), PARAMETERS + 2.0 * layer_bias(l, &scratch.y, ball)),
             };
-            if ball < NOISE_RADII * noise {
+            let (radii, own) = match prior.sure {
+                true => (KNOWN_RADII, noise.min(prior.noise / r0)),
+                false if prior.noise > 0.0 => (NOISE_RADII, noise),
+                false => (KNOWN_RADII, noise),
+            };
+            let wide = (radii * own).max(NO_VOLUME * noise);
+            // The first ball is as wide as the noise asks, but for rounding.
+            if ball * (1.0 + 1e-9) < wide {
                 continue;
             }
             usual = usual.min(noise);
@@ -154,6 +177,10 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
                     error: error * r0 * r0,
                     spacing: radius(j)
                         * (std::f64::consts::PI * if layers.is_some() { 2.0 } else { 1.0 } / count as f64).sqrt(),
+                    sure: layers.is_none()
+                        && count as f64 > MANY
+                        && excess < UNBIASED
+                        && (kurtosis - 3.0).abs() < NORMAL * (24.0 / count as f64).sqrt(),
                     quadric: quadric(layers.as_ref().map_or(&height, |l| &l.sheets[0])),
                     layer: layers.map(|l| quadric(&l.sheets[1])),
                 });
@@ -171,17 +198,27 @@ fn layer_bias(layers: &Layers, points: &[DVec3], ball: f64) -> f64 {
         let [a, b] = [k, 1 - k].map(|i| &layers.sheets[i]);
         points.iter().copied().filter(|&y| a.residual(y).abs() <= b.residual(y).abs()).collect()
     };
-    (0..2).map(|k| bias(&layers.sheets[k], &own(k), ball).1).sum::<f64>() / 2.0
+    (0..2).map(|k| bias(&layers.sheets[k], &own(k), ball).excess).sum::<f64>() / 2.0
 }
 
-/// Noise inside the sectors and what the averages of the sectors hold beyond it, in units of the squared noise.
-pub(super) fn bias(height: &Height, points: &[DVec3], ball: f64) -> (f64, f64) {
+/// What the residuals of a ball show.
+struct Scatter {
+    /// Standard deviation inside the sectors, local units.
+    noise: f64,
+    /// What the averages of the sectors hold beyond it, in units of the squared noise.
+    excess: f64,
+    /// Fourth moment of the residuals over the square of the second: 3 of normal noise.
+    kurtosis: f64,
+}
+
+/// Noise inside the sectors and what the averages of the sectors hold beyond it.
+fn bias(height: &Height, points: &[DVec3], ball: f64) -> Scatter {
     const SECTORS: usize = 16;
     // Two rings of equal area want five points in each part.
     let rings = points.len() >= 5 * SECTORS;
     let half = ball * ball / 2.0;
     let mut sums = [(0.0, 0.0); SECTORS];
-    let mut squares = 0.0;
+    let (mut squares, mut fourths) = (0.0, 0.0);
     for &y in points {
         let (u, v) = (height.frame.u.dot(y), height.frame.v.dot(y));
         let r = height.residual(y);
@@ -192,6 +229,7 @@ pub(super) fn bias(height: &Height, points: &[DVec3], ball: f64) -> (f64, f64) {
         sums[at].0 += 1.0;
         sums[at].1 += r;
         squares += r * r;
+        fourths += (r * r) * (r * r);
     }
     let parts = sums.iter().filter(|s| s.0 > 0.0).count() as f64;
     let between: f64 = sums.iter().filter(|s| s.0 > 0.0).map(|s| s.1 * s.1 / s.0).sum();
@@ -200,5 +238,6 @@ pub(super) fn bias(height: &Height, points: &[DVec3], ball: f64) -> (f64, f64) {
     // The averages can take up this many of the six parameters, so the fit has removed their share.
     let freedom = (parts - if rings { 5.0 } else { 4.0 }).max(1.0);
     let excess = if within > 0.0 { (between / within - freedom).max(0.0) } else { 0.0 };
-    (within.sqrt(), excess)
+    let kurtosis = if squares > 0.0 { n * fourths / (squares * squares) } else { 3.0 };
+    Scatter { noise: within.sqrt(), excess, kurtosis }
 }
