@@ -226,3 +226,67 @@ impl Sites {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::random;
+    use crate::observe::Silent;
+
+    fn gauss(i: u64) -> DVec3 {
+        DVec3::from_array(
+            [0, 1, 2].map(|k| random::normal(random::unit(7, 6 * i + 2 * k), random::unit(7, 6 * i + 2 * k + 1))),
+        )
+    }
+
+    fn sites_of(points: Vec<DVec3>) -> (Vec<DVec3>, Sites) {
+        let order = KdTree::new(&points);
+        let points: Vec<DVec3> = order.order().iter().map(|&i| points[i as usize]).collect();
+        let sites = choose(&points, &KdTree::new(&points), &Silent).unwrap();
+        (points, sites)
+    }
+
+    fn share(all: &[usize], good: impl Fn(usize) -> bool) -> f64 {
+        all.iter().filter(|&&s| good(s)).count() as f64 / all.len() as f64
+    }
+
+    #[test]
+    fn on_a_plate_of_three_noise_levels_the_noise_is_that_of_the_rest_within_15_percent_and_balls_have_six_levels() {
+        // A sphere of 50 noise levels, and aside a plate.
+        let (noise, count) = (0.02, 40_000u64);
+        let place = |i: u64| {
+            let r = |k: u64| 2.0 * random::unit(5, 4 * i + k) - 1.0;
+            if i % 5 < 3 {
+                let (z, a) = (r(0), std::f64::consts::PI * r(1));
+                let s = (1.0 - z * z).sqrt();
+                return DVec3::new(s * a.cos(), s * a.sin(), z);
+            }
+            DVec3::new(3.0 + r(0), r(1), 1.5 * noise * if i % 5 == 3 { 1.0 } else { -1.0 })
+        };
+        let (points, sites) = sites_of((0..count).map(|i| place(i) + noise * gauss(i)).collect());
+        let plate: Vec<usize> = (0..sites.point.len())
+            .filter(|&s| (points[sites.point[s] as usize] - DVec3::new(3.0, 0.0, 0.0)).abs().max_element() < 0.8)
+            .collect();
+        assert!(plate.len() > 50, "{}", plate.len());
+        let known = share(&plate, |s| (sites.prior[s].noise / noise - 1.0).abs() < 0.15);
+        assert!(known > 0.9, "{known}");
+        let narrow = share(&plate, |s| sites.survey[s].radius < 6.0 * noise);
+        assert!(narrow > 0.9, "{narrow}");
+    }
+
+    #[test]
+    fn noise_three_times_as_high_beyond_a_line_is_known_within_a_third_on_both_sides() {
+        let place = |i: u64| {
+            let r = |k: u64| 2.0 * random::unit(3, 2 * i + k) - 1.0;
+            let p = DVec3::new(r(0), r(1), 0.0);
+            p + if p.x < 0.0 { 0.005 } else { 0.015 } * gauss(i)
+        };
+        let (points, sites) = sites_of((0..40_000).map(place).collect());
+        for (side, noise) in [(-1.0, 0.005), (1.0, 0.015)] {
+            let there: Vec<usize> =
+                (0..sites.point.len()).filter(|&s| side * points[sites.point[s] as usize].x > 0.06).collect();
+            let known = share(&there, |s| (sites.prior[s].noise / noise - 1.0).abs() < 0.33);
+            assert!(there.len() > 50 && known > 0.97, "{known}");
+        }
+    }
+}

@@ -40,10 +40,12 @@ const KNOWN: f64 = 0.8;
 /// Scatter above this many times the usual noise is more than noise: another sheet, or relief finer than the sectors.
 const THICKER: f64 = 1.15;
 /// The scatter of a place is noise for sure if the ball has this many points, the averages of its sectors hold less than so
-/// much beyond noise, and its fourth moment is that of a normal distribution within so many standard deviations.
+/// much beyond noise, and its fourth moment is that of a normal distribution within so many standard deviations, and within
+/// half of what two sheets three levels apart lack.
 const MANY: f64 = 100.0;
 const UNBIASED: f64 = 6.0;
 const NORMAL: f64 = 2.0;
+const LACK: f64 = 0.5;
 /// Parameters of a height field: its error at the centre is about this times the noise over the points.
 const PARAMETERS: f64 = 6.0;
 
@@ -180,7 +182,7 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
                     sure: layers.is_none()
                         && count as f64 > MANY
                         && excess < UNBIASED
-                        && (kurtosis - 3.0).abs() < NORMAL * (24.0 / count as f64).sqrt(),
+                        && (kurtosis - 3.0).abs() < LACK.min(NORMAL * (24.0 / count as f64).sqrt()),
                     quadric: quadric(layers.as_ref().map_or(&height, |l| &l.sheets[0])),
                     layer: layers.map(|l| quadric(&l.sheets[1])),
                 });
