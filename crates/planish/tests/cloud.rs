@@ -93,6 +93,21 @@ fn points_of_a_sphere_with_noise_of_half_the_spacing_are_moved_to_within_0_075_s
 }
 
 #[test]
+fn noise_of_one_percent_shrinks_a_sphere_by_less_than_a_quarter_of_what_it_blurs() {
+    let noise = 0.0346;
+    let points: Vec<DVec3> = sphere(50_000)
+        .into_iter()
+        .zip(0u64..)
+        .map(|(p, i)| p + noise * DVec3::from_array([0, 1, 2].map(|k| normal(3, 3 * i + k))))
+        .collect();
+    let samples = clean(points.clone());
+    let made = cloud::project(&Cloud::new(points), &samples, 4.0, &ProjectParams::default(), &Silent).unwrap();
+    let off = made.cloud.points.iter().map(|p| p.length() - 1.0).sum::<f64>() / made.cloud.points.len() as f64;
+    // By the square of the noise over the radius.
+    assert!(off.abs() < 0.25 * noise * noise, "{off}");
+}
+
+#[test]
 fn all_samples_of_a_closed_shape_point_outward() {
     for mesh in [shapes::sphere(1.0, 5), shapes::torus(1.0, 0.35, 96, 48)] {
         let diagonal = mesh.bounds().diagonal();

@@ -19,6 +19,8 @@ use serde::{Deserialize, Serialize};
 
 /// The points that a cell explains lie within this many supports: a fillet and an edge differ only from afar.
 const HEARD: f64 = 1.3;
+/// And it takes part in the blend within so many: nearly as far as its points.
+const BLENDED: f64 = 1.2;
 /// Most sheets of a cell.
 const MOST: usize = nest::MOST;
 /// Samples within this many supports are candidates.
@@ -79,8 +81,13 @@ impl Cell {
 
     /// Weight in the blend at a point whose squared distance is this share of the squared support.
     pub(super) fn weight(&self, t2: f64) -> f64 {
-        // C2 at the rim; a steep bell, so that a point hears the cells beside it.
-        (1.0 - t2).max(0.0).powi(4) * self.trust
+        // C1 at the rim; a wide bell, since the mean of many cells has less noise than any of them.
+        (1.0 - t2).max(0.0).powi(2) * self.trust
+    }
+
+    /// Squared error that is expected there: it grows with the distance.
+    pub(super) fn variance(&self, t2: f64) -> f64 {
+        self.support * self.support / self.trust * (1.0 + t2) * (1.0 + t2)
     }
 }
 
@@ -107,7 +114,7 @@ pub(super) fn cells(
             Place {
                 center: if count > 0 { sum / count as f64 } else { sites.survey[site].quadric.center },
                 support,
-                noise: sites.prior[site].noise.min(sites.survey[site].noise).max(1e-9 * support),
+                noise: sites.noise(site).max(1e-9 * support),
             }
         })
         .collect();
@@ -176,7 +183,7 @@ fn outvoted(cells: Vec<Cell>, noise: &[f64]) -> Vec<Cell> {
                     let votes = if cell.count > 1 { 1.0 } else { 0.0 };
                     let weight = votes * now[i].weight(cell.center.distance_squared(p) / cell.support.powi(2));
                     blend.at(p).is_some_and(|all| {
-                        let others = (all.value * all.weight - own * weight) / (all.weight - weight);
+                        let others = (all.mean * all.weight - own * weight) / (all.weight - weight);
                         others * own < 0.0 && others.abs() > SURE * noise[i]
                     })
                 });
@@ -224,9 +231,9 @@ impl Found {
     }
 
     fn cell(&self, place: &Place) -> Cell {
-        let support = place.support;
+        let support = BLENDED * place.support;
         let mut sheets = [self.sheets[0].0; MOST];
-        sheets.iter_mut().zip(&self.sheets).for_each(|(s, f)| *s = f.0);
+        sheets.iter_mut().zip(&self.sheets).for_each(|(s, f)| *s = f.0.sharpened(f.1, place.noise));
         let error = self.sheets.iter().map(|s| s.2 * s.2).sum::<f64>() / self.sheets.len() as f64;
         // What the points show beyond noise is bias of the cell.
         let bias = BIAS * (self.cost - 1.0).max(0.0) * place.noise * place.noise;

@@ -201,7 +201,7 @@ fn accompanied(fits: Vec<Fit>) -> Vec<Fit> {
 fn fit_site(tree: &KdTree, sites: &Sites, site: usize, irregularity: f64, class: u8, closed: Closed) -> Vec<Fit> {
     let survey = &sites.survey[site];
     let p = survey.quadric.center;
-    let noise = sites.prior[site].noise.min(survey.noise).max(1e-300);
+    let noise = sites.noise(site).max(1e-300);
     let starts = if let Some(layer) = survey.layer {
         [survey.quadric, layer].map(|sheet| Start { sheet, at: sheet.project(p).0, radius: survey.radius }).to_vec()
     } else if class == 0 {
@@ -342,10 +342,12 @@ fn widen(tree: &KdTree, closed: Closed, start: &Start, others: &[Quadric], noise
         let r = start.radius * WIDEN.powi(step as i32);
         ball.clear();
         weights.clear();
+        // Along the sheet alone: at the rim of a ball the noise would say which points of a bent sheet are in it.
+        let across = guess.distance(p).1;
         tree.within(p, r, |_, q, _| {
             let y = (q - p) / r;
             ball.push(y);
-            weights.push(kernel(y.length_squared()));
+            weights.push(kernel(y.length_squared() - y.dot(across).powi(2)));
         });
         if !others.is_empty() {
             // The chance that each point belongs to this sheet and to none of the others.

@@ -250,7 +250,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
         round += 1;
         sites.join(&tree, &twice);
     };
-    let samples: Vec<Sample> = fits
+    let mut samples: Vec<Sample> = fits
         .iter()
         .enumerate()
         .map(|(i, f)| {
@@ -277,6 +277,12 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
     let of_site: Vec<u32> = fits.iter().map(|f| f.site).collect();
     let cells =
         cells::cells(&points, &tree, &sites, &samples, &of_site, &part(0.9, 1.0)).ok_or(CloudError::Cancelled)?;
+    // What was chosen by its residuals is moved to where the surface is last.
+    for (s, &site) in samples.iter_mut().zip(&of_site) {
+        s.quadric = s.quadric.sharpened(s.center, sites.noise(site as usize));
+        (s.center, s.normal) = s.quadric.project(s.center);
+        s.quadric = s.quadric.normalized_at(s.center);
+    }
     observer.progress(1.0);
     let middle = |mut v: Vec<f64>| {
         v.sort_unstable_by(f64::total_cmp);

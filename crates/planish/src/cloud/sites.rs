@@ -198,6 +198,11 @@ impl Sites {
         }
     }
 
+    /// Standard deviation of the points: that of the region, or less.
+    pub(super) fn noise(&self, site: usize) -> f64 {
+        self.prior[site].noise.min(self.survey[site].noise)
+    }
+
     /// Radius within which a site takes part in the blend.
     pub(super) fn support(&self, site: usize) -> f64 {
         (SUPPORT * self.survey[site].radius).max(SUPPORT_GAPS * self.gap[site])

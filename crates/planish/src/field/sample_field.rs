@@ -11,12 +11,12 @@ use rayon::prelude::*;
 
 /// The pseudo-distance changes by at most this much per length near the surface.
 const STEEP: f64 = 1.2;
-/// From this share of the support on a point is beside the data: cells stand less than .45 supports apart.
-const BESIDE: f64 = 0.5;
+/// From this share of the support on a point is beside the data: cells stand less than .38 supports apart.
+const BESIDE: f64 = 0.42;
 /// A winding number closer to one half than this says nothing beside cells, and twice as far off all.
 const UNSURE: f64 = 0.15;
 /// From this share on the winding number decides alone.
-const BEYOND: f64 = 1.0;
+const BEYOND: f64 = 0.84;
 
 /// Points in a row that are asked by one thread.
 const CHUNK: usize = 64;
