@@ -5,7 +5,7 @@ use planish::Silent;
 use planish::cloud::{self, CleanParams, Cloud, CloudError, ProjectParams, Samples};
 use planish::contour::ContourParams;
 use planish::field::{Field, SampleField};
-use planish::geom::random;
+use planish::geom::{Aabb, random};
 use planish::mesh::{TriMesh, diagnose, shapes};
 use planish::pipeline::{ScanMeshed, ScanParams, mesh_scan};
 
@@ -162,6 +162,29 @@ fn two_balls_that_touch_or_have_a_gap_of_two_noise_levels_are_two_segments() {
         let agreed = apart.iter().filter(|a| **a).count() as f64 / apart.len() as f64;
         assert!((agreed - 0.5).abs() > 0.49, "gap {gap}: {agreed} of the samples are in the segment of their ball");
     }
+}
+
+#[test]
+fn no_box_with_both_signs_is_left_out_of_a_field_of_two_scales() {
+    // The wide supports of the large ball say nothing of distances beside the small one.
+    let mut points = sphere(8000);
+    points.extend(sphere(8000).into_iter().map(|p| p * 0.02 + DVec3::X * 1.5));
+    let samples = clean(points.clone());
+    let field = SampleField::new(&samples, true);
+    let (mut both, mut missed) = (0, 0);
+    for i in 0..4000u64 {
+        let random = |k: u64| DVec3::from_array([0, 1, 2].map(|a| random::unit(5, 30 * i + 3 * k + a)));
+        let at = points[(i as usize * 397) % points.len()];
+        let half = if at.x > 1.2 { 0.02 } else { 0.1 };
+        let center = at + half * (2.0 * random(0) - DVec3::ONE);
+        let aabb = Aabb { min: center - DVec3::splat(half), max: center + DVec3::splat(half) };
+        let values: Vec<f64> = (1..9).map(|k| field.value(center + half * (2.0 * random(k) - DVec3::ONE))).collect();
+        if values.iter().any(|v| *v < 0.0) && values.iter().any(|v| *v >= 0.0) {
+            both += 1;
+            missed += usize::from(!field.crosses(&aabb));
+        }
+    }
+    assert!(both > 2000 && missed == 0, "{missed} of {both}");
 }
 
 #[test]

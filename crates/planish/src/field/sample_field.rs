@@ -140,12 +140,9 @@ impl Field for SampleField {
     }
 
     fn crosses(&self, aabb: &Aabb) -> bool {
-        let reach = aabb.diagonal() / 2.0;
-        let value = self.value(aabb.center());
-        if value.is_nan() {
-            return self.blend.reached(aabb.min, aabb.max);
-        }
-        value.abs() <= STEEP * reach
+        let (value, _, amid) = self.evaluate_at(aabb.center(), false);
+        // Only in the midst of data the value is a distance; beside it some other surface may be nearer.
+        (!amid && self.blend.reached(aabb.min, aabb.max)) || value.abs() <= STEEP * aabb.diagonal() / 2.0
     }
 
     fn noise_deg(&self) -> f64 {
