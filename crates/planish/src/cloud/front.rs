@@ -4,6 +4,7 @@
 //! 1. irregularity of every site from its survey, classes by quantiles
 //! 2. class by class, in rounds: a site takes its own fit or, where they explain its points better, the sheets of
 //!    fitted neighbours carried on to here: one, two at a crease, three or four at a corner
+//!    (these also have a say inside the fits: `guides`)
 //! 3. every sheet grows: the ball widens by steps, points that do not belong to the sheet lose their weight, and the
 //!    widest ball stays in which the points that do belong show noise and no bias
 //!

@@ -167,7 +167,7 @@ pub struct Sample {
     pub quadric: Quadric,
     /// Radius of the points that it was fitted to, world units.
     pub radius: f64,
-    /// Radius within which it takes part in the blend, world units.
+    /// Radius of what it speaks for, world units.
     pub support: f64,
     /// Expected error of the fit, world units.
     pub error: f64,
@@ -183,7 +183,7 @@ pub struct Sample {
     pub class: u8,
     /// Sheets at its site: 1 regular, 2 crease, 3 and more corner.
     pub sheets: u8,
-    /// Connected part that it belongs to, by falling area.
+    /// Body that it belongs to, by falling area.
     pub segment: u32,
     /// Share of its meetings with other samples that agree with its orientation, 0 to 1.
     pub confidence: f64,

@@ -3,8 +3,8 @@
 //! [X03] §7, fig. 12, solved globally: all meetings of samples are signed votes.
 //! 1. groups of samples join where their votes are clearest in sum; then samples and whole patches turn while that
 //!    satisfies more
-//! 2. parts without a vote between them: scanner positions where known; else closed parts by the winding number of the
-//!    larger ones around them; open parts by it, too, if they fill a hole of others, else upwards
+//! 2. bodies and what goes with them (`segments`): scanner positions where known; else closed parts by the winding number of
+//!    the larger ones around them; open parts by it, too, if they fill a hole of others, else upwards
 //! 3. patches that scanners, normals or, in closed parts, the winding number of all contradict turn (`wind`)
 //!
 //! Departs from [X03]: patches are not merged one after the other, where a single wrong meeting turns a whole patch.

@@ -77,14 +77,13 @@ pub(super) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
     // A narrow ball has little noise by chance; with the noise of those around the scouts look again.
     let (known, places): (Vec<Survey>, Vec<DVec3>) =
         first.iter().zip(&scouts).filter_map(|(s, &i)| Some(((*s)?, points[i as usize]))).unzip();
-    let seen = match known.is_empty() {
-        false => {
-            let regions = regions(&scouts.iter().map(|&i| points[i as usize]).collect::<Vec<_>>(), &places, &known);
-            in_pieces(scouts.len(), (0.2, 0.4), observer, |s, i| {
-                survey(tree, points[scouts[i] as usize], f64::INFINITY, regions[i].2, s)
-            })?
-        }
-        true => first,
+    let seen = if known.is_empty() {
+        first
+    } else {
+        let regions = regions(&scouts.iter().map(|&i| points[i as usize]).collect::<Vec<_>>(), &places, &known);
+        in_pieces(scouts.len(), (0.2, 0.4), observer, |s, i| {
+            survey(tree, points[scouts[i] as usize], f64::INFINITY, regions[i].2, s)
+        })?
     };
     let (known, places): (Vec<Survey>, Vec<DVec3>) =
         seen.into_iter().zip(&scouts).filter_map(|(s, &i)| Some((s?, points[i as usize]))).unzip();
@@ -176,7 +175,7 @@ pub(super) fn cover(points: &[DVec3], tree: &KdTree, gap: impl Fn(usize) -> f64)
     chosen
 }
 
-/// Support over the radius of the fit, and over the distance of sites: about nine cells hear of every point.
+/// Support over the radius of the fit, and over the distance of sites.
 const SUPPORT: f64 = 1.15;
 const SUPPORT_GAPS: f64 = 2.3;
 
@@ -203,7 +202,7 @@ impl Sites {
         self.prior[site].noise.min(self.survey[site].noise)
     }
 
-    /// Radius within which a site takes part in the blend.
+    /// Radius of what a site speaks for; cells hear points and are heard a little farther.
     pub(super) fn support(&self, site: usize) -> f64 {
         (SUPPORT * self.survey[site].radius).max(SUPPORT_GAPS * self.gap[site])
     }
