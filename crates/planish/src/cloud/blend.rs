@@ -113,59 +113,104 @@ impl Blend {
 
     /// Value and gradient at `p`; `None` where no cell reaches.
     pub fn at(&self, p: DVec3) -> Option<Blended> {
-        let mut seen = [Seen { value: 0.0, normal: DVec3::ZERO, weight: 0.0, variance: 0.0 }; ASKED];
-        let mut count = 0;
-        let (mut sum, mut weight, mut aside) = (0.0, 0.0, 1.0f64);
-        let mut lead = (0.0, DVec3::Z, 0);
-        self.around(p, |i, t2| {
-            let (d, n) = self.cells[i].evaluate(p);
-            if d.is_finite() {
-                let w = self.cells[i].weight(t2);
-                sum += w * d;
-                weight += w;
-                aside = aside.min(t2);
-                if w > lead.0 {
-                    lead = (w, n, i);
-                }
-                if count < ASKED {
-                    seen[count] = Seen { value: d, normal: n, weight: w, variance: self.cells[i].variance(t2) };
-                    count += 1;
-                }
+        let mut heard = Heard::new(p);
+        self.around(p, |i, t2| heard.add(&self.cells[i], i, t2));
+        heard.blended()
+    }
+
+    /// The same bits by these cells alone, if all that reach `p` are among them.
+    /// * `cells` - indices, ascending
+    pub fn at_of(&self, cells: &[u32], p: DVec3) -> Option<Blended> {
+        let mut heard = Heard::new(p);
+        for &i in cells {
+            let c = &self.cells[i as usize];
+            let t2 = c.center.distance_squared(p) / (c.support * c.support);
+            if t2 < 1.0 {
+                heard.add(c, i as usize, t2);
             }
-        });
-        if !(weight > 0.0) {
+        }
+        heard.blended()
+    }
+
+    /// The cells whose supports reach into a box, ascending.
+    pub fn reaching(&self, aabb: &Aabb) -> Vec<u32> {
+        let mut found = Vec::new();
+        let mut stack = [0u32; 64];
+        let mut top = usize::from(!self.nodes.is_empty());
+        while top > 0 {
+            top -= 1;
+            let id = stack[top];
+            let node = &self.nodes[id as usize];
+            if (aabb.max.cmplt(node.low) | aabb.min.cmpgt(node.high)).any() {
+                continue;
+            }
+            if node.right == 0 {
+                found.extend((node.start..node.start + node.count).filter(|&i| self.cells[i as usize].reaches(aabb)));
+            } else {
+                stack[top] = node.right;
+                stack[top + 1] = id + 1;
+                top += 2;
+            }
+        }
+        found
+    }
+}
+
+/// The cells that are heard at a point.
+struct Heard {
+    p: DVec3,
+    seen: [Seen; ASKED],
+    count: usize,
+    sum: f64,
+    weight: f64,
+    aside: f64,
+    /// The heaviest: its weight, normal and index.
+    lead: (f64, DVec3, usize),
+}
+
+impl Heard {
+    fn new(p: DVec3) -> Heard {
+        let nothing = Seen { value: 0.0, normal: DVec3::ZERO, weight: 0.0, variance: 0.0 };
+        Heard { p, seen: [nothing; ASKED], count: 0, sum: 0.0, weight: 0.0, aside: 1.0, lead: (0.0, DVec3::Z, 0) }
+    }
+
+    #[inline]
+    fn add(&mut self, cell: &Cell, i: usize, t2: f64) {
+        let (d, n) = cell.evaluate(self.p);
+        if d.is_finite() {
+            let w = cell.weight(t2);
+            self.sum += w * d;
+            self.weight += w;
+            self.aside = self.aside.min(t2);
+            if w > self.lead.0 {
+                self.lead = (w, n, i);
+            }
+            if self.count < ASKED {
+                self.seen[self.count] = Seen { value: d, normal: n, weight: w, variance: cell.variance(t2) };
+                self.count += 1;
+            }
+        }
+    }
+
+    fn blended(&self) -> Option<Blended> {
+        if !(self.weight > 0.0) {
             return None;
         }
-        let mean = sum / weight;
+        let seen = &self.seen[..self.count];
+        let mean = self.sum / self.weight;
         let mut value = mean;
         for _ in 0..ROUNDS {
             let heeded = |s: &Seen| s.weight / (1.0 + (s.value - value).powi(2) / (OFF * OFF * s.variance)).powi(2);
-            let (sum, weight) = seen[..count].iter().fold((0.0, 0.0), |(sum, weight), s| {
+            let (sum, weight) = seen.iter().fold((0.0, 0.0), |(sum, weight), s| {
                 let w = heeded(s);
                 (sum + w * s.value, weight + w)
             });
             value = sum / weight;
         }
-        let along = seen[..count].iter().filter(|s| s.normal.dot(lead.1) > SAME);
+        let along = seen.iter().filter(|s| s.normal.dot(self.lead.1) > SAME);
         let normal: DVec3 = along.map(|s| s.weight * s.normal).sum();
-        Some(Blended { value, normal: normal.normalize_or(lead.1), aside, cell: lead.2, mean, weight })
-    }
-
-    /// May a support reach into this box?
-    pub fn reached(&self, low: DVec3, high: DVec3) -> bool {
-        let mut stack = vec![0u32; usize::from(!self.nodes.is_empty())];
-        while let Some(id) = stack.pop() {
-            let node = &self.nodes[id as usize];
-            if (high.cmplt(node.low) | low.cmpgt(node.high)).any() {
-                continue;
-            }
-            if node.right == 0 {
-                return true;
-            }
-            stack.push(node.right);
-            stack.push(id + 1);
-        }
-        false
+        let normal = normal.normalize_or(self.lead.1);
+        Some(Blended { value, normal, aside: self.aside, cell: self.lead.2, mean, weight: self.weight })
     }
 }
 

@@ -11,7 +11,7 @@ use super::points::Points;
 use super::rim::rim;
 use super::sites::{Sites, in_pieces};
 use super::{Blend, Quadric, Sample};
-use crate::geom::KdTree;
+use crate::geom::{Aabb, KdTree};
 use crate::observe::Observer;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -68,7 +68,7 @@ pub struct Cell {
 
 impl Cell {
     /// Signed distance, positive outside, and unit normal of the sheet that decides.
-    pub(super) fn evaluate(&self, p: DVec3) -> (f64, DVec3) {
+    pub fn evaluate(&self, p: DVec3) -> (f64, DVec3) {
         let mut best = self.sheets[0].distance(p);
         for k in 1..self.count as usize {
             let next = self.sheets[k].distance(p);
@@ -77,6 +77,11 @@ impl Cell {
             }
         }
         best
+    }
+
+    /// Does its support reach into a box?
+    pub fn reaches(&self, aabb: &Aabb) -> bool {
+        self.center.clamp(aabb.min, aabb.max).distance_squared(self.center) < self.support * self.support
     }
 
     /// Weight in the blend at a point whose squared distance is this share of the squared support.

@@ -8,6 +8,8 @@ use std::f64::consts::PI;
 
 /// A group counts as one from this many of its radii on: right to about 1e-2, and only the nearest half matters.
 const FAR: f64 = 2.0;
+/// And so much is left between a side that is sure and one half.
+const ROUGH: f64 = 0.02;
 /// Samples in a leaf at most.
 const LEAF: usize = 8;
 
@@ -71,6 +73,44 @@ impl Dipoles {
             }
         }
         sum / (4.0 * PI)
+    }
+
+    /// The side of all points within `radius` of `p`: 1 outside, -1 inside; `None` if the number may pass one half there.
+    ///
+    /// The number of a dipole m at distance d changes by at most 2 |m| / (4 pi d^3) per length.
+    pub fn side(&self, p: DVec3, radius: f64) -> Option<f64> {
+        let (mut sum, mut change) = (0.0, 0.0);
+        let mut add = |c: DVec3, m: DVec3| {
+            let away = c - p;
+            let d = away.length();
+            sum += m.dot(away) / (d * d * d);
+            change += if d > radius { m.length() / (d - radius).powi(3) } else { f64::INFINITY };
+            // More than from the inside to the outside.
+            2.0 * radius * change < 4.0 * PI
+        };
+        let mut stack = [0u32; 64];
+        let mut top = usize::from(!self.nodes.is_empty());
+        while top > 0 {
+            top -= 1;
+            let at = stack[top] as usize;
+            let node = &self.nodes[at];
+            if node.center.distance(p) > FAR * node.radius + radius {
+                if !add(node.center, node.moment) {
+                    return None;
+                }
+            } else if node.second == 0 {
+                let own = node.first as usize..(node.first + node.count) as usize;
+                if !own.into_iter().all(|i| add(self.centers[i], self.moments[i])) {
+                    return None;
+                }
+            } else {
+                stack[top] = node.second;
+                stack[top + 1] = at as u32 + 1;
+                top += 2;
+            }
+        }
+        let beyond = 0.5 - sum / (4.0 * PI);
+        (beyond.abs() > 2.0 * radius * change / (4.0 * PI) + ROUGH).then_some(beyond.signum())
     }
 }
 

@@ -131,6 +131,11 @@ pub trait Field: Sync {
         None
     }
 
+    /// Places on edges of a lattice are sought to this fraction of an edge.
+    fn precision(&self) -> f64 {
+        1e-13
+    }
+
     /// Typical angle by which [`Field::gradient`] misses the true normal, degrees: 0 for exact sources. Normals that
     /// differ by less than about three times this are no evidence of a feature; the extractor widens its
     /// threshold accordingly.

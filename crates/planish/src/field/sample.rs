@@ -227,7 +227,7 @@ pub fn hit_on_edge(field: &dyn Field, lattice: &Lattice, axis: usize, [i, j, k]:
     let near = field.within(&Aabb { min: low, max: high });
     let field = near.as_deref().unwrap_or(field);
     let (f0, f1) = (field.value(low), field.value(high));
-    let t = root(|t| field.value(at(t)), f0, f1);
+    let t = root_within(field.precision(), |t| field.value(at(t)), f0, f1);
     let p = at(t);
     let mut normal = field.gradient(p);
     if normal == DVec3::ZERO || !normal.is_finite() {
@@ -241,22 +241,27 @@ pub fn hit_on_edge(field: &dyn Field, lattice: &Lattice, axis: usize, [i, j, k]:
 /// The place is known to this fraction of the edge.
 const ROOT: f64 = 1e-13;
 
-/// Where `f` passes zero between 0 and 1, by interpolation kept within a shrinking bracket (Oliveira and Takahashi
+/// Where `f` passes zero between 0 and 1, to 1e-13.
+pub fn root(f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
+    root_within(ROOT, f, f0, f1)
+}
+
+/// Where `f` passes zero between 0 and 1, to `precision`, by interpolation kept within a shrinking bracket (Oliveira and Takahashi
 /// 2020, *An Enhancement of the Bisection Method Average Performance Preserving Minmax Optimality*): never more steps
 /// than bisection plus one.
-pub fn root(f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
+fn root_within(precision: f64, f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
     let sign = if f0 < f1 { 1.0 } else { -1.0 };
     let (mut a, mut b, mut fa, mut fb) = (0.0, 1.0, sign * f0, sign * f1);
     if fa.is_nan() || fb.is_nan() {
         return 0.5;
     }
-    let most = (0.5 / ROOT).log2().ceil() as i32 + 1;
+    let most = (0.5 / precision).log2().ceil() as i32 + 1;
     for n in 0..=most {
-        if b - a <= 2.0 * ROOT {
+        if b - a <= 2.0 * precision {
             break;
         }
         let middle = (a + b) / 2.0;
-        let room = (ROOT * 2f64.powi(most - n) - (b - a) / 2.0).max(0.0);
+        let room = (precision * 2f64.powi(most - n) - (b - a) / 2.0).max(0.0);
         let falsi = if fb > fa { (fb * a - fa * b) / (fb - fa) } else { middle };
         let direction = if middle >= falsi { 1.0 } else { -1.0 };
         let cut = 0.2 * (b - a) * (b - a);

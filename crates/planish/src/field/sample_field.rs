@@ -4,10 +4,9 @@
 //! winding number of the samples.
 
 use super::Field;
-use crate::cloud::{Blend, Dipoles, Samples};
+use crate::cloud::{Blend, Blended, Dipoles, Samples};
 use crate::geom::Aabb;
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// The pseudo-distance changes by at most this much per length near the surface.
 const STEEP: f64 = 1.2;
@@ -18,8 +17,9 @@ const UNSURE: f64 = 0.15;
 /// From this share on the winding number decides alone.
 const BEYOND: f64 = 0.84;
 
-/// Points in a row that are asked by one thread.
-const CHUNK: usize = 64;
+/// Places on edges are sought to this fraction of an edge: a cell is a few noise levels wide, and the coordinates of a mesh
+/// file have 24 bits.
+const PRECISION: f64 = 1e-6;
 
 /// The blended field of oriented samples.
 pub struct SampleField {
@@ -46,19 +46,15 @@ impl SampleField {
 
     /// Value and unit gradient at `p`; NaN where nothing is known.
     pub fn evaluate(&self, p: DVec3) -> (f64, DVec3) {
-        let (value, normal, _) = self.evaluate_at(p, true);
-        (value, normal)
+        self.joined(self.blend.at(p), p, true)
     }
 
-    /// And whether `p` is in the midst of data; where no cell reaches the gradient only if asked for.
-    fn evaluate_at(&self, p: DVec3, slope: bool) -> (f64, DVec3, bool) {
-        let Some(here) = self.blend.at(p) else {
-            let (value, normal) = self.beyond(p, slope);
-            return (value, normal, false);
-        };
+    /// Value and unit gradient at `p` from what the cells say there; where no cell reaches the gradient only if asked for.
+    fn joined(&self, here: Option<Blended>, p: DVec3, slope: bool) -> (f64, DVec3) {
+        let Some(here) = here else { return self.beyond(p, slope) };
         // Away from the data the samples together know better than a fit carried on beyond its points: from the cells to
         // the winding number without a step, so that the surface goes on smoothly over a hole.
-        if here.aside > BESIDE * BESIDE
+        if !amid(&here)
             && let Some(dipoles) = &self.closing
         {
             let far = ((here.aside.sqrt() - BESIDE) / (BEYOND - BESIDE)).min(1.0);
@@ -69,17 +65,17 @@ impl SampleField {
             let beyond = winding(p);
             // Where both agree on the side the cells know the distance.
             if beyond * here.value > 0.0 {
-                return (here.value, here.normal, false);
+                return (here.value, here.normal);
             }
             let share = share * ((beyond.abs() / size - UNSURE) / UNSURE).clamp(0.0, 1.0);
             let value = here.value + share * (beyond - here.value);
             if !slope {
-                return (value, here.normal, false);
+                return (value, here.normal);
             }
             let g = gradient(winding, p, STENCIL * size).unwrap_or(here.normal);
-            return (value, here.normal.lerp(g, share).normalize_or(here.normal), false);
+            return (value, here.normal.lerp(g, share).normalize_or(here.normal));
         }
-        (here.value, here.normal, here.aside <= BESIDE * BESIDE)
+        (here.value, here.normal)
     }
 
     /// Where no cell reaches.
@@ -106,46 +102,93 @@ fn gradient(value: impl Fn(DVec3) -> f64, p: DVec3, e: f64) -> Option<DVec3> {
     DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)).try_normalize()
 }
 
+/// Is a place in the midst of data?
+fn amid(here: &Blended) -> bool {
+    here.aside <= BESIDE * BESIDE
+}
+
 impl Field for SampleField {
     fn bounds(&self) -> Aabb {
         self.bounds
     }
 
     fn value(&self, p: DVec3) -> f64 {
-        self.evaluate_at(p, false).0
+        self.joined(self.blend.at(p), p, false).0
     }
 
     fn gradient(&self, p: DVec3) -> DVec3 {
         self.evaluate(p).1
     }
 
-    fn values(&self, points: &[DVec3], values: &mut [f64]) {
-        values.par_chunks_mut(CHUNK).zip(points.par_chunks(CHUNK)).for_each(|(values, points)| {
-            // What the value at one point leaves at the next: the same side, and no distance is too long.
-            let mut left: Option<(DVec3, f64)> = None;
-            for (v, &p) in values.iter_mut().zip(points) {
-                if let Some((q, d)) = left {
-                    let rest = d.abs() - STEEP * p.distance(q);
-                    if rest > 0.0 {
-                        *v = rest.copysign(d);
-                        continue;
-                    }
-                }
-                let (value, _, amid) = self.evaluate_at(p, false);
-                *v = value;
-                // Where holes stay open the next point may be beside the data.
-                left = (amid && self.closing.is_some()).then_some((p, value));
-            }
-        });
+    fn crosses(&self, aabb: &Aabb) -> bool {
+        Near { field: self, cells: self.blend.reaching(aabb) }.crosses(aabb)
     }
 
-    fn crosses(&self, aabb: &Aabb) -> bool {
-        let (value, _, amid) = self.evaluate_at(aabb.center(), false);
-        // Only in the midst of data the value is a distance; beside it some other surface may be nearer.
-        (!amid && self.blend.reached(aabb.min, aabb.max)) || value.abs() <= STEEP * aabb.diagonal() / 2.0
+    fn within(&self, aabb: &Aabb) -> Option<Box<dyn Field + '_>> {
+        Some(Box::new(Near { field: self, cells: self.blend.reaching(aabb) }))
     }
 
     fn noise_deg(&self) -> f64 {
         self.noise_deg
+    }
+
+    fn precision(&self) -> f64 {
+        PRECISION
+    }
+}
+
+/// The field in a box: few cells reach it.
+struct Near<'a> {
+    field: &'a SampleField,
+    /// Ascending.
+    cells: Vec<u32>,
+}
+
+impl Near<'_> {
+    fn here(&self, p: DVec3) -> Option<Blended> {
+        self.field.blend.at_of(&self.cells, p)
+    }
+}
+
+impl Field for Near<'_> {
+    fn bounds(&self) -> Aabb {
+        self.field.bounds
+    }
+
+    fn value(&self, p: DVec3) -> f64 {
+        self.field.joined(self.here(p), p, false).0
+    }
+
+    fn gradient(&self, p: DVec3) -> DVec3 {
+        self.field.joined(self.here(p), p, true).1
+    }
+
+    fn crosses(&self, aabb: &Aabb) -> bool {
+        let (center, reach) = (aabb.center(), STEEP * aabb.diagonal() / 2.0);
+        if let Some(here) = self.here(center).filter(amid) {
+            return here.value.abs() <= reach;
+        }
+        // Beside the data the value is no distance, some other surface may be nearer: all must be on one side.
+        let Some(dipoles) = &self.field.closing else { return !self.cells.is_empty() };
+        let mut values = self.cells.iter().map(|&i| self.field.blend.cells()[i as usize].evaluate(center).0);
+        let side = values.clone().next().map(f64::signum);
+        if side.is_some_and(|side| !values.all(|d| d.is_finite() && d * side > reach)) {
+            return true;
+        }
+        dipoles.side(center, aabb.diagonal() / 2.0).is_none_or(|s| side.is_some_and(|side| side != s))
+    }
+
+    fn within(&self, aabb: &Aabb) -> Option<Box<dyn Field + '_>> {
+        let cells =
+            self.cells.iter().copied().filter(|&i| self.field.blend.cells()[i as usize].reaches(aabb)).collect();
+        Some(Box::new(Near { field: self.field, cells }))
+    }
+
+    fn noise_deg(&self) -> f64 {
+        self.field.noise_deg
+    }
+
+    fn precision(&self) -> f64 {
+        PRECISION
     }
 }
