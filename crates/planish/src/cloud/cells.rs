@@ -6,8 +6,8 @@
 
 use super::fit::{Ball, sheet};
 use super::front::{PRICE, VARIATION_PRICE};
-use super::nest::{self, LIMIT, Seen, cost, nest};
-use super::points::Points;
+use super::nest::{self, Face, LIMIT, Seen, cost, nest};
+use super::points::{Points, decided_cost};
 use super::rim::rim;
 use super::sites::{Sites, in_pieces};
 use super::{Blend, Quadric, Sample};
@@ -207,6 +207,9 @@ struct Place {
     noise: f64,
 }
 
+/// A sheet of a cell: quadric, middle of its points and expected error.
+type Sheet = (Quadric, DVec3, f64);
+
 /// A sheet that a cell may take.
 struct Candidate {
     quadric: Quadric,
@@ -215,10 +218,10 @@ struct Candidate {
     owner: u32,
 }
 
-/// What a cell takes: quadric, middle of its points and expected error of every sheet.
+/// What a cell takes.
 #[derive(Clone)]
 struct Found {
-    sheets: Vec<(Quadric, DVec3, f64)>,
+    sheets: Vec<Sheet>,
     concave: u8,
     /// Cost and prices.
     total: f64,
@@ -268,12 +271,7 @@ fn find(
     let step = ball.len().div_ceil(ENOUGH).max(1);
     let ball: Points = ball.into_iter().step_by(step).collect();
     let count = ball.len().max(1) as f64;
-    let residuals = |q: &Quadric| -> Vec<f64> {
-        let mut residuals = Vec::new();
-        ball.distances(q, &mut residuals);
-        residuals.iter_mut().for_each(|r| *r /= noise);
-        residuals
-    };
+    let residuals = |q: &Quadric| ball.levels(q, noise);
     // Candidates, those of the site first, then by distance.
     let mut near: Vec<(f64, u32)> = Vec::new();
     around.within(center, ASIDE * support, |i, _, d2| {
@@ -316,54 +314,48 @@ fn find(
         })
         .collect();
     let found = nest(&all, false, MOST)?;
-    let mut sheets: Vec<(Quadric, DVec3, f64)> =
-        found.order.iter().map(|&k| (asked[k].quadric, asked[k].at, asked[k].error)).collect();
+    let mut sheets: Vec<Sheet> = found.order.iter().map(|&k| (asked[k].quadric, asked[k].at, asked[k].error)).collect();
     let mut prices: Vec<f64> = found.order.iter().map(|&k| all[k].price).collect();
     let mut concave = found.concave;
     let mut spent = found.cost;
     // Every point tells of the sheet that decides at it, and of no other. The wider the ball the less chance has a say, as
     // long as the points around the site agree: Akaike's criterion, here with points of which some are not asked.
-    let spread = |sheets: &[(Quadric, DVec3, f64)], concave: u8| -> (f64, f64) {
-        let seen: Vec<Seen> = sheets
-            .iter()
-            .map(|s| Seen { residuals: residuals(&s.0), normal: s.0.distance(center).1, price: 0.0 })
-            .collect();
-        let luck = |k: usize| 2.0 * (sheets[k].2 / noise).powi(2);
-        let (mut cost, mut lucky) = (nest::folds(&seen, concave), 0.0);
-        for q in 0..ball.len() {
-            let (k, d) = nest::joined(seen.iter().map(|s| s.residuals[q]), concave);
-            cost += (d * d).min(LIMIT * LIMIT);
-            lucky += luck(k);
-        }
-        (cost, cost + lucky)
+    let look = |s: &Sheet| Spread {
+        residuals: residuals(&s.0),
+        normal: s.0.distance(center).1,
+        luck: 2.0 * (s.2 / noise).powi(2),
     };
     // What the site has found before is refined already.
     let known = again && found.order.iter().all(|&k| asked[k].owner == site);
     let rounds = if sheets.len() > 1 && !known { REFINED } else { 0 };
-    let mut worth = spread(&sheets, concave).1;
+    let mut worth = spread(&sheets.iter().map(look).collect::<Vec<_>>().iter().collect::<Vec<_>>(), concave).1;
     let mut widths = WIDTHS.to_vec();
     let wide = if rounds > 0 { widest(place, tree) } else { Points::default() };
     for _ in 0..rounds {
         let owned = owned(&sheets, concave, noise, &wide);
         let tried = widths.iter().map(|width| {
             let better = refined(&sheets, place, width * HEARD * support, &wide, &owned);
-            let (cost, worth) = spread(&better, concave);
-            (better, cost, worth, *width)
+            let seen: Vec<Spread> = better.iter().map(look).collect();
+            let (cost, worth) = spread(&seen.iter().collect::<Vec<_>>(), concave);
+            (better, cost, worth, *width, seen)
         });
         let Some(best) = tried.min_by(|a, b| a.2.total_cmp(&b.2)).filter(|b| b.2 < worth) else { break };
         (sheets, spent, worth) = (best.0, best.1, best.2);
         widths = vec![best.3];
+        let mut seen = best.4;
         // What better sheets leave nothing to explain for goes: it may lie on another one, turned over.
         while sheets.len() > 1 {
             let fewer = (0..sheets.len()).map(|k| {
-                let (rest, concave) = without(&sheets, concave, k);
-                let (cost, worth) = spread(&rest, concave);
-                (k, rest, concave, cost, worth)
+                let rest: Vec<&Spread> = (0..seen.len()).filter(|&i| i != k).map(|i| &seen[i]).collect();
+                let (cost, worth) = spread(&rest, without(concave, k));
+                (k, cost, worth)
             });
-            let least = fewer.min_by(|a, b| (a.4 - prices[a.0]).total_cmp(&(b.4 - prices[b.0])));
-            let Some(less) = least.filter(|l| l.4 - prices[l.0] < worth) else { break };
-            prices.remove(less.0);
-            (_, sheets, concave, spent, worth) = less;
+            let least = fewer.min_by(|a, b| (a.2 - prices[a.0]).total_cmp(&(b.2 - prices[b.0])));
+            let Some((k, cost, rest)) = least.filter(|l| l.2 - prices[l.0] < worth) else { break };
+            (concave, spent, worth) = (without(concave, k), cost, rest);
+            prices.remove(k);
+            sheets.remove(k);
+            seen.remove(k);
         }
     }
     // A plate ends where its points do: no sheet says so, if it is as thin as the noise.
@@ -380,16 +372,33 @@ fn find(
     Some(Found { sheets, concave, total, cost: spent / count, plain })
 }
 
-/// The nesting without its sheet `k`.
-fn without(sheets: &[(Quadric, DVec3, f64)], concave: u8, k: usize) -> (Vec<(Quadric, DVec3, f64)>, u8) {
-    let mut rest = sheets.to_vec();
-    rest.remove(k);
+/// One sheet of a cell as its points see it.
+struct Spread {
+    /// Signed distances, in noise levels.
+    residuals: Vec<f64>,
+    normal: DVec3,
+    /// Twice the variance of the fit, in squared noise levels.
+    luck: f64,
+}
+
+/// What the points cost with a nesting, alone and with what each owes to chance.
+fn spread(sheets: &[&Spread], concave: u8) -> (f64, f64) {
+    let faces: Vec<Face> =
+        sheets.iter().map(|s| Face { residuals: &s.residuals, sign: 1.0, normal: s.normal }).collect();
+    let rows: Vec<(&[f64], f64)> = sheets.iter().map(|s| (&s.residuals[..], s.luck)).collect();
+    let (cost, lucky) = decided_cost(&rows, concave);
+    let cost = nest::folds(&faces, concave) + cost;
+    (cost, cost + lucky)
+}
+
+/// How the other sheets of a nesting are joined without its sheet `k`.
+fn without(concave: u8, k: usize) -> u8 {
     let below = concave & ((1 << k) - 1);
-    (rest, (below | (concave >> (k + 1)) << k) & !1)
+    (below | (concave >> (k + 1)) << k) & !1
 }
 
 /// The sheet that decides at a point and its signed distance.
-fn joined(sheets: &[(Quadric, DVec3, f64)], concave: u8, p: DVec3) -> (usize, f64) {
+fn joined(sheets: &[Sheet], concave: u8, p: DVec3) -> (usize, f64) {
     nest::joined(sheets.iter().map(|s| s.0.distance(p).0), concave)
 }
 
@@ -403,7 +412,7 @@ fn widest(place: &Place, tree: &KdTree) -> Points {
 }
 
 /// For each point the sheet that decides there, `u8::MAX` if the point does not lie on the nesting.
-fn owned(sheets: &[(Quadric, DVec3, f64)], concave: u8, noise: f64, points: &Points) -> Vec<u8> {
+fn owned(sheets: &[Sheet], concave: u8, noise: f64, points: &Points) -> Vec<u8> {
     let (mut value, mut next) = (Vec::new(), Vec::new());
     points.distances(&sheets[0].0, &mut value);
     let mut owner = vec![0; value.len()];
@@ -421,13 +430,7 @@ fn owned(sheets: &[(Quadric, DVec3, f64)], concave: u8, noise: f64, points: &Poi
 }
 
 /// Every sheet fitted again to those of its points that lie in a ball.
-fn refined(
-    sheets: &[(Quadric, DVec3, f64)],
-    place: &Place,
-    radius: f64,
-    points: &Points,
-    owner: &[u8],
-) -> Vec<(Quadric, DVec3, f64)> {
+fn refined(sheets: &[Sheet], place: &Place, radius: f64, points: &Points, owner: &[u8]) -> Vec<Sheet> {
     let inverse = 1.0 / radius;
     let mut parts: Vec<Points> =
         (0..sheets.len()).map(|k| Points::with_capacity(owner.iter().filter(|&&o| o as usize == k).count())).collect();

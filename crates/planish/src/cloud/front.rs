@@ -259,9 +259,9 @@ fn choose(tree: &KdTree, radius: f64, usual: f64, own: Quadric, noise: f64, clos
     let alone = vec![Start { sheet: own, at: p, radius }];
     // A crease has a narrow ball because one sheet is no model there; with the right sheets a usual ball will do.
     let wide = usual.clamp(radius, WIDE * radius);
-    let mut ball = Vec::new();
+    let mut ball = Points::default();
     tree.within(p, wide, |_, q, _| ball.push(q));
-    let residuals = |q: &Quadric| -> Vec<f64> { ball.iter().map(|&x| q.distance(x).0 / noise).collect() };
+    let residuals = |q: &Quadric| ball.levels(q, noise);
     let count = ball.len() as f64;
     let good = count * (EXPLAINED + 2.0 * (2.0 / count).sqrt());
     let own_cost = cost(&residuals(&own));
@@ -301,7 +301,7 @@ fn choose(tree: &KdTree, radius: f64, usual: f64, own: Quadric, noise: f64, clos
     }
     // The points nearest to each sheet tell where it begins to grow.
     let mut middle = vec![(0usize, DVec3::ZERO); found.order.len()];
-    for (i, &q) in ball.iter().enumerate() {
+    for (i, q) in ball.iter().enumerate() {
         let (d, k) = (0..found.order.len())
             .map(|k| (all[found.order[k]].residuals[i].abs(), k))
             .min_by(|a, b| a.0.total_cmp(&b.0))

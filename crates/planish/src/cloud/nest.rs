@@ -8,7 +8,7 @@
 //! would not do: it lets every point choose its sheet, and noise alone then pays for a second one. For the same reason a
 //! point above which the surface lies m-fold pays 2 ln m: twice the area has half the density of points.
 
-use super::points::{Join, joined_cost};
+use super::points::{Join, capped, joined_cost, nearest_cost};
 use glam::DVec3;
 
 /// Most sheets that are nested: a corner of four faces.
@@ -30,15 +30,15 @@ pub(super) struct Seen {
     pub price: f64,
 }
 
-impl Seen {
-    /// The same sheet counted with this sign.
-    fn turned(&self, sign: f64) -> Seen {
-        Seen {
-            residuals: self.residuals.iter().map(|r| sign * r).collect(),
-            normal: sign * self.normal,
-            price: self.price,
-        }
-    }
+/// A sheet of a nesting.
+#[derive(Clone, Copy)]
+pub(super) struct Face<'a> {
+    /// Signed distance of every point, in noise levels.
+    pub residuals: &'a [f64],
+    /// 1, or -1 if the sheet counts turned over.
+    pub sign: f64,
+    /// Unit normal of the sheet as it is.
+    pub normal: DVec3,
 }
 
 /// Nested maxima and minima.
@@ -63,7 +63,32 @@ const ENOUGH: usize = 60;
 
 /// Sum of squared residuals (in noise levels), each at most the square of [`LIMIT`].
 pub(super) fn cost(residuals: &[f64]) -> f64 {
-    joined_cost(&[(residuals, Join::Nearest)])
+    joined_cost(&[(residuals, Join::Greatest(1.0))], f64::INFINITY)
+}
+
+/// A few of the sheets that are asked, ascending but for the last; places past `count` are zero.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Set {
+    items: [usize; MOST],
+    count: usize,
+}
+
+impl Set {
+    fn of(items: &[usize]) -> Set {
+        let mut set = Set { items: [0; MOST], count: items.len() };
+        set.items[..items.len()].copy_from_slice(items);
+        set
+    }
+
+    fn with(mut self, item: usize) -> Set {
+        self.items[self.count] = item;
+        self.count += 1;
+        self
+    }
+
+    fn items(&self) -> &[usize] {
+        &self.items[..self.count]
+    }
 }
 
 /// The nesting of least cost plus prices, of at most `most` sheets.
@@ -71,59 +96,79 @@ pub(super) fn cost(residuals: &[f64]) -> f64 {
 /// * `asked` - the sheets; the first wins ties
 /// * `free` - the signs of the sheets are not known to fit each other
 pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
-    let first =
-        (0..asked.len()).map(|i| (cost(&asked[i].residuals) + asked[i].price, i)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let squares: Vec<Vec<f64>> = asked.iter().map(|a| capped(&a.residuals)).collect();
+    let alone = |i: usize| nearest_cost(&[&squares[i]], f64::INFINITY);
+    let first = (0..asked.len()).map(|i| (alone(i) + asked[i].price, i)).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let price = |order: &[usize]| order.iter().map(|&k| asked[k].price).sum::<f64>();
     let mut best =
         Nesting { order: vec![first.1], flipped: 0, concave: 0, cost: first.0 - asked[first.1].price, total: first.0 };
     let step = asked[0].residuals.len().div_ceil(ENOUGH).max(1);
     let all: Vec<&[f64]> = asked.iter().map(|a| &a.residuals[..]).collect();
-    let thinned: Vec<Vec<f64>> = all.iter().map(|r| r.iter().step_by(step).copied().collect()).collect();
-    let some: Vec<&[f64]> = thinned.iter().map(|r| &r[..]).collect();
+    let mut thinned: Vec<Vec<f64>> = vec![Vec::new(); asked.len()];
     // One sheet after the other, each the best that can be joined to those chosen, in all nestings of the set. The second
     // may come with another first: between the two sides of a plate one sheet alone does best in the middle.
     while best.order.len() < most.min(MOST) {
-        let sets: Vec<Vec<usize>> = if best.order.len() == 1 {
-            (0..asked.len()).flat_map(|i| (0..i).map(move |j| vec![j, i])).collect()
-        } else {
-            let others = (0..asked.len()).filter(|i| !best.order.contains(i));
-            others.map(|i| best.order.iter().copied().chain([i]).collect()).collect()
+        let chosen = Set::of(&best.order);
+        // No nesting explains more than the union. The sets whose unions explain most, rising:
+        let mut bound: Vec<(f64, Set)> = Vec::with_capacity(TRIED + 1);
+        let mut hear = |set: Set| {
+            let priced = price(set.items());
+            let least = if bound.len() == TRIED { bound[TRIED - 1].0 } else { best.total };
+            let mut rows = [[].as_slice(); MOST];
+            rows.iter_mut().zip(set.items()).for_each(|(row, &i)| *row = &squares[i]);
+            let union = nearest_cost(&rows[..set.count], least - priced) + priced;
+            if union > least || union >= best.total {
+                return;
+            }
+            let at = bound.partition_point(|b| b.0.total_cmp(&union).then_with(|| b.1.cmp(&set)).is_lt());
+            bound.insert(at, (union, set));
+            bound.truncate(TRIED);
         };
-        // No nesting explains more than the union.
-        let mut bound: Vec<(f64, Vec<usize>)> = sets
-            .into_iter()
-            .map(|set| (nearest_cost(set.iter().map(|&i| all[i])) + price(&set), set))
-            .filter(|b| b.0 < best.total)
-            .collect();
-        bound.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
-        bound.truncate(TRIED);
+        if chosen.count == 1 {
+            (0..asked.len()).for_each(|i| (0..i).for_each(|j| hear(Set::of(&[j, i]))));
+        } else {
+            (0..asked.len()).filter(|i| !best.order.contains(i)).for_each(|i| hear(chosen.with(i)));
+        }
         let mut next: Option<Nesting> = None;
         for (union, set) in bound {
             let limit = next.as_ref().map_or(best.total, |n| n.total);
             if union >= limit {
                 break;
             }
-            let priced = price(&set);
+            for &i in set.items() {
+                if thinned[i].is_empty() {
+                    thinned[i] = all[i].iter().step_by(step).copied().collect();
+                }
+            }
+            let priced = price(set.items());
             let mut found: Option<Nesting> = None;
-            for order in orders(&set) {
+            for order in orders(set.items()) {
                 let joints = order.len() - 1;
                 let signs = if free { 1u8 << joints } else { 1 };
                 for flips in 0..signs {
                     for ops in 0..1u8 << joints {
                         let (flipped, concave) = (flips << 1, ops << 1);
-                        let part = nesting_cost(&some, &order, flipped, concave);
-                        if found.as_ref().is_none_or(|n| part < n.cost) {
+                        if !free && repeats(set.items(), &order, concave) {
+                            continue;
+                        }
+                        let least = found.as_ref().map_or(f64::INFINITY, |n| n.cost);
+                        let part = nesting_cost(|i| &thinned[i], &order, flipped, concave, least);
+                        if part < least {
                             found = Some(Nesting { order: order.clone(), flipped, concave, cost: part, total: 0.0 });
                         }
                     }
                 }
             }
             let Some(mut found) = found else { continue };
-            found.cost = nesting_cost(&all, &found.order, found.flipped, found.concave);
+            found.cost = nesting_cost(|i| all[i], &found.order, found.flipped, found.concave, limit - priced);
             if found.cost + priced < limit {
-                let set: Vec<Seen> =
-                    found.order.iter().enumerate().map(|(k, &i)| asked[i].turned(sign(found.flipped, k))).collect();
-                found.cost += folds(&set, found.concave);
+                let face = |(k, &i): (usize, &usize)| Face {
+                    residuals: all[i],
+                    sign: sign(found.flipped, k),
+                    normal: asked[i].normal,
+                };
+                let faces: Vec<Face> = found.order.iter().enumerate().map(face).collect();
+                found.cost += folds(&faces, found.concave);
                 found.total = found.cost + priced;
                 if found.total < limit {
                     next = Some(found);
@@ -138,21 +183,23 @@ pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
     Some(best)
 }
 
-/// Cost if every point belonged to the sheet nearest to it.
-fn nearest_cost<'a>(rows: impl Iterator<Item = &'a [f64]>) -> f64 {
-    let mut signed = [([].as_slice(), Join::Nearest); MOST];
-    let count = signed.iter_mut().zip(rows).map(|(s, row)| s.0 = row).count();
-    joined_cost(&signed[..count])
+/// Does an order give the same function as one that comes before it in [`orders`]? Neighbours that are joined alike commute.
+fn repeats(items: &[usize], order: &[usize], concave: u8) -> bool {
+    let place = |k: usize| items.iter().position(|&i| i == order[k]);
+    (2..order.len()).any(|k| {
+        let alike = (concave >> k ^ concave >> (k - 1)) & 1 == 0;
+        alike && (place(k) > place(k - 1) || (k == 2 && place(k) > place(0)))
+    })
 }
 
-/// Cost of a nesting of these sheets.
-fn nesting_cost(rows: &[&[f64]], order: &[usize], flipped: u8, concave: u8) -> f64 {
-    let mut signed = [([].as_slice(), Join::Nearest); MOST];
+/// Cost of a nesting of these sheets, or something above `limit`, if it is.
+fn nesting_cost<'a>(row: impl Fn(usize) -> &'a [f64], order: &[usize], flipped: u8, concave: u8, limit: f64) -> f64 {
+    let mut signed = [([].as_slice(), Join::Greatest(1.0)); MOST];
     for (k, (s, &i)) in signed.iter_mut().zip(order).enumerate() {
         let sign = sign(flipped, k);
-        *s = (rows[i], if concave >> k & 1 == 1 { Join::Least(sign) } else { Join::Greatest(sign) });
+        *s = (row(i), if concave >> k & 1 == 1 { Join::Least(sign) } else { Join::Greatest(sign) });
     }
-    joined_cost(&signed[..order.len()])
+    joined_cost(&signed[..order.len()], limit)
 }
 
 fn sign(flipped: u8, k: usize) -> f64 {
@@ -167,22 +214,28 @@ pub(super) fn joined(values: impl IntoIterator<Item = f64>, concave: u8) -> (usi
 }
 
 /// What the points pay for lying above several sheets of the surface at once: twice the logarithm of how many.
-pub(super) fn folds(sheets: &[Seen], concave: u8) -> f64 {
+pub(super) fn folds(sheets: &[Face], concave: u8) -> f64 {
     let m = sheets.len();
+    if let [a, b] = sheets {
+        let turn = (a.sign * a.normal).dot(b.sign * b.normal);
+        return folded([a, b], turn, concave >> 1 & 1 == 1) as f64 * 2.0 * f64::ln_1p(turn.abs());
+    }
     let mut turn = [[0.0; MOST]; MOST];
     for j in 0..m {
         for k in 0..m {
-            turn[j][k] = sheets[j].normal.dot(sheets[k].normal);
+            turn[j][k] = (sheets[j].sign * sheets[j].normal).dot(sheets[k].sign * sheets[k].normal);
         }
     }
+    // Logarithms by the sheet of the point and the set of those above it.
+    let mut known = [[f64::NAN; 1 << MOST]; MOST];
     let mut price = 0.0;
     for q in 0..sheets[0].residuals.len() {
         let mut at = [0.0; MOST];
-        (0..m).for_each(|k| at[k] = sheets[k].residuals[q]);
+        (0..m).for_each(|k| at[k] = sheets[k].sign * sheets[k].residuals[q]);
         // The foot of the point on sheet k is part of the surface if the nesting vanishes there. Sheets at right angles
         // do not lie above each other; a foot on the edge itself would count as if they did.
         let own = (0..m).fold(0, |a, k| if at[k].abs() < at[a].abs() { k } else { a });
-        let mut layers = 1.0;
+        let (mut layers, mut above) = (1.0, 0);
         for k in (0..m).filter(|&k| k != own) {
             let foot = |j: usize| if j == k { 0.0 } else { at[j] - at[k] * turn[j][k] };
             let mut f = foot(0);
@@ -191,13 +244,29 @@ pub(super) fn folds(sheets: &[Seen], concave: u8) -> f64 {
             }
             if f.abs() < ON {
                 layers += turn[k][own].abs();
+                above |= 1 << k;
             }
         }
-        if layers > 1.0 {
-            price += 2.0 * f64::ln(layers);
+        if above != 0 {
+            let log: &mut f64 = &mut known[own][above];
+            if log.is_nan() {
+                *log = 2.0 * f64::ln(layers);
+            }
+            price += *log;
         }
     }
     price
+}
+
+/// How many points lie above both of two sheets.
+fn folded([a, b]: [&Face; 2], turn: f64, least: bool) -> usize {
+    let above = |(&x, &y): (&f64, &f64)| {
+        let (x, y) = (a.sign * x, b.sign * y);
+        // The foot on the farther sheet, as the nearer one sees it.
+        let foot = if y.abs() < x.abs() { y - x * turn } else { x - y * turn };
+        if least { foot > -ON } else { foot < ON }
+    };
+    a.residuals.iter().zip(b.residuals).filter(|&p| above(p)).count()
 }
 
 /// All orders of a few sheets; the first two stand as they come, since joining two is the same both ways.

@@ -68,6 +68,14 @@ impl Points {
         Arch::new().dispatch(Distances { at: self.columns(), q, out });
     }
 
+    /// These distances over a noise level.
+    pub(super) fn levels(&self, q: &Quadric, noise: f64) -> Vec<f64> {
+        let mut levels = Vec::new();
+        self.distances(q, &mut levels);
+        levels.iter_mut().for_each(|r| *r /= noise);
+        levels
+    }
+
     /// Weighted sums of the monomials.
     pub(super) fn moments(&self, weights: &[f64]) -> Moments {
         Arch::new().dispatch(Sums { at: self.columns(), weights })
@@ -92,25 +100,88 @@ pub(super) fn weighted_squares(weights: &[f64], values: &[f64]) -> f64 {
     Arch::new().dispatch(Squares { weights, values })
 }
 
+/// Squares of distances in noise levels, each at most the square of [`LIMIT`].
+pub(super) fn capped(residuals: &[f64]) -> Vec<f64> {
+    residuals.iter().map(|r| cap(r * r)).collect()
+}
+
+#[inline(always)]
+fn cap(square: f64) -> f64 {
+    if square < LIMIT * LIMIT { square } else { LIMIT * LIMIT }
+}
+
+/// Sum over all points of the least of their [`capped`] squares; or something above `limit`, if it is.
+pub(super) fn nearest_cost(rows: &[&[f64]], limit: f64) -> f64 {
+    Arch::new().dispatch(Nearest { rows, limit })
+}
+
 /// How the distances to a sheet are joined to those before, each times its sign.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Join {
-    /// The nearer of both sheets.
-    Nearest,
     /// The minimum.
     Least(f64),
     /// The maximum.
     Greatest(f64),
 }
 
-/// Sum over all points of the squares of joined distances, each at most the square of [`LIMIT`].
+/// Sum over all points of the squares of joined distances, each at most the square of [`LIMIT`]; or something above `limit`,
+/// if it is.
 /// * `rows` - distances to each sheet in noise levels; how the first is joined is of no meaning
-pub(super) fn joined_cost(rows: &[(&[f64], Join)]) -> f64 {
-    Arch::new().dispatch(Joined { rows })
+pub(super) fn joined_cost(rows: &[(&[f64], Join)], limit: f64) -> f64 {
+    Arch::new().dispatch(Joined { rows, limit })
+}
+
+/// Sum over all points of the squares of joined distances, each at most the square of [`LIMIT`], and of what belongs to the
+/// sheets that decide at them.
+/// * `rows` - distances to each sheet in noise levels, and what belongs to it
+/// * `concave` - bit k: sheet k is joined by the minimum, else by the maximum
+pub(super) fn decided_cost(rows: &[(&[f64], f64)], concave: u8) -> (f64, f64) {
+    Arch::new().dispatch(Decided { rows, concave })
+}
+
+/// The lanes of a row from `first` on; places past the end are zero.
+#[inline(always)]
+fn lanes(row: &[f64], first: usize) -> [f64; LANES] {
+    if let Some(whole) = row.get(first..first + LANES) {
+        std::array::from_fn(|l| whole[l])
+    } else {
+        std::array::from_fn(|l| row.get(first + l).copied().unwrap_or(0.0))
+    }
+}
+
+struct Nearest<'a> {
+    rows: &'a [&'a [f64]],
+    limit: f64,
+}
+
+impl WithSimd for Nearest<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let mut sums = [0.0; LANES];
+        let n = self.rows[0].len();
+        for block in (0..n).step_by(BLOCK) {
+            for first in (block..n.min(block + BLOCK)).step_by(LANES) {
+                let mut v = lanes(self.rows[0], first);
+                for row in &self.rows[1..] {
+                    let r = lanes(row, first);
+                    (0..LANES).for_each(|l| v[l] = if r[l] < v[l] { r[l] } else { v[l] });
+                }
+                (0..LANES).for_each(|l| sums[l] += v[l]);
+            }
+            let sum = sums.iter().sum();
+            if sum > self.limit {
+                return sum;
+            }
+        }
+        sums.iter().sum()
+    }
 }
 
 struct Joined<'a> {
     rows: &'a [(&'a [f64], Join)],
+    limit: f64,
 }
 
 impl WithSimd for Joined<'_> {
@@ -120,30 +191,63 @@ impl WithSimd for Joined<'_> {
     fn with_simd<S: Simd>(self, _: S) -> f64 {
         let mut sums = [0.0; LANES];
         let n = self.rows[0].0.len();
-        for first in (0..n).step_by(LANES) {
-            // Places past the end count nothing.
-            let load = |row: &[f64]| {
-                if let Some(whole) = row.get(first..first + LANES) {
-                    std::array::from_fn(|l| whole[l])
-                } else {
-                    std::array::from_fn(|l| row.get(first + l).copied().unwrap_or(0.0))
+        for block in (0..n).step_by(BLOCK / 2) {
+            for first in (block..n.min(block + BLOCK / 2)).step_by(LANES) {
+                // Places past the end count nothing.
+                let mut v = lanes(self.rows[0].0, first);
+                for (row, join) in &self.rows[1..] {
+                    let r = lanes(row, first);
+                    match join {
+                        Join::Least(s) => {
+                            (0..LANES).for_each(|l| v[l] = if s * r[l] < v[l] { s * r[l] } else { v[l] });
+                        }
+                        Join::Greatest(s) => {
+                            (0..LANES).for_each(|l| v[l] = if s * r[l] > v[l] { s * r[l] } else { v[l] });
+                        }
+                    }
                 }
-            };
-            let mut v: [f64; LANES] = load(self.rows[0].0);
-            for (row, join) in &self.rows[1..] {
-                let r = load(row);
-                match join {
-                    Join::Nearest => (0..LANES).for_each(|l| v[l] = if r[l].abs() < v[l].abs() { r[l] } else { v[l] }),
-                    Join::Least(s) => (0..LANES).for_each(|l| v[l] = if s * r[l] < v[l] { s * r[l] } else { v[l] }),
-                    Join::Greatest(s) => (0..LANES).for_each(|l| v[l] = if s * r[l] > v[l] { s * r[l] } else { v[l] }),
-                }
+                (0..LANES).for_each(|l| sums[l] += cap(v[l] * v[l]));
             }
-            for l in 0..LANES {
-                let square = v[l] * v[l];
-                sums[l] += if square < LIMIT * LIMIT { square } else { LIMIT * LIMIT };
+            let sum = sums.iter().sum();
+            if sum > self.limit {
+                return sum;
             }
         }
         sums.iter().sum()
+    }
+}
+
+struct Decided<'a> {
+    rows: &'a [(&'a [f64], f64)],
+    concave: u8,
+}
+
+impl WithSimd for Decided<'_> {
+    type Output = (f64, f64);
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> (f64, f64) {
+        let (mut costs, mut shares) = ([0.0; LANES], [0.0; LANES]);
+        let n = self.rows[0].0.len();
+        for first in (0..n).step_by(LANES) {
+            let (mut v, mut own) = (lanes(self.rows[0].0, first), [self.rows[0].1; LANES]);
+            for (k, (row, share)) in self.rows.iter().enumerate().skip(1) {
+                let r = lanes(row, first);
+                let least = self.concave >> k & 1 == 1;
+                for l in 0..LANES {
+                    let takes = if least { r[l] < v[l] } else { r[l] >= v[l] };
+                    own[l] = if takes { *share } else { own[l] };
+                    v[l] = if takes { r[l] } else { v[l] };
+                }
+            }
+            let count = LANES.min(n - first);
+            own[count..].fill(0.0);
+            for l in 0..LANES {
+                costs[l] += cap(v[l] * v[l]);
+                shares[l] += own[l];
+            }
+        }
+        (costs.iter().sum(), shares.iter().sum())
     }
 }
 
@@ -241,6 +345,7 @@ impl WithSimd for Sums<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::nest;
     use crate::geom::random;
 
     fn unit(seed: u64, i: usize) -> f64 {
@@ -291,10 +396,17 @@ mod tests {
         let [a, b, c] = [0, 1, 2].map(|k| &rows[k][..]);
         let cost = |v: f64| (v * v).min(LIMIT * LIMIT);
         let nested: f64 = (0..45).map(|i| cost(a[i].max(-b[i]).min(c[i]))).sum();
-        let found = joined_cost(&[(a, Join::Nearest), (b, Join::Greatest(-1.0)), (c, Join::Least(1.0))]);
-        assert!((found - nested).abs() < 1e-12);
+        let rows = [(a, Join::Greatest(1.0)), (b, Join::Greatest(-1.0)), (c, Join::Least(1.0))];
+        assert!((joined_cost(&rows, f64::INFINITY) - nested).abs() < 1e-12);
+        assert!(joined_cost(&rows, 0.5 * nested) > 0.5 * nested);
         let nearest: f64 = (0..45).map(|i| cost(a[i].abs().min(b[i].abs()))).sum();
-        assert!((joined_cost(&[(a, Join::Nearest), (b, Join::Nearest)]) - nearest).abs() < 1e-12);
+        let squares = [capped(a), capped(b)];
+        assert!((nearest_cost(&[&squares[0], &squares[1]], f64::INFINITY) - nearest).abs() < 1e-12);
+        let (costs, shares) = decided_cost(&[(a, 1.0), (b, 10.0), (c, 100.0)], 0b100);
+        let decided: Vec<usize> = (0..45).map(|i| nest::joined([a[i], b[i], c[i]], 0b100).0).collect();
+        let bare: f64 = (0..45).map(|i| cost(a[i].max(b[i]).min(c[i]))).sum();
+        assert!((costs - bare).abs() < 1e-12);
+        assert_eq!(shares, decided.iter().map(|&k| [1.0, 10.0, 100.0][k]).sum::<f64>());
     }
 
     #[test]

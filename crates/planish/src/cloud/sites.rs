@@ -80,9 +80,10 @@ pub(super) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
     let seen = if known.is_empty() {
         first
     } else {
-        let regions = regions(&scouts.iter().map(|&i| points[i as usize]).collect::<Vec<_>>(), &places, &known);
+        let regions = Regions::new(&places, &known);
         in_pieces(scouts.len(), (0.2, 0.4), observer, |s, i| {
-            survey(tree, points[scouts[i] as usize], f64::INFINITY, regions[i].2, s)
+            let p = points[scouts[i] as usize];
+            survey(tree, p, f64::INFINITY, regions.at(p).prior, s)
         })?
     };
     let (known, places): (Vec<Survey>, Vec<DVec3>) =
@@ -90,56 +91,76 @@ pub(super) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
     if known.is_empty() {
         return Some(Sites { owner: vec![u32::MAX; points.len()], ..Sites::default() });
     }
-    let regions = regions(points, &places, &known);
-    let chosen = cover(points, tree, |i| APART * regions[i].0);
+    let regions = Regions::new(&places, &known);
+    let mut there = Vec::new();
+    let chosen = cover(points, tree, |i| {
+        let region = regions.at(points[i]);
+        there.push(region);
+        APART * region.least
+    });
     let surveys = in_pieces(chosen.len(), (0.4, 1.0), observer, |s, i| {
-        let at = chosen[i] as usize;
-        let (_, reach, prior) = regions[at];
-        Some((survey(tree, points[at], reach, prior, s)?, prior))
+        let Region { reach, prior, .. } = there[i];
+        survey(tree, points[chosen[i] as usize], reach, prior, s)
     })?;
-    let (point, both): (Vec<u32>, Vec<(Survey, Prior)>) =
-        chosen.into_iter().zip(surveys).filter_map(|(p, s)| Some((p, s?))).unzip();
-    let gap = point.iter().map(|&i| APART * regions[i as usize].0).collect();
-    let (survey, prior) = both.into_iter().unzip();
-    let places: Vec<DVec3> = point.iter().map(|&i| points[i as usize]).collect();
+    let mut sites = Sites::default();
+    for ((&point, region), survey) in chosen.iter().zip(&there).zip(surveys) {
+        let Some(survey) = survey else { continue };
+        sites.point.push(point);
+        sites.survey.push(survey);
+        sites.prior.push(region.prior);
+        sites.gap.push(APART * region.least);
+    }
+    let places: Vec<DVec3> = sites.point.iter().map(|&i| points[i as usize]).collect();
     let site_tree = KdTree::new(&places);
-    let owner = points.par_iter().map(|&p| site_tree.closest(p).unwrap_or(u32::MAX)).collect();
-    let mut sites = Sites { point, survey, prior, gap, owner };
+    sites.owner = points.par_iter().map(|&p| site_tree.closest(p).unwrap_or(u32::MAX)).collect();
     sites.even(&places, &site_tree);
     Some(sites)
 }
 
-/// For each point the least radius around, the farthest that a fit may reach, and the region, from the scouts around.
+/// What the scouts around a place say of it.
+#[derive(Clone, Copy)]
+struct Region {
+    /// Least radius around, world units.
+    least: f64,
+    /// The farthest that a fit may reach, world units.
+    reach: f64,
+    prior: Prior,
+}
+
+/// What is known of all places by scouts.
 ///
 /// Where a plate or a rib is as thin as the noise every scout takes it for noise; those that are sure of theirs are a
 /// little farther off.
-fn regions(points: &[DVec3], places: &[DVec3], known: &[Survey]) -> Vec<(f64, f64, Prior)> {
-    let tree = KdTree::new(places);
-    let certain = certain_noise(places, known);
-    points
-        .par_iter()
-        .map_init(
-            || (Vec::new(), Vec::new(), Vec::new()),
-            |(near, radii, noises), &p| {
-                tree.nearest(p, SCOUTS, near);
-                radii.clear();
-                noises.clear();
-                radii.extend(near.iter().map(|n| known[n.1 as usize].radius));
-                noises.extend(near.iter().map(|n| known[n.1 as usize].noise));
-                let least = radii.iter().take(3).copied().fold(f64::INFINITY, f64::min);
-                let most = radii.iter().copied().fold(0.0, f64::max);
-                radii.sort_unstable_by(f64::total_cmp);
-                noises.sort_unstable_by(f64::total_cmp);
-                let middle = radii[radii.len() / 2];
-                let prior = match &certain {
-                    Some(noise) => Prior { noise: noise[near[0].1 as usize], sure: true, one: false },
-                    None => Prior { noise: noises[noises.len() / 2], sure: false, one: false },
-                };
-                // A scout in a crease sees next to nothing; sites there stand as for half of the usual radius.
-                (least.max(USUAL * middle), REACH * most, prior)
-            },
-        )
-        .collect()
+struct Regions<'a> {
+    known: &'a [Survey],
+    tree: KdTree,
+    /// The noise at every scout, where it is sure.
+    certain: Option<Vec<f64>>,
+}
+
+impl Regions<'_> {
+    fn new<'a>(places: &[DVec3], known: &'a [Survey]) -> Regions<'a> {
+        Regions { known, tree: KdTree::new(places), certain: certain_noise(places, known) }
+    }
+
+    fn at(&self, p: DVec3) -> Region {
+        let mut near = Vec::with_capacity(SCOUTS);
+        self.tree.nearest(p, SCOUTS, &mut near);
+        let sorted = |of: &dyn Fn(&Survey) -> f64| {
+            let mut all: Vec<f64> = near.iter().map(|n| of(&self.known[n.1 as usize])).collect();
+            all.sort_unstable_by(f64::total_cmp);
+            all
+        };
+        let least = near.iter().take(3).map(|n| self.known[n.1 as usize].radius).fold(f64::INFINITY, f64::min);
+        let radii = sorted(&|s| s.radius);
+        let prior = match &self.certain {
+            Some(noise) => Prior { noise: noise[near[0].1 as usize], sure: true, one: false },
+            None => Prior { noise: sorted(&|s| s.noise)[near.len() / 2], sure: false, one: false },
+        };
+        // A scout in a crease sees next to nothing; sites there stand as for half of the usual radius.
+        let least = least.max(USUAL * radii[radii.len() / 2]);
+        Region { least, reach: REACH * radii[radii.len() - 1], prior }
+    }
 }
 
 /// The noise at every scout by those around that are sure of theirs; `None` if these are few.
@@ -163,7 +184,7 @@ fn certain_noise(places: &[DVec3], known: &[Survey]) -> Option<Vec<f64>> {
 }
 
 /// Points in their order such that none is within `gap(point)` of an earlier one and all are within that of one.
-pub(super) fn cover(points: &[DVec3], tree: &KdTree, gap: impl Fn(usize) -> f64) -> Vec<u32> {
+pub(super) fn cover(points: &[DVec3], tree: &KdTree, mut gap: impl FnMut(usize) -> f64) -> Vec<u32> {
     let mut covered = vec![false; points.len()];
     let mut chosen = Vec::new();
     for i in 0..points.len() {
