@@ -131,12 +131,12 @@ pub(super) fn cells(
         let around = KdTree::new(&candidates.iter().map(|c| c.at).collect::<Vec<_>>());
         let span = [pass, pass + 1].map(|k| k as f64 / PASSES as f64);
         let before = &made;
-        let fresh = in_pieces(places.len(), (span[0], span[1]), observer, |_, site| {
+        let fresh = in_pieces(places.len(), (span[0], span[1]), observer, |s, site| {
             let old = &before[site];
             if old.as_ref().is_some_and(|f| f.plain) {
                 return old.clone();
             }
-            let new = find(&places[site], site as u32, pass > 0, tree, &candidates, &around);
+            let new = find(&places[site], site as u32, pass > 0, tree, &candidates, &around, &mut s.around);
             match (old, new) {
                 (Some(o), Some(n)) => Some(if n.total < o.total { n } else { o.clone() }),
                 (o, n) => n.or_else(|| o.clone()),
@@ -264,12 +264,10 @@ fn find(
     tree: &KdTree,
     candidates: &[Candidate],
     around: &KdTree,
+    scratch: &mut Vec<DVec3>,
 ) -> Option<Found> {
     let &Place { center, support, noise } = place;
-    let mut ball = Vec::new();
-    tree.within(center, HEARD * support, |_, q, _| ball.push(q));
-    let step = ball.len().div_ceil(ENOUGH).max(1);
-    let ball: Points = ball.into_iter().step_by(step).collect();
+    let ball = around_place(center, HEARD * support, ENOUGH, tree, scratch);
     let count = ball.len().max(1) as f64;
     let residuals = |q: &Quadric| ball.levels(q, noise);
     // Candidates, those of the site first, then by distance.
@@ -330,7 +328,8 @@ fn find(
     let rounds = if sheets.len() > 1 && !known { REFINED } else { 0 };
     let mut worth = spread(&sheets.iter().map(look).collect::<Vec<_>>().iter().collect::<Vec<_>>(), concave).1;
     let mut widths = WIDTHS.to_vec();
-    let wide = if rounds > 0 { widest(place, tree) } else { Points::default() };
+    let widest = WIDTHS.into_iter().fold(0.0, f64::max) * HEARD * support;
+    let wide = if rounds > 0 { around_place(center, widest, PLENTY, tree, scratch) } else { Points::default() };
     for _ in 0..rounds {
         let owned = owned(&sheets, concave, noise, &wide);
         let tried = widths.iter().map(|width| {
@@ -402,13 +401,12 @@ fn joined(sheets: &[Sheet], concave: u8, p: DVec3) -> (usize, f64) {
     nest::joined(sheets.iter().map(|s| s.0.distance(p).0), concave)
 }
 
-/// The points of the widest ball around a place, or every so many of them.
-fn widest(place: &Place, tree: &KdTree) -> Points {
-    let radius = WIDTHS.into_iter().fold(0.0, f64::max) * HEARD * place.support;
-    let mut points = Vec::new();
-    tree.within(place.center, radius, |_, q, _| points.push(q));
-    let step = points.len().div_ceil(PLENTY).max(1);
-    points.into_iter().step_by(step).collect()
+/// The points of a ball, or every so many of them: at most `enough`.
+fn around_place(center: DVec3, radius: f64, enough: usize, tree: &KdTree, near: &mut Vec<DVec3>) -> Points {
+    near.clear();
+    tree.within(center, radius, |_, q, _| near.push(q));
+    let step = near.len().div_ceil(enough).max(1);
+    near.iter().copied().step_by(step).collect()
 }
 
 /// For each point the sheet that decides there, `u8::MAX` if the point does not lie on the nesting.

@@ -13,7 +13,7 @@
 //! on its own fit, which is the seed jump of [X03]. Supports follow from the data and not from factors c_i.
 
 use super::Quadric;
-use super::fit::{Ball, Sheet, kernel, localized, sheet};
+use super::fit::{Ball, Sheet, localized, sheet};
 use super::guides::guides;
 use super::layers;
 use super::nest::{LIMIT, Seen, cost, nest};
@@ -121,9 +121,9 @@ pub(super) fn grow(points: &[DVec3], tree: &KdTree, sites: &Sites, observer: &dy
         let centers: Vec<DVec3> = closed.iter().map(|f| f.center).collect();
         let closed_tree = KdTree::new(&centers);
         let snapshot = Closed { fits: &closed, tree: &closed_tree };
-        let fitted = in_pieces(open.len(), (span[0], span[1]), observer, |_, k| {
+        let fitted = in_pieces(open.len(), (span[0], span[1]), observer, |s, k| {
             let site = open[k] as usize;
-            fit_site(tree, sites, site, irregularity[site], class as u8, snapshot)
+            fit_site(tree, sites, site, irregularity[site], class as u8, snapshot, &mut s.around)
         })?;
         closed.extend(fitted.into_iter().flatten());
     }
@@ -199,7 +199,15 @@ fn accompanied(fits: Vec<Fit>) -> Vec<Fit> {
     fits
 }
 
-fn fit_site(tree: &KdTree, sites: &Sites, site: usize, irregularity: f64, class: u8, closed: Closed) -> Vec<Fit> {
+fn fit_site(
+    tree: &KdTree,
+    sites: &Sites,
+    site: usize,
+    irregularity: f64,
+    class: u8,
+    closed: Closed,
+    near: &mut Vec<DVec3>,
+) -> Vec<Fit> {
     let survey = &sites.survey[site];
     let p = survey.quadric.center;
     let noise = sites.noise(site).max(1e-300);
@@ -208,7 +216,7 @@ fn fit_site(tree: &KdTree, sites: &Sites, site: usize, irregularity: f64, class:
     } else if class == 0 {
         vec![Start { sheet: survey.quadric, at: p, radius: survey.radius }]
     } else {
-        choose(tree, survey.radius, sites.gap[site] / APART, survey.quadric, noise, closed)
+        choose(tree, survey.radius, sites.gap[site] / APART, survey.quadric, noise, closed, near)
     };
     let sheets = starts.len() as u8;
     let all: Vec<Quadric> = starts.iter().map(|s| s.sheet).collect();
@@ -217,7 +225,7 @@ fn fit_site(tree: &KdTree, sites: &Sites, site: usize, irregularity: f64, class:
         .enumerate()
         .filter_map(|(k, start)| {
             let others: Vec<Quadric> = (0..all.len()).filter(|&i| i != k).map(|i| all[i]).collect();
-            let (s, radius, error) = widen(tree, closed, &start, &others, noise)?;
+            let (s, radius, error) = widen(tree, closed, &start, &others, noise, near)?;
             let (center, normal) = s.quadric.project(start.at);
             Some(Fit {
                 quadric: s.quadric.normalized_at(center),
@@ -254,13 +262,23 @@ fn fit_site(tree: &KdTree, sites: &Sites, site: usize, irregularity: f64, class:
 const SIDE_BY_SIDE: f64 = 0.866;
 
 /// The sheets that explain the points around a site, each with the middle of the points that are nearest to it there.
-fn choose(tree: &KdTree, radius: f64, usual: f64, own: Quadric, noise: f64, closed: Closed) -> Vec<Start> {
+fn choose(
+    tree: &KdTree,
+    radius: f64,
+    usual: f64,
+    own: Quadric,
+    noise: f64,
+    closed: Closed,
+    around: &mut Vec<DVec3>,
+) -> Vec<Start> {
     let p = own.center;
     let alone = vec![Start { sheet: own, at: p, radius }];
     // A crease has a narrow ball because one sheet is no model there; with the right sheets a usual ball will do.
     let wide = usual.clamp(radius, WIDE * radius);
+    around.clear();
+    tree.within(p, wide, |_, q, _| around.push(q));
     let mut ball = Points::default();
-    tree.within(p, wide, |_, q, _| ball.push(q));
+    ball.refill(around);
     let residuals = |q: &Quadric| ball.levels(q, noise);
     let count = ball.len() as f64;
     let good = count * (EXPLAINED + 2.0 * (2.0 / count).sqrt());
@@ -333,7 +351,14 @@ struct Start {
 }
 
 /// Fits a sheet from a first guess and widens its ball while its own points show no bias: sheet, radius, expected error.
-fn widen(tree: &KdTree, closed: Closed, start: &Start, others: &[Quadric], noise: f64) -> Option<(Sheet, f64, f64)> {
+fn widen(
+    tree: &KdTree,
+    closed: Closed,
+    start: &Start,
+    others: &[Quadric],
+    noise: f64,
+    near: &mut Vec<DVec3>,
+) -> Option<(Sheet, f64, f64)> {
     let p = start.at;
     let mut best: Option<(Sheet, f64, f64)> = None;
     let mut guess = start.sheet;
@@ -341,15 +366,20 @@ fn widen(tree: &KdTree, closed: Closed, start: &Start, others: &[Quadric], noise
     let (mut own, mut other, mut all) = (Vec::new(), Vec::new(), Vec::new());
     for step in 0..=STEPS {
         let r = start.radius * WIDEN.powi(step as i32);
-        ball.clear();
-        weights.clear();
+        // The second ball is asked in nearly every case, and it holds the first.
+        if step != 1 {
+            near.clear();
+            let reach = if step == 0 { start.radius * WIDEN } else { r };
+            tree.within(p, reach, |_, q, _| near.push(q));
+        }
+        if step == 0 {
+            ball.clear();
+            near.iter().filter(|q| q.distance_squared(p) <= r * r).for_each(|&q| ball.push(q));
+        } else {
+            ball.refill(near);
+        }
         // Along the sheet alone: at the rim of a ball the noise would say which points of a bent sheet are in it.
-        let across = guess.distance(p).1;
-        tree.within(p, r, |_, q, _| {
-            let y = (q - p) / r;
-            ball.push(y);
-            weights.push(kernel(y.length_squared() - y.dot(across).powi(2)));
-        });
+        ball.localize(p, r, guess.distance(p).1, &mut weights);
         if !others.is_empty() {
             // The chance that each point belongs to this sheet and to none of the others.
             let sigma = noise / r;
@@ -360,14 +390,14 @@ fn widen(tree: &KdTree, closed: Closed, start: &Start, others: &[Quadric], noise
             chance(&guess, &mut own);
             all.clear();
             all.resize(ball.len(), STRAY);
-            for s in others.iter().chain([&guess]) {
+            for s in others {
                 chance(s, &mut other);
                 all.iter_mut().zip(&other).for_each(|(a, c)| *a += c);
             }
+            all.iter_mut().zip(&own).for_each(|(a, c)| *a += c);
             weights.iter_mut().zip(own.iter().zip(&all)).for_each(|(w, (own, all))| *w *= own / all);
         }
-        ball.keep(|i| weights[i] > FELT);
-        weights.retain(|&w| w > FELT);
+        ball.keep_above(FELT, &mut weights);
         // Enough points: more of them cost more than they tell.
         if step > 0 && ball.len() > PLENTY && r > WIDE_ENOUGH * noise {
             break;

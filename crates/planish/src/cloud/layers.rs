@@ -6,12 +6,13 @@
 
 use super::fit::{Frame, Height, framed_height};
 use super::moments::Moments;
+use super::points::Points;
 use glam::DVec3;
 
 /// Fewest points: a dip in fewer is chance.
 const FEWEST: usize = 48;
 /// Kurtosis above which there is no dip to look for: noise has 3, two sheets three levels apart 2.
-const PEAKED: f64 = 2.4;
+pub(super) const PEAKED: f64 = 2.4;
 /// Half width of the windows in the dip and on the sheets, of half the distance of the sheets.
 const WINDOW: f64 = 0.35;
 /// Points in the dip over those on a sheet, at most: noise has 1.3, an even spread 1, sheets three levels apart two
@@ -38,11 +39,11 @@ pub(super) struct Layers {
 
 /// Tells whether points that one height field was fitted to are two sheets.
 /// * `points` - local coordinates
-pub(super) fn split(height: &Height, points: &[DVec3]) -> Option<Layers> {
+/// * `r` - residuals of the points
+pub(super) fn split(height: &Height, points: &Points, r: &[f64]) -> Option<Layers> {
     if points.len() < FEWEST {
         return None;
     }
-    let r: Vec<f64> = points.iter().map(|&y| height.residual(y)).collect();
     let n = r.len() as f64;
     let (squares, fourths) = r.iter().fold((0.0, 0.0), |(s, f), x| (s + x * x, f + x * x * x * x));
     if !(fourths * n < PEAKED * squares * squares) {
@@ -52,7 +53,7 @@ pub(super) fn split(height: &Height, points: &[DVec3]) -> Option<Layers> {
     let mut middle = 0.0;
     for _ in 0..4 {
         let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
-        for &x in &r {
+        for &x in r {
             let k = usize::from(x > middle);
             sums[k] += x;
             counts[k] += 1.0;
@@ -70,7 +71,7 @@ pub(super) fn split(height: &Height, points: &[DVec3]) -> Option<Layers> {
         return None;
     }
     let mut sectors = [[0.0f64; 2]; SECTORS];
-    for (&y, &x) in points.iter().zip(&r) {
+    for (y, &x) in points.iter().zip(r) {
         let (u, v) = (height.frame.u.dot(y), height.frame.v.dot(y));
         let at = usize::from(u > 0.0) | usize::from(v > 0.0) << 1 | usize::from(u.abs() > v.abs()) << 2;
         sectors[at][usize::from(x > middle)] += 1.0;
@@ -82,24 +83,24 @@ pub(super) fn split(height: &Height, points: &[DVec3]) -> Option<Layers> {
     let mut sheets = [*height; 2];
     for round in 0..=ROUNDS {
         let mut sums = [Moments::ZERO; 2];
-        for (&y, &s) in points.iter().zip(&side) {
+        for (y, &s) in points.iter().zip(&side) {
             sums[usize::from(s)].add(y, 1.0);
         }
         for (sheet, sum) in sheets.iter_mut().zip(&sums) {
             *sheet = framed_height(&sum.matrix(), Frame::of(height.frame.n))?;
         }
         if round < ROUNDS {
-            for (&y, s) in points.iter().zip(&mut side) {
+            for (y, s) in points.iter().zip(&mut side) {
                 *s = sheets[1].residual(y).abs() < sheets[0].residual(y).abs();
             }
         }
     }
-    let left: f64 = points.iter().map(|&y| sheets[0].residual(y).abs().min(sheets[1].residual(y).abs()).powi(2)).sum();
+    let left: f64 = points.iter().map(|y| sheets[0].residual(y).abs().min(sheets[1].residual(y).abs()).powi(2)).sum();
     let noise = (left / (n - 12.0)).sqrt();
     // Side by side everywhere: sheets that cross are the faces of an edge.
     let apart = |y: DVec3| sheets[0].residual(y) - sheets[1].residual(y);
     let way = apart(DVec3::ZERO).signum();
-    if points.iter().any(|&y| way * apart(y) < APART * noise) {
+    if points.iter().any(|y| way * apart(y) < APART * noise) {
         return None;
     }
     if sheets[1].residual(DVec3::ZERO).abs() < sheets[0].residual(DVec3::ZERO).abs() {
@@ -118,8 +119,8 @@ mod tests {
     }
 
     /// Points in the unit disk on `of(u, v, k)`, noise .03.
-    fn patch(seed: u64, count: u64, of: impl Fn(f64, f64, u64) -> f64) -> (Height, Vec<DVec3>) {
-        let points: Vec<DVec3> = (0..count)
+    fn patch(seed: u64, count: u64, of: impl Fn(f64, f64, u64) -> f64) -> (Height, Points, Vec<f64>) {
+        let points: Points = (0..count)
             .map(|k| {
                 let (r, a) = (random::unit(seed, 2 * k).sqrt(), std::f64::consts::TAU * random::unit(seed, 2 * k + 1));
                 let (u, v) = (r * a.cos(), r * a.sin());
@@ -127,16 +128,18 @@ mod tests {
             })
             .collect();
         let mut m = Moments::ZERO;
-        points.iter().for_each(|&p| m.add(p, 1.0));
-        (framed_height(&m.matrix(), Frame::of_moments(&m)).unwrap(), points)
+        points.iter().for_each(|p| m.add(p, 1.0));
+        let height = framed_height(&m.matrix(), Frame::of_moments(&m)).unwrap();
+        let r = points.iter().map(|p| height.residual(p)).collect();
+        (height, points, r)
     }
 
     #[test]
     fn of_20_pairs_of_sheets_four_noise_levels_apart_14_are_told_apart_and_placed_within_two_thirds_of_the_noise() {
         let mut told = 0;
         for seed in 0..20 {
-            let (h, points) = patch(seed, 200, |u, _, k| 0.2 * u * u + if k % 2 == 0 { 0.06 } else { -0.06 });
-            let Some(found) = split(&h, &points) else { continue };
+            let (h, points, r) = patch(seed, 200, |u, _, k| 0.2 * u * u + if k % 2 == 0 { 0.06 } else { -0.06 });
+            let Some(found) = split(&h, &points, &r) else { continue };
             told += 1;
             assert!((found.noise / 0.03 - 1.0).abs() < 0.2, "{}", found.noise);
             let mut at = found.sheets.map(|s| -s.residual(DVec3::ZERO) * s.frame.n.z.signum());
@@ -150,12 +153,12 @@ mod tests {
     #[test]
     fn noise_an_even_spread_and_an_edge_are_one_sheet_in_200_seeds_each() {
         for seed in 0..200 {
-            let (h, points) = patch(seed, 150, |u, v, _| 0.2 * u * v);
-            assert!(split(&h, &points).is_none(), "noise, seed {seed}");
-            let (h, points) = patch(seed, 150, |_, _, k| 0.2 * random::unit(77 + seed, k));
-            assert!(split(&h, &points).is_none(), "even, seed {seed}");
-            let (h, points) = patch(seed, 150, |u, _, _| -u.abs());
-            assert!(split(&h, &points).is_none(), "edge, seed {seed}");
+            let (h, points, r) = patch(seed, 150, |u, v, _| 0.2 * u * v);
+            assert!(split(&h, &points, &r).is_none(), "noise, seed {seed}");
+            let (h, points, r) = patch(seed, 150, |_, _, k| 0.2 * random::unit(77 + seed, k));
+            assert!(split(&h, &points, &r).is_none(), "even, seed {seed}");
+            let (h, points, r) = patch(seed, 150, |u, _, _| -u.abs());
+            assert!(split(&h, &points, &r).is_none(), "edge, seed {seed}");
         }
     }
 }

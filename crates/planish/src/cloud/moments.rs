@@ -117,6 +117,11 @@ impl Moments {
         }
     }
 
+    /// Adds the sums over other points.
+    pub(super) fn join(&mut self, other: &Moments) {
+        self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += b);
+    }
+
     /// Sum of the weights.
     pub(super) fn weight(&self) -> f64 {
         self.0[0]

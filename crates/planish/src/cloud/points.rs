@@ -3,6 +3,7 @@
 //! Every sum has a fixed number of lanes, so its bits do not depend on how wide the instructions are.
 
 use super::Quadric;
+use super::fit::{Frame, Height, kernel};
 use super::moments::{COUNT, Moments, PARENTS};
 use super::nest::LIMIT;
 use glam::DVec3;
@@ -39,6 +40,54 @@ impl Points {
         self.z.push(p.z);
     }
 
+    /// Takes these points instead.
+    pub(super) fn refill(&mut self, points: &[DVec3]) {
+        self.clear();
+        self.x.extend(points.iter().map(|p| p.x));
+        self.y.extend(points.iter().map(|p| p.y));
+        self.z.extend(points.iter().map(|p| p.z));
+    }
+
+    /// Makes the points local to a ball, and weighs each by its distance along a sheet ([`kernel`]).
+    /// * `normal` - that of the sheet
+    pub(super) fn localize(&mut self, center: DVec3, radius: f64, normal: DVec3, weights: &mut Vec<f64>) {
+        weights.clear();
+        weights.resize(self.len(), 0.0);
+        let at = [&mut self.x[..], &mut self.y[..], &mut self.z[..]];
+        Arch::new().dispatch(Localize { at, center, radius, normal, weights });
+    }
+
+    /// Leaves out the points whose weights are not above `least`, and these weights.
+    pub(super) fn keep_above(&mut self, least: f64, weights: &mut Vec<f64>) {
+        let mut kept = 0;
+        for i in 0..weights.len() {
+            if weights[i] > least {
+                (self.x[kept], self.y[kept], self.z[kept]) = (self.x[i], self.y[i], self.z[i]);
+                weights[kept] = weights[i];
+                kept += 1;
+            }
+        }
+        for axis in [&mut self.x, &mut self.y, &mut self.z, weights] {
+            axis.truncate(kept);
+        }
+    }
+
+    /// Coordinates of all points and distances above the height field, in its frame; `out` is three rows of values.
+    pub(super) fn heights(&self, height: &Height, out: &mut [Vec<f64>; 3]) {
+        let rows = out.each_mut().map(|row| {
+            row.resize(self.len(), 0.0);
+            &mut row[..]
+        });
+        Arch::new().dispatch(Heights { at: self.columns(), height, out: rows });
+    }
+
+    /// Adds the points of another.
+    pub(super) fn append(&mut self, other: &Points) {
+        self.x.extend_from_slice(&other.x);
+        self.y.extend_from_slice(&other.y);
+        self.z.extend_from_slice(&other.z);
+    }
+
     pub(super) fn len(&self) -> usize {
         self.x.len()
     }
@@ -49,17 +98,6 @@ impl Points {
 
     pub(super) fn iter(&self) -> impl Iterator<Item = DVec3> + '_ {
         (0..self.len()).map(|i| self.get(i))
-    }
-
-    /// Leaves out the points that are not wanted.
-    pub(super) fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
-        for axis in [&mut self.x, &mut self.y, &mut self.z] {
-            let mut i = 0;
-            axis.retain(|_| {
-                i += 1;
-                wanted(i - 1)
-            });
-        }
     }
 
     /// First-order signed distance of every point to a quadric, as [`Quadric::distance`], in the units of the points.
@@ -265,6 +303,17 @@ impl WithSimd for Distances<'_> {
         let (n, out) = (self.out.len(), self.out);
         let [x, y, z] = self.at.map(|c| &c[..n]);
         let (a, c, scale, inverse) = (self.q.a, self.q.center, self.q.scale, 1.0 / self.q.scale);
+        if a[..6] == [0.0; 6] {
+            // The same bits: the gradient of a plane is the same everywhere.
+            let square = a[6] * a[6] + a[7] * a[7] + a[8] * a[8];
+            let length = square.sqrt();
+            for i in 0..n {
+                let (x, y, z) = ((x[i] - c.x) * inverse, (y[i] - c.y) * inverse, (z[i] - c.z) * inverse);
+                let d = scale * (a[6] * x + a[7] * y + a[8] * z + a[9]) / length;
+                out[i] = if square > 0.0 { d } else { f64::INFINITY };
+            }
+            return;
+        }
         for i in 0..n {
             let (x, y, z) = ((x[i] - c.x) * inverse, (y[i] - c.y) * inverse, (z[i] - c.z) * inverse);
             let (hx, hy, hz) = (a[0] * x + a[1] * y + a[2] * z, a[3] * y + a[4] * z, a[5] * z);
@@ -275,6 +324,56 @@ impl WithSimd for Distances<'_> {
             let square = gx * gx + gy * gy + gz * gz;
             let d = scale * f / square.sqrt();
             out[i] = if square > 0.0 { d } else { f64::INFINITY };
+        }
+    }
+}
+
+struct Localize<'a> {
+    at: [&'a mut [f64]; 3],
+    center: DVec3,
+    radius: f64,
+    normal: DVec3,
+    weights: &'a mut [f64],
+}
+
+impl WithSimd for Localize<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Localize { at: [x, y, z], center: c, radius, normal, weights } = self;
+        let n = weights.len();
+        let (x, y, z) = (&mut x[..n], &mut y[..n], &mut z[..n]);
+        for i in 0..n {
+            let p = DVec3::new((x[i] - c.x) / radius, (y[i] - c.y) / radius, (z[i] - c.z) / radius);
+            (x[i], y[i], z[i]) = (p.x, p.y, p.z);
+            let across = p.dot(normal);
+            weights[i] = kernel(p.length_squared() - across * across);
+        }
+    }
+}
+
+struct Heights<'a> {
+    at: [&'a [f64]; 3],
+    height: &'a Height,
+    out: [&'a mut [f64]; 3],
+}
+
+impl WithSimd for Heights<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Frame { u: fu, v: fv, n: fn_ } = self.height.frame;
+        let c = self.height.c;
+        let [u, v, r] = self.out;
+        let n = u.len();
+        let ([x, y, z], v, r) = (self.at.map(|a| &a[..n]), &mut v[..n], &mut r[..n]);
+        for i in 0..n {
+            let p = DVec3::new(x[i], y[i], z[i]);
+            let (a, b) = (fu.dot(p), fv.dot(p));
+            (u[i], v[i]) = (a, b);
+            r[i] = fn_.dot(p) - (a * (c[0] * a + c[1] * b + c[3]) + b * (c[2] * b + c[4]) + c[5]);
         }
     }
 }
@@ -369,6 +468,18 @@ mod tests {
                 assert!((d - q.distance(p).0).abs() < 1e-14 * (1.0 + d.abs()), "{d}");
             }
         }
+        let plane = Quadric {
+            center: DVec3::new(0.2, -0.1, 0.3),
+            scale: 0.7,
+            a: {
+                let mut a = a;
+                a[..6].fill(0.0);
+                a
+            },
+        };
+        let points = some(70);
+        points.distances(&plane, &mut found);
+        assert!(points.iter().zip(&found).all(|(p, d)| (d - plane.distance(p).0).abs() < 1e-14));
         // Where the gradient vanishes there is no direction to go.
         let cone = Quadric { center: DVec3::ZERO, scale: 1.0, a: [1.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0] };
         [DVec3::ZERO].into_iter().collect::<Points>().distances(&cone, &mut found);
@@ -410,10 +521,31 @@ mod tests {
     }
 
     #[test]
-    fn points_that_are_not_wanted_leave_in_all_axes() {
+    fn points_of_little_weight_leave_in_all_axes() {
         let mut points = some(20);
         let wanted = points.get(7);
-        points.keep(|i| i == 7);
+        let mut weights: Vec<f64> = (0..20).map(|i| if i == 7 { 0.5 } else { 0.1 }).collect();
+        points.keep_above(0.1, &mut weights);
         assert_eq!(points.iter().collect::<Vec<_>>(), [wanted]);
+        assert_eq!(weights, [0.5]);
+    }
+
+    #[test]
+    fn local_points_weights_and_heights_are_those_of_each_alone_to_1e_14() {
+        let mut points = some(29);
+        let (center, radius, normal) = (DVec3::new(0.1, 0.0, -0.2), 0.8, DVec3::new(0.6, 0.0, 0.8));
+        let before: Vec<DVec3> = points.iter().collect();
+        let mut weights = Vec::new();
+        points.localize(center, radius, normal, &mut weights);
+        let height = Height { frame: Frame::of(normal), c: [0.3, -0.5, 0.2, 0.9, 0.4, -0.6] };
+        let mut rows = Default::default();
+        points.heights(&height, &mut rows);
+        for (i, p) in before.into_iter().enumerate() {
+            let y = (p - center) / radius;
+            assert!(points.get(i).distance(y) < 1e-14);
+            assert!((weights[i] - kernel(y.length_squared() - y.dot(normal).powi(2))).abs() < 1e-14);
+            let alone = [height.frame.u.dot(y), height.frame.v.dot(y), height.residual(y)];
+            assert!((0..3).all(|k| (rows[k][i] - alone[k]).abs() < 1e-14));
+        }
     }
 }

@@ -13,8 +13,9 @@
 use super::Quadric;
 use super::fit::{Frame, Height, framed_height};
 use super::front::{PLENTY, WIDE_ENOUGH};
-use super::layers::{Layers, split};
+use super::layers::{Layers, PEAKED, split};
 use super::moments::Moments;
+use super::points::Points;
 use crate::geom::KdTree;
 use glam::DVec3;
 
@@ -72,8 +73,13 @@ pub(super) struct Survey {
 #[derive(Default)]
 pub(super) struct Scratch {
     near: Vec<(f64, u32)>,
-    y: Vec<DVec3>,
-    shell: Vec<u8>,
+    /// Points of a ball, world units.
+    pub around: Vec<DVec3>,
+    /// Those of the balls so far, local coordinates, and those of the next ones alone.
+    ball: Points,
+    fresh: [Points; STRIDE],
+    ones: Vec<f64>,
+    rows: [Vec<f64>; 3],
 }
 
 /// What is known around a place before it is surveyed.
@@ -106,8 +112,13 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
         // A point aside of the surface sees one side of the noise; the search begins on the plane of its ball.
         r0 = start;
         for _ in 0..2 {
-            let mut m = Moments::ZERO;
-            tree.within(p, r0, |_, q, _| m.add((q - p) / r0, 1.0));
+            let Scratch { around, ball, ones, .. } = &mut *scratch;
+            around.clear();
+            tree.within(p, r0, |_, q, _| around.push(q));
+            ball.refill(around);
+            ball.localize(p, r0, DVec3::ZERO, ones);
+            ones.fill(1.0);
+            let m = ball.moments(ones);
             if m.weight() >= SMALLEST as f64 {
                 let n = Frame::of_moments(&m).n;
                 p += r0 * n * m.mean().dot(n);
@@ -118,43 +129,44 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
     let quadric = |h: &Height| Quadric { center: p, scale: r0, a: h.implicit() };
     let mut sums = Moments::ZERO;
     let (mut best, mut least): (Option<Survey>, f64) = (None, f64::INFINITY);
-    scratch.y.clear();
+    let Scratch { around, ball: inner, fresh, ones, rows, .. } = scratch;
+    inner.clear();
     let mut done = 0.0;
     // The noise of the region, or the least of the balls so far.
     let mut usual = if prior.noise > 0.0 { prior.noise / r0 } else { f64::INFINITY };
     'rounds: for first in (0..BALLS).step_by(STRIDE) {
         let last = first + STRIDE - 1;
         let limits: [f64; STRIDE] = std::array::from_fn(|k| GROWTH.powi(2 * (first + k) as i32));
-        let mut fresh: [Vec<DVec3>; STRIDE] = Default::default();
-        scratch.shell.clear();
-        tree.within(p, radius(last) * (1.0 + 1e-12), |_, q, _| {
+        fresh.iter_mut().for_each(Points::clear);
+        around.clear();
+        tree.within(p, radius(last) * (1.0 + 1e-12), |_, q, _| around.push(q));
+        for &q in &*around {
             let y = (q - p) / r0;
             let d2 = y.length_squared();
             if d2 > done {
                 let k = limits.iter().position(|&l| d2 <= l * (1.0 + 1e-12)).unwrap_or(STRIDE - 1);
                 fresh[k].push(y);
             }
-        });
+        }
         done = limits[STRIDE - 1] * (1.0 + 1e-12);
         for (k, points) in fresh.iter().enumerate() {
-            for &y in points {
-                sums.add(y, 1.0);
-            }
-            scratch.y.extend_from_slice(points);
+            ones.clear();
+            ones.resize(points.len(), 1.0);
+            sums.join(&points.moments(ones));
+            inner.append(points);
             let j = first + k;
-            if j > 0 && (radius(j) > reach || (scratch.y.len() > PLENTY && GROWTH.powi(j as i32) > WIDE_ENOUGH * usual))
-            {
+            if j > 0 && (radius(j) > reach || (inner.len() > PLENTY && GROWTH.powi(j as i32) > WIDE_ENOUGH * usual)) {
                 break 'rounds;
             }
             let Some(height) = framed_height(&sums.matrix(), Frame::of_moments(&sums)) else { continue };
             let ball = GROWTH.powi(j as i32);
-            let Scatter { noise, excess, kurtosis } = bias(&height, &scratch.y, ball);
-            let count = scratch.y.len();
-            let layers = if prior.one { None } else { split(&height, &scratch.y) };
+            let Scatter { noise, excess, kurtosis } = bias(&height, inner, ball, rows);
+            let count = inner.len();
+            let layers = if prior.one || kurtosis >= PEAKED { None } else { split(&height, inner, &rows[2]) };
             let (noise, excess) = match &layers {
                 None => (noise.max(floor / r0), excess),
                 // Each sheet has half of the points, and its bias is not measured: that of both together is.
-                Some(l) => (l.noise.max(floor / r0), PARAMETERS + 2.0 * layer_bias(l, &scratch.y, ball)),
+                Some(l) => (l.noise.max(floor / r0), PARAMETERS + 2.0 * layer_bias(l, inner, ball, rows)),
             };
             let (radii, own) = match prior.sure {
                 true => (KNOWN_RADII, noise.min(prior.noise / r0)),
@@ -195,12 +207,12 @@ pub(super) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
 }
 
 /// What the averages of the sectors hold beyond noise if every point belongs to the nearer of two sheets.
-fn layer_bias(layers: &Layers, points: &[DVec3], ball: f64) -> f64 {
-    let own = |k: usize| -> Vec<DVec3> {
+fn layer_bias(layers: &Layers, points: &Points, ball: f64, rows: &mut [Vec<f64>; 3]) -> f64 {
+    let own = |k: usize| -> Points {
         let [a, b] = [k, 1 - k].map(|i| &layers.sheets[i]);
-        points.iter().copied().filter(|&y| a.residual(y).abs() <= b.residual(y).abs()).collect()
+        points.iter().filter(|&y| a.residual(y).abs() <= b.residual(y).abs()).collect()
     };
-    (0..2).map(|k| bias(&layers.sheets[k], &own(k), ball).excess).sum::<f64>() / 2.0
+    (0..2).map(|k| bias(&layers.sheets[k], &own(k), ball, rows).excess).sum::<f64>() / 2.0
 }
 
 /// What the residuals of a ball show.
@@ -214,16 +226,17 @@ struct Scatter {
 }
 
 /// Noise inside the sectors and what the averages of the sectors hold beyond it.
-fn bias(height: &Height, points: &[DVec3], ball: f64) -> Scatter {
+/// * `rows` - takes coordinates and residuals ([`Points::heights`])
+fn bias(height: &Height, points: &Points, ball: f64, rows: &mut [Vec<f64>; 3]) -> Scatter {
     const SECTORS: usize = 16;
     // Two rings of equal area want five points in each part.
     let rings = points.len() >= 5 * SECTORS;
     let half = ball * ball / 2.0;
     let mut sums = [(0.0, 0.0); SECTORS];
     let (mut squares, mut fourths) = (0.0, 0.0);
-    for &y in points {
-        let (u, v) = (height.frame.u.dot(y), height.frame.v.dot(y));
-        let r = height.residual(y);
+    points.heights(height, rows);
+    let [us, vs, rs] = &*rows;
+    for ((&u, &v), &r) in us.iter().zip(vs).zip(rs) {
         let mut at = usize::from(u > 0.0) | usize::from(v > 0.0) << 1 | usize::from(u.abs() > v.abs()) << 2;
         if rings && u * u + v * v > half {
             at |= 8;
