@@ -28,6 +28,7 @@ const ROUNDS: usize = 2;
 pub struct Blend {
     /// In the order of the tree.
     cells: Vec<Cell>,
+    reaches: Vec<Reach>,
     nodes: Vec<Node>,
 }
 
@@ -36,8 +37,6 @@ pub struct Blend {
 pub struct Blended {
     /// Pseudo-distance, positive outside, world units.
     pub value: f64,
-    /// Unit gradient.
-    pub normal: DVec3,
     /// Distance to the nearest centre of a cell over the support of that cell, squared.
     pub aside: f64,
     /// The heaviest cell.
@@ -48,13 +47,43 @@ pub struct Blended {
     pub weight: f64,
 }
 
-/// One cell at a point.
-#[derive(Clone, Copy)]
-struct Seen {
-    value: f64,
-    normal: DVec3,
-    weight: f64,
-    variance: f64,
+/// How far a cell reaches.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reach {
+    center: DVec3,
+    /// One over the squared support.
+    inverse: f64,
+    trust: f64,
+}
+
+impl Reach {
+    pub(super) fn of(cell: &Cell) -> Reach {
+        Reach { center: cell.center, inverse: 1.0 / (cell.support * cell.support), trust: cell.trust }
+    }
+
+    /// Squared distance of `p` over the squared support.
+    #[inline]
+    fn share(&self, p: DVec3) -> f64 {
+        self.center.distance_squared(p) * self.inverse
+    }
+
+    /// Weight in the blend at `p`.
+    pub(super) fn weight(&self, p: DVec3) -> f64 {
+        self.bell(self.share(p))
+    }
+
+    /// Weight in the blend at such a share.
+    #[inline]
+    fn bell(&self, t2: f64) -> f64 {
+        // C1 at the rim; a wide bell, since the mean of many cells has less noise than any of them.
+        (1.0 - t2).max(0.0).powi(2) * self.trust
+    }
+
+    /// One over the squared error that is expected there: it grows with the distance.
+    #[inline]
+    fn sure(&self, t2: f64) -> f64 {
+        self.trust * self.inverse / ((1.0 + t2) * (1.0 + t2))
+    }
 }
 
 /// A node of the tree over the supports, in preorder; the left child follows it.
@@ -76,7 +105,7 @@ impl Blend {
         if !cells.is_empty() {
             build(&mut cells, 0, &mut nodes);
         }
-        Blend { cells, nodes }
+        Blend { reaches: cells.iter().map(Reach::of).collect(), cells, nodes }
     }
 
     /// The cells, in the order of the tree.
@@ -97,8 +126,7 @@ impl Blend {
             }
             if node.right == 0 {
                 for i in node.start as usize..(node.start + node.count) as usize {
-                    let c = &self.cells[i];
-                    let t2 = c.center.distance_squared(p) / (c.support * c.support);
+                    let t2 = self.reaches[i].share(p);
                     if t2 < 1.0 {
                         visit(i, t2);
                     }
@@ -111,10 +139,10 @@ impl Blend {
         }
     }
 
-    /// Value and gradient at `p`; `None` where no cell reaches.
+    /// The value at `p`; `None` where no cell reaches.
     pub fn at(&self, p: DVec3) -> Option<Blended> {
         let mut heard = Heard::new(p);
-        self.around(p, |i, t2| heard.add(&self.cells[i], i, t2));
+        self.around(p, |i, t2| heard.add(self, i, t2));
         heard.blended()
     }
 
@@ -123,18 +151,42 @@ impl Blend {
     pub fn at_of(&self, cells: &[u32], p: DVec3) -> Option<Blended> {
         let mut heard = Heard::new(p);
         for &i in cells {
-            let c = &self.cells[i as usize];
-            let t2 = c.center.distance_squared(p) / (c.support * c.support);
+            let t2 = self.reaches[i as usize].share(p);
             if t2 < 1.0 {
-                heard.add(c, i as usize, t2);
+                heard.add(self, i as usize, t2);
             }
         }
         heard.blended()
     }
 
+    /// Unit gradient at `p`, where cells said `here`: that of the sheets on the heaviest side of an edge.
+    /// * `cells` - indices of all that reach `p`, and of others, ascending
+    pub fn normal_of(&self, cells: &[u32], p: DVec3, here: &Blended) -> DVec3 {
+        let lead = self.cells[here.cell].evaluate(p).1;
+        let mut sum = DVec3::ZERO;
+        for &i in cells {
+            let (reach, cell) = (&self.reaches[i as usize], &self.cells[i as usize]);
+            let t2 = reach.share(p);
+            if t2 < 1.0 {
+                let (d, n) = cell.evaluate(p);
+                if d.is_finite() && n.dot(lead) > SAME {
+                    sum += reach.bell(t2) * n;
+                }
+            }
+        }
+        sum.normalize_or(lead)
+    }
+
+    /// As [`Blend::normal_of`] among all cells.
+    pub fn normal(&self, p: DVec3, here: &Blended) -> DVec3 {
+        let mut cells = Vec::new();
+        self.around(p, |i, _| cells.push(i as u32));
+        self.normal_of(&cells, p, here)
+    }
+
     /// The cells whose supports reach into a box, ascending.
     pub fn reaching(&self, aabb: &Aabb) -> Vec<u32> {
-        let mut found = Vec::new();
+        let mut found = Vec::with_capacity(64);
         let mut stack = [0u32; 64];
         let mut top = usize::from(!self.nodes.is_empty());
         while top > 0 {
@@ -159,34 +211,42 @@ impl Blend {
 /// The cells that are heard at a point.
 struct Heard {
     p: DVec3,
-    seen: [Seen; ASKED],
+    values: [f64; ASKED],
+    weights: [f64; ASKED],
+    /// One over the variance of each value, and over the square of [`OFF`].
+    sure: [f64; ASKED],
     count: usize,
     sum: f64,
     weight: f64,
     aside: f64,
-    /// The heaviest: its weight, normal and index.
-    lead: (f64, DVec3, usize),
+    /// The heaviest: its weight and index.
+    lead: (f64, usize),
 }
 
 impl Heard {
+    #[inline]
     fn new(p: DVec3) -> Heard {
-        let nothing = Seen { value: 0.0, normal: DVec3::ZERO, weight: 0.0, variance: 0.0 };
-        Heard { p, seen: [nothing; ASKED], count: 0, sum: 0.0, weight: 0.0, aside: 1.0, lead: (0.0, DVec3::Z, 0) }
+        let none = [0.0; ASKED];
+        let lead = (0.0, 0);
+        Heard { p, values: none, weights: none, sure: none, count: 0, sum: 0.0, weight: 0.0, aside: 1.0, lead }
     }
 
     #[inline]
-    fn add(&mut self, cell: &Cell, i: usize, t2: f64) {
-        let (d, n) = cell.evaluate(self.p);
+    fn add(&mut self, blend: &Blend, i: usize, t2: f64) {
+        let d = blend.cells[i].evaluate(self.p).0;
         if d.is_finite() {
-            let w = cell.weight(t2);
+            let reach = &blend.reaches[i];
+            let w = reach.bell(t2);
             self.sum += w * d;
             self.weight += w;
             self.aside = self.aside.min(t2);
             if w > self.lead.0 {
-                self.lead = (w, n, i);
+                self.lead = (w, i);
             }
             if self.count < ASKED {
-                self.seen[self.count] = Seen { value: d, normal: n, weight: w, variance: cell.variance(t2) };
+                self.values[self.count] = d;
+                self.weights[self.count] = w;
+                self.sure[self.count] = reach.sure(t2) / (OFF * OFF);
                 self.count += 1;
             }
         }
@@ -196,21 +256,20 @@ impl Heard {
         if !(self.weight > 0.0) {
             return None;
         }
-        let seen = &self.seen[..self.count];
+        let n = self.count;
         let mean = self.sum / self.weight;
         let mut value = mean;
         for _ in 0..ROUNDS {
-            let heeded = |s: &Seen| s.weight / (1.0 + (s.value - value).powi(2) / (OFF * OFF * s.variance)).powi(2);
-            let (sum, weight) = seen.iter().fold((0.0, 0.0), |(sum, weight), s| {
-                let w = heeded(s);
-                (sum + w * s.value, weight + w)
-            });
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for ((d, w), sure) in self.values[..n].iter().zip(&self.weights[..n]).zip(&self.sure[..n]) {
+                let off = 1.0 + (d - value) * (d - value) * sure;
+                let heeded = w / (off * off);
+                sum += heeded * d;
+                weight += heeded;
+            }
             value = sum / weight;
         }
-        let along = seen.iter().filter(|s| s.normal.dot(self.lead.1) > SAME);
-        let normal: DVec3 = along.map(|s| s.weight * s.normal).sum();
-        let normal = normal.normalize_or(self.lead.1);
-        Some(Blended { value, normal, aside: self.aside, cell: self.lead.2, mean, weight: self.weight })
+        Some(Blended { value, aside: self.aside, cell: self.lead.1, mean, weight: self.weight })
     }
 }
 

@@ -4,6 +4,7 @@
 //! these functions keeps edges sharp, and where one site errs its neighbours outvote it. A plate ends where its points do
 //! (`rim`), and a cell that faces the wrong way beside cells of several sheets is left hardly a say.
 
+use super::blend::Reach;
 use super::fit::{Ball, sheet};
 use super::front::{PRICE, VARIATION_PRICE};
 use super::nest::{self, Face, LIMIT, Seen, cost, nest};
@@ -79,20 +80,14 @@ impl Cell {
         best
     }
 
+    /// Weight in the blend at `p`.
+    pub(super) fn weight(&self, p: DVec3) -> f64 {
+        Reach::of(self).weight(p)
+    }
+
     /// Does its support reach into a box?
     pub fn reaches(&self, aabb: &Aabb) -> bool {
         self.center.clamp(aabb.min, aabb.max).distance_squared(self.center) < self.support * self.support
-    }
-
-    /// Weight in the blend at a point whose squared distance is this share of the squared support.
-    pub(super) fn weight(&self, t2: f64) -> f64 {
-        // C1 at the rim; a wide bell, since the mean of many cells has less noise than any of them.
-        (1.0 - t2).max(0.0).powi(2) * self.trust
-    }
-
-    /// Squared error that is expected there: it grows with the distance.
-    pub(super) fn variance(&self, t2: f64) -> f64 {
-        self.support * self.support / self.trust * (1.0 + t2) * (1.0 + t2)
     }
 }
 
@@ -185,8 +180,7 @@ fn outvoted(cells: Vec<Cell>, noise: &[f64]) -> Vec<Cell> {
                 let contradicted = [-BESIDE, BESIDE].into_iter().any(|side| {
                     let p = foot + side * noise[i] * n;
                     let own = cell.evaluate(p).0;
-                    let votes = if cell.count > 1 { 1.0 } else { 0.0 };
-                    let weight = votes * now[i].weight(cell.center.distance_squared(p) / cell.support.powi(2));
+                    let weight = if cell.count > 1 { now[i].weight(p) } else { 0.0 };
                     blend.at(p).is_some_and(|all| {
                         let others = (all.mean * all.weight - own * weight) / (all.weight - weight);
                         others * own < 0.0 && others.abs() > SURE * noise[i]

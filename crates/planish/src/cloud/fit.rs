@@ -276,7 +276,7 @@ fn choose(m: &Moments, felt: &Ball, frame: Frame, distances: &mut Vec<f64>) -> O
     let rss = squared(&a);
     let mut best = (a, 6.0, rss);
     let bend = curved.c[0].abs().max(curved.c[2].abs()) * 2.0;
-    let reach = points.iter().map(DVec3::length_squared).fold(0.0, f64::max).sqrt();
+    let reach = points.reach();
     let order_four = bend.powi(3) * reach.powi(4) / 8.0;
     if n > 12.0
         && order_four > ORDER_FOUR_SHARE * (rss.0 / n).sqrt().min(noise)

@@ -148,8 +148,8 @@ fn supported(points: &[DVec3], fits: Vec<Fit>) -> Vec<Fit> {
     let tree = KdTree::new(&centers);
     let best: Vec<u32> = points
         .par_iter()
-        .map_init(Vec::new, |near, &p| {
-            tree.nearest(p, 10, near);
+        .map_init(Default::default, |(near, last), &p| {
+            tree.nearest_after(p, 10, last, near);
             near.iter()
                 .map(|n| {
                     let f = &fits[n.1 as usize];

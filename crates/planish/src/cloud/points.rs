@@ -81,6 +81,11 @@ impl Points {
         Arch::new().dispatch(Heights { at: self.columns(), height, out: rows });
     }
 
+    /// Distance of the farthest point from the origin.
+    pub(super) fn reach(&self) -> f64 {
+        Arch::new().dispatch(Farthest { at: self.columns() }).sqrt()
+    }
+
     /// Adds the points of another.
     pub(super) fn append(&mut self, other: &Points) {
         self.x.extend_from_slice(&other.x);
@@ -353,6 +358,27 @@ impl WithSimd for Localize<'_> {
     }
 }
 
+struct Farthest<'a> {
+    at: [&'a [f64]; 3],
+}
+
+impl WithSimd for Farthest<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let mut most = [0.0; LANES];
+        for first in (0..self.at[0].len()).step_by(LANES) {
+            let [x, y, z] = self.at.map(|row| lanes(row, first));
+            for l in 0..LANES {
+                let d2 = x[l] * x[l] + y[l] * y[l] + z[l] * z[l];
+                most[l] = if d2 > most[l] { d2 } else { most[l] };
+            }
+        }
+        most.into_iter().fold(0.0, f64::max)
+    }
+}
+
 struct Heights<'a> {
     at: [&'a [f64]; 3],
     height: &'a Height,
@@ -496,6 +522,7 @@ mod tests {
             let all = points.moments(&weights);
             assert!(one.0.iter().zip(&all.0).all(|(a, b)| (a - b).abs() < 1e-12), "{count} points");
             let values: Vec<f64> = points.iter().map(|p| p.x).collect();
+            assert_eq!(points.reach(), points.iter().map(DVec3::length).fold(0.0, f64::max));
             assert!((weighted_squares(&weights, &values) - one.0[4]).abs() < 1e-12, "{count} points");
         }
     }

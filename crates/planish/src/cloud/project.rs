@@ -169,17 +169,18 @@ fn place(
     let mut here = None;
     for _ in 0..STEPS {
         let Some(b) = blend.at(at) else { return stray(f64::INFINITY) };
-        at -= b.value * b.normal;
-        here = Some(b);
+        let normal = blend.normal(at, &b);
+        at -= b.value * normal;
+        here = Some((b, normal));
         if b.value.abs() < 1e-9 * samples.diagonal {
             break;
         }
     }
-    let Some(here) = here else { return stray(f64::INFINITY) };
+    let Some((here, normal)) = here else { return stray(f64::INFINITY) };
     // The sample that stands for the point: near, and of its side.
     let sample = near
         .iter()
-        .find(|n| samples.samples[n.1 as usize].normal.dot(here.normal) > SHARP_DEG.to_radians().cos())
+        .find(|n| samples.samples[n.1 as usize].normal.dot(normal) > SHARP_DEG.to_radians().cos())
         .map_or(first, |n| n.1);
     let s = &samples.samples[sample as usize];
     let moved = at.distance(p);
@@ -194,7 +195,7 @@ fn place(
     let own = sheets
         .iter()
         .map(|q| (q.distance(at), q))
-        .filter(|((_, n), _)| n.dot(here.normal) > SHARP_DEG.to_radians().cos())
+        .filter(|((_, n), _)| n.dot(normal) > SHARP_DEG.to_radians().cos())
         .min_by(|a, b| a.0.0.abs().total_cmp(&b.0.0.abs()));
     let (mut edge, mut bend) = (None, (0.0, 0.0));
     if let Some((_, own)) = own {
@@ -203,11 +204,11 @@ fn place(
             .iter()
             .filter(|q| {
                 let (d, n) = q.distance(at);
-                n.dot(here.normal) < SHARP_DEG.to_radians().cos() && d.abs() < BESIDE * noise + samples.spacing
+                n.dot(normal) < SHARP_DEG.to_radians().cos() && d.abs() < BESIDE * noise + samples.spacing
             })
             .find_map(|q| meet(*own, *q, at));
     }
-    Placed { at, normal: here.normal, sample, moved, mean: bend.1, gauss: bend.0, edge, outlier: false }
+    Placed { at, normal, sample, moved, mean: bend.1, gauss: bend.0, edge, outlier: false }
 }
 
 /// Where two sheets meet, near a point: alternating steps onto both.

@@ -30,7 +30,7 @@ impl Quadric {
     #[inline]
     pub fn value(&self, p: DVec3) -> (f64, DVec3) {
         let a = &self.a;
-        let y = (p - self.center) / self.scale;
+        let y = (p - self.center) * (1.0 / self.scale);
         let h = DVec3::new(a[0] * y.x + a[1] * y.y + a[2] * y.z, a[3] * y.y + a[4] * y.z, a[5] * y.z);
         let g = DVec3::new(
             a[0] * y.x + h.x + a[6],

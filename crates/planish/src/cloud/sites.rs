@@ -112,7 +112,11 @@ pub(super) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
     }
     let places: Vec<DVec3> = sites.point.iter().map(|&i| points[i as usize]).collect();
     let site_tree = KdTree::new(&places);
-    sites.owner = points.par_iter().map(|&p| site_tree.closest(p).unwrap_or(u32::MAX)).collect();
+    let closest = |(near, last): &mut (Vec<(f64, u32)>, _), &p: &DVec3| {
+        site_tree.nearest_after(p, 1, last, near);
+        near.first().map_or(u32::MAX, |n| n.1)
+    };
+    sites.owner = points.par_iter().map_init(Default::default, closest).collect();
     sites.even(&places, &site_tree);
     Some(sites)
 }

@@ -57,8 +57,8 @@ pub(super) fn without(points: Vec<DVec3>, ids: Vec<u32>) -> (Vec<DVec3>, Vec<u32
     let tree = KdTree::new(&points);
     let far: Vec<f64> = points
         .par_iter()
-        .map_init(Vec::new, |near, &p| {
-            tree.nearest(p, RANK + 1, near);
+        .map_init(Default::default, |(near, last), &p| {
+            tree.nearest_after(p, RANK + 1, last, near);
             near.last().map_or(0.0, |n| n.0.sqrt())
         })
         .collect();

@@ -44,38 +44,45 @@ impl SampleField {
         SampleField { blend: Blend::new(&samples.cells), bounds, widest, noise_deg: samples.normal_noise_deg, closing }
     }
 
-    /// Value and unit gradient at `p`; NaN where nothing is known.
-    pub fn evaluate(&self, p: DVec3) -> (f64, DVec3) {
-        self.joined(self.blend.at(p), p, true)
+    /// The value at `p` from what the cells say there; NaN where nothing is known.
+    fn value_of(&self, here: Option<Blended>, p: DVec3) -> f64 {
+        match here {
+            None => self.beyond(p, false).0,
+            Some(here) => {
+                self.aside(&here, p).map_or(here.value, |(_, share, beyond)| here.value + share * (beyond - here.value))
+            }
+        }
     }
 
-    /// Value and unit gradient at `p` from what the cells say there; where no cell reaches the gradient only if asked for.
-    fn joined(&self, here: Option<Blended>, p: DVec3, slope: bool) -> (f64, DVec3) {
-        let Some(here) = here else { return self.beyond(p, slope) };
-        // Away from the data the samples together know better than a fit carried on beyond its points: from the cells to
-        // the winding number without a step, so that the surface goes on smoothly over a hole.
-        if !amid(&here)
-            && let Some(dipoles) = &self.closing
-        {
-            let far = ((here.aside.sqrt() - BESIDE) / (BEYOND - BESIDE)).min(1.0);
-            let share = far * far * (3.0 - 2.0 * far);
+    /// The unit gradient at `p` from what the cells say there, and from theirs.
+    fn gradient_of(&self, here: Option<Blended>, p: DVec3, own: impl Fn(&Blended) -> DVec3) -> DVec3 {
+        let Some(here) = here else { return self.beyond(p, true).1 };
+        let normal = own(&here);
+        self.aside(&here, p).map_or(normal, |(winding, share, _)| {
             let size = self.blend.cells()[here.cell].support;
-            // Beside the data the number has no more than its bounds; close to single dipoles it leaves them.
-            let winding = |p: DVec3| (0.5 - dipoles.number(p, 0.0)).clamp(-0.5, 0.5) * size;
-            let beyond = winding(p);
-            // Where both agree on the side the cells know the distance.
-            if beyond * here.value > 0.0 {
-                return (here.value, here.normal);
-            }
-            let share = share * ((beyond.abs() / size - UNSURE) / UNSURE).clamp(0.0, 1.0);
-            let value = here.value + share * (beyond - here.value);
-            if !slope {
-                return (value, here.normal);
-            }
-            let g = gradient(winding, p, STENCIL * size).unwrap_or(here.normal);
-            return (value, here.normal.lerp(g, share).normalize_or(here.normal));
+            let g = gradient(winding, p, STENCIL * size).unwrap_or(normal);
+            normal.lerp(g, share).normalize_or(normal)
+        })
+    }
+
+    /// What the winding number says beside the data, as a value, the share of that, and the value at `p`.
+    ///
+    /// Away from the data the samples together know better than a fit carried on beyond its points: from the cells to the
+    /// winding number without a step, so that the surface goes on smoothly over a hole.
+    fn aside(&self, here: &Blended, p: DVec3) -> Option<(impl Fn(DVec3) -> f64, f64, f64)> {
+        let dipoles = self.closing.as_ref().filter(|_| !amid(here))?;
+        let far = ((here.aside.sqrt() - BESIDE) / (BEYOND - BESIDE)).min(1.0);
+        let share = far * far * (3.0 - 2.0 * far);
+        let size = self.blend.cells()[here.cell].support;
+        // Beside the data the number has no more than its bounds; close to single dipoles it leaves them.
+        let winding = move |p: DVec3| (0.5 - dipoles.number(p, 0.0)).clamp(-0.5, 0.5) * size;
+        let beyond = winding(p);
+        // Where both agree on the side the cells know the distance.
+        if beyond * here.value > 0.0 {
+            return None;
         }
-        (here.value, here.normal)
+        let share = share * ((beyond.abs() / size - UNSURE) / UNSURE).clamp(0.0, 1.0);
+        Some((winding, share, beyond))
     }
 
     /// Where no cell reaches.
@@ -113,11 +120,11 @@ impl Field for SampleField {
     }
 
     fn value(&self, p: DVec3) -> f64 {
-        self.joined(self.blend.at(p), p, false).0
+        self.value_of(self.blend.at(p), p)
     }
 
     fn gradient(&self, p: DVec3) -> DVec3 {
-        self.evaluate(p).1
+        self.gradient_of(self.blend.at(p), p, |here| self.blend.normal(p, here))
     }
 
     fn crosses(&self, aabb: &Aabb) -> bool {
@@ -156,11 +163,11 @@ impl Field for Near<'_> {
     }
 
     fn value(&self, p: DVec3) -> f64 {
-        self.field.joined(self.here(p), p, false).0
+        self.field.value_of(self.here(p), p)
     }
 
     fn gradient(&self, p: DVec3) -> DVec3 {
-        self.field.joined(self.here(p), p, true).1
+        self.field.gradient_of(self.here(p), p, |here| self.field.blend.normal_of(&self.cells, p, here))
     }
 
     fn crosses(&self, aabb: &Aabb) -> bool {

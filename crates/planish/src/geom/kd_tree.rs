@@ -129,6 +129,15 @@ impl KdTree {
         found.sort_unstable_by(compare);
     }
 
+    /// As [`KdTree::nearest`], for places that come one after the other: those of the last one bound where the next ones are.
+    /// * `last` - the last place and the distance of its farthest neighbour; takes those of this one
+    pub fn nearest_after(&self, at: DVec3, k: usize, last: &mut Option<(DVec3, f64)>, found: &mut Vec<(f64, u32)>) {
+        // With room for rounding.
+        let radius = last.map_or(f64::INFINITY, |(p, far)| (p.distance(at) + far) * (1.0 + 1e-9));
+        self.nearest_within(at, k, radius, found);
+        *last = found.last().filter(|_| found.len() == k).map(|f| (at, f.0.sqrt()));
+    }
+
     /// Id of the nearest point, ties by id; `None` for an empty tree.
     pub fn closest(&self, at: DVec3) -> Option<u32> {
         let mut found = Vec::with_capacity(1);
@@ -241,12 +250,14 @@ mod tests {
         let mut cloud = points(2000);
         cloud.extend_from_within(..100); // repeated places
         let tree = KdTree::new(&cloud);
-        let mut found = Vec::new();
+        let (mut found, mut last) = (Vec::new(), None);
         for &p in points(50).iter().chain(&cloud[..20]) {
             let mut all: Vec<(f64, u32)> =
                 cloud.iter().enumerate().map(|(i, q)| (q.distance_squared(p), i as u32)).collect();
             all.sort_unstable_by(compare);
             tree.nearest(p, 17, &mut found);
+            assert_eq!(found, all[..17]);
+            tree.nearest_after(p, 17, &mut last, &mut found);
             assert_eq!(found, all[..17]);
             let mut inside = Vec::new();
             tree.within(p, 0.2, |i, _, d2| inside.push((d2, i)));
