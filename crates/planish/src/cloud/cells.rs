@@ -265,7 +265,7 @@ fn find(
     let count = ball.len().max(1) as f64;
     let residuals = |q: &Quadric| ball.levels(q, noise);
     // Candidates, those of the site first, then by distance.
-    let mut near: Vec<(f64, u32)> = Vec::new();
+    let mut near: Vec<(f64, u32)> = Vec::with_capacity(4 * ASKED);
     around.within(center, ASIDE * support, |i, _, d2| {
         near.push((if candidates[i as usize].owner == site { 0.0 } else { d2 }, i));
     });
@@ -400,7 +400,7 @@ fn around_place(center: DVec3, radius: f64, enough: usize, tree: &KdTree, near: 
     near.clear();
     tree.within(center, radius, |_, q, _| near.push(q));
     let step = near.len().div_ceil(enough).max(1);
-    near.iter().copied().step_by(step).collect()
+    Points::every(near, step)
 }
 
 /// For each point the sheet that decides there, `u8::MAX` if the point does not lie on the nesting.

@@ -147,23 +147,43 @@ fn build(items: &mut [(DVec3, DVec3)], first: usize, nodes: &mut Vec<Node>) {
 mod tests {
     use super::*;
 
-    #[test]
-    fn winding_of_2000_samples_of_a_sphere_is_one_inside_and_zero_outside_within_0_04() {
+    /// Centres and normals times areas of a unit sphere.
+    fn sphere() -> Vec<(DVec3, DVec3)> {
         let n = 2000;
         let golden = PI * (3.0 - 5f64.sqrt());
-        let samples: Vec<(DVec3, DVec3)> = (0..n)
+        (0..n)
             .map(|k| {
                 let z = 1.0 - (2 * k + 1) as f64 / n as f64;
                 let (s, c) = (k as f64 * golden).sin_cos();
                 let p = DVec3::new((1.0 - z * z).sqrt() * c, (1.0 - z * z).sqrt() * s, z);
                 (p, p * (4.0 * PI / n as f64))
             })
-            .collect();
+            .collect()
+    }
+
+    #[test]
+    fn winding_of_2000_samples_of_a_sphere_is_one_inside_and_zero_outside_within_0_04() {
+        let samples = sphere();
         let tree = Dipoles::new(&samples);
         for (p, w) in [(DVec3::ZERO, 1.0), (DVec3::new(0.4, -0.3, 0.5), 1.0), (DVec3::new(1.3, 0.4, 0.0), 0.0)] {
             assert!((tree.number(p, 0.0) - w).abs() < 0.04, "{p} {}", tree.number(p, 0.0));
         }
         // On the surface itself half of the sphere remains.
         assert!((tree.number(samples[700].0, 0.1) - 0.5).abs() < 0.06);
+    }
+
+    #[test]
+    fn balls_beside_a_sphere_have_one_side_and_those_that_meet_it_have_none() {
+        let tree = Dipoles::new(&sphere());
+        for (p, radius, side) in [
+            (DVec3::ZERO, 0.1, Some(-1.0)),
+            (DVec3::new(0.0, 0.6, 0.0), 0.1, Some(-1.0)),
+            (DVec3::new(1.4, 0.0, 0.4), 0.1, Some(1.0)),
+            (DVec3::new(9.0, 0.0, 0.0), 4.0, Some(1.0)),
+            (DVec3::new(0.9, 0.0, 0.0), 0.2, None),
+            (DVec3::ZERO, 1.5, None),
+        ] {
+            assert_eq!(tree.side(p, radius), side, "{p} {radius}");
+        }
     }
 }

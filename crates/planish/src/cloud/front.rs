@@ -286,7 +286,7 @@ fn choose(
     if own_cost < PLAIN * count {
         return alone;
     }
-    let mut near = Vec::new();
+    let mut near = Vec::with_capacity(4 * ASKED);
     closed.tree.within(p, FARTHEST * wide, |i, _, d2| near.push((d2, i)));
     near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut asked: Vec<(Quadric, f64)> = Vec::new();

@@ -8,7 +8,7 @@
 //! would not do: it lets every point choose its sheet, and noise alone then pays for a second one. For the same reason a
 //! point above which the surface lies m-fold pays 2 ln m: twice the area has half the density of points.
 
-use super::points::{Join, capped, joined_cost, nearest_cost};
+use super::points::{Join, capped, folded, joined_cost, nearest_cost};
 use glam::DVec3;
 
 /// Most sheets that are nested: a corner of four faces.
@@ -218,7 +218,8 @@ pub(super) fn folds(sheets: &[Face], concave: u8) -> f64 {
     let m = sheets.len();
     if let [a, b] = sheets {
         let turn = (a.sign * a.normal).dot(b.sign * b.normal);
-        return folded([a, b], turn, concave >> 1 & 1 == 1) as f64 * 2.0 * f64::ln_1p(turn.abs());
+        let above = folded([(a.residuals, a.sign), (b.residuals, b.sign)], turn, concave >> 1 & 1 == 1, ON);
+        return above as f64 * 2.0 * turn.abs().ln_1p();
     }
     let mut turn = [[0.0; MOST]; MOST];
     for j in 0..m {
@@ -256,17 +257,6 @@ pub(super) fn folds(sheets: &[Face], concave: u8) -> f64 {
         }
     }
     price
-}
-
-/// How many points lie above both of two sheets.
-fn folded([a, b]: [&Face; 2], turn: f64, least: bool) -> usize {
-    let above = |(&x, &y): (&f64, &f64)| {
-        let (x, y) = (a.sign * x, b.sign * y);
-        // The foot on the farther sheet, as the nearer one sees it.
-        let foot = if y.abs() < x.abs() { y - x * turn } else { x - y * turn };
-        if least { foot > -ON } else { foot < ON }
-    };
-    a.residuals.iter().zip(b.residuals).filter(|&p| above(p)).count()
 }
 
 /// All orders of a few sheets; the first two stand as they come, since joining two is the same both ways.

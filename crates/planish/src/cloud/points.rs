@@ -129,6 +129,14 @@ impl Points {
     }
 }
 
+impl Points {
+    /// Every so many of these points.
+    pub(super) fn every(points: &[DVec3], step: usize) -> Points {
+        let axis = |of: fn(&DVec3) -> f64| points.iter().step_by(step).map(of).collect();
+        Points { x: axis(|p| p.x), y: axis(|p| p.y), z: axis(|p| p.z) }
+    }
+}
+
 impl FromIterator<DVec3> for Points {
     fn from_iter<T: IntoIterator<Item = DVec3>>(points: T) -> Points {
         let points = points.into_iter();
@@ -185,11 +193,13 @@ pub(super) fn decided_cost(rows: &[(&[f64], f64)], concave: u8) -> (f64, f64) {
 /// The lanes of a row from `first` on; places past the end are zero.
 #[inline(always)]
 fn lanes(row: &[f64], first: usize) -> [f64; LANES] {
+    let mut all = [0.0; LANES];
     if let Some(whole) = row.get(first..first + LANES) {
-        std::array::from_fn(|l| whole[l])
+        all.copy_from_slice(whole);
     } else {
-        std::array::from_fn(|l| row.get(first + l).copied().unwrap_or(0.0))
+        all.iter_mut().zip(&row[first..]).for_each(|(to, from)| *to = *from);
     }
+    all
 }
 
 struct Nearest<'a> {
@@ -204,8 +214,8 @@ impl WithSimd for Nearest<'_> {
     fn with_simd<S: Simd>(self, _: S) -> f64 {
         let mut sums = [0.0; LANES];
         let n = self.rows[0].len();
-        for block in (0..n).step_by(BLOCK) {
-            for first in (block..n.min(block + BLOCK)).step_by(LANES) {
+        for block in (0..n).step_by(2 * BLOCK) {
+            for first in (block..n.min(block + 2 * BLOCK)).step_by(LANES) {
                 let mut v = lanes(self.rows[0], first);
                 for row in &self.rows[1..] {
                     let r = lanes(row, first);
@@ -234,8 +244,8 @@ impl WithSimd for Joined<'_> {
     fn with_simd<S: Simd>(self, _: S) -> f64 {
         let mut sums = [0.0; LANES];
         let n = self.rows[0].0.len();
-        for block in (0..n).step_by(BLOCK / 2) {
-            for first in (block..n.min(block + BLOCK / 2)).step_by(LANES) {
+        for block in (0..n).step_by(BLOCK) {
+            for first in (block..n.min(block + BLOCK)).step_by(LANES) {
                 // Places past the end count nothing.
                 let mut v = lanes(self.rows[0].0, first);
                 for (row, join) in &self.rows[1..] {
@@ -291,6 +301,38 @@ impl WithSimd for Decided<'_> {
             }
         }
         (costs.iter().sum(), shares.iter().sum())
+    }
+}
+
+/// How many points lie above both of two sheets: their feet on the farther one are part of the surface, or no more than `on`
+/// off it.
+/// * `rows` - distances to each sheet in noise levels, and its sign
+/// * `turn` - cosine between the normals
+/// * `least` - the sheets are joined by the minimum, else by the maximum
+pub(super) fn folded(rows: [(&[f64], f64); 2], turn: f64, least: bool, on: f64) -> usize {
+    Arch::new().dispatch(Folded { rows, turn, side: if least { -1.0 } else { 1.0 }, on })
+}
+
+struct Folded<'a> {
+    rows: [(&'a [f64], f64); 2],
+    turn: f64,
+    side: f64,
+    on: f64,
+}
+
+impl WithSimd for Folded<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> usize {
+        let [(a, s), (b, t)] = self.rows;
+        let mut count = 0u64;
+        for (x, y) in a.iter().zip(b) {
+            let (x, y) = (s * x, t * y);
+            let foot = if y.abs() < x.abs() { y - x * self.turn } else { x - y * self.turn };
+            count += u64::from(self.side * foot < self.on);
+        }
+        count as usize
     }
 }
 
@@ -447,20 +489,22 @@ impl WithSimd for Sums<'_> {
             for (at, of) in at.iter_mut().zip(self.at) {
                 at[..count].copy_from_slice(&of[first..first + count]);
             }
-            for k in 0..COUNT {
-                if k > 0 {
-                    let (before, after) = column.split_at_mut(k);
-                    let (parent, axis) = PARENTS[k];
-                    let (own, parent, axis) = (&mut after[0], &before[parent], &at[axis]);
-                    for i in 0..BLOCK {
-                        own[i] = parent[i] * axis[i];
-                    }
-                }
-                for chunk in column[k].chunks_exact(LANES) {
+            for chunk in column[0].chunks_exact(LANES) {
+                (0..LANES).for_each(|l| lanes[0][l] += chunk[l]);
+            }
+            for k in 1..COUNT {
+                let (before, after) = column.split_at_mut(k);
+                let (parent, axis) = PARENTS[k];
+                let (own, parent, axis) = (&mut after[0], &before[parent], &at[axis]);
+                let mut sums = lanes[k];
+                for first in (0..BLOCK).step_by(LANES) {
                     for l in 0..LANES {
-                        lanes[k][l] += chunk[l];
+                        let product = parent[first + l] * axis[first + l];
+                        own[first + l] = product;
+                        sums[l] += product;
                     }
                 }
+                lanes[k] = sums;
             }
         }
         Moments(lanes.map(|l| l.iter().sum()))

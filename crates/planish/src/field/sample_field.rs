@@ -199,3 +199,56 @@ impl Field for Near<'_> {
         PRECISION
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::{CleanParams, Cloud, clean};
+    use crate::geom::random;
+    use crate::observe::Silent;
+
+    /// A scan of half a sphere, with noise of a hundredth of its radius.
+    fn bowl() -> Samples {
+        let point = |i: u64| {
+            let r = |k: u64| random::unit(8, 8 * i + k);
+            let (z, a) = (r(0), std::f64::consts::TAU * r(1));
+            let s = (1.0 - z * z).sqrt();
+            let noise = [0, 1, 2].map(|k| random::normal(r(2 + 2 * k), r(3 + 2 * k)));
+            DVec3::new(s * a.cos(), s * a.sin(), z) + 0.01 * DVec3::from_array(noise)
+        };
+        clean(&Cloud::new((0..4000).map(point).collect()), &CleanParams::default(), &Silent).unwrap()
+    }
+
+    #[test]
+    fn boxes_answer_the_same_bits_and_what_they_rule_out_is_on_one_side() {
+        let samples = bowl();
+        for close in [false, true] {
+            let field = SampleField::new(&samples, close);
+            let (mut ruled, mut left) = (0, 0);
+            for i in 0..300 {
+                let r = |k: u64| random::unit(9, 100 * i + k);
+                let low = DVec3::new(3.0 * r(0) - 1.5, 3.0 * r(1) - 1.5, 2.0 * r(2) - 0.5);
+                let aabb = Aabb { min: low, max: low + 0.3 * r(3) };
+                let half = Aabb { min: low, max: aabb.center() };
+                let near = field.within(&aabb).unwrap();
+                let nearer = near.within(&half).unwrap();
+                let place = |k: u64| low + half.size() * DVec3::new(r(4 + 3 * k), r(5 + 3 * k), r(6 + 3 * k));
+                let inside: Vec<DVec3> = (0..20).map(place).collect();
+                for &p in &inside {
+                    let bits = |f: &dyn Field| (f.value(p).to_bits(), f.gradient(p).to_array().map(f64::to_bits));
+                    assert_eq!(bits(&field), bits(&*near));
+                    assert_eq!(bits(&field), bits(&*nearer));
+                }
+                assert_eq!(field.crosses(&half), nearer.crosses(&half));
+                if field.crosses(&half) {
+                    left += 1;
+                } else {
+                    ruled += 1;
+                    let side = field.side(half.center());
+                    assert!(inside.iter().all(|&p| field.side(p) == side), "{half:?}");
+                }
+            }
+            assert!(ruled > 30 && left > 30, "{ruled} {left}");
+        }
+    }
+}
