@@ -177,7 +177,7 @@ mod tests {
         let tree = Dipoles::new(&sphere());
         for (p, radius, side) in [
             (DVec3::ZERO, 0.1, Some(-1.0)),
-            (DVec3::new(0.0, 0.6, 0.0), 0.1, Some(-1.0)),
+            (DVec3::new(0.0, 0.6, 0.0), 0.05, Some(-1.0)),
             (DVec3::new(1.4, 0.0, 0.4), 0.1, Some(1.0)),
             (DVec3::new(9.0, 0.0, 0.0), 4.0, Some(1.0)),
             (DVec3::new(0.9, 0.0, 0.0), 0.2, None),

@@ -113,10 +113,10 @@ fn wishes(lines: &Lines, scale: &ScanScale) -> Wishes {
                     continue;
                 }
                 let w = (1.0 - far * far).powi(2) / (flank.variance + SURE);
-                let off = flank.distance(p);
+                let (off, normal) = flank.beside(p);
                 if lines.on_line[v] {
                     if let Some(shared) = shared.get_mut(own[3 * t as usize + k]) {
-                        shared.add(n, w, flank.normal(p), off);
+                        shared.add(n, w, normal, off);
                     }
                     continue;
                 }
@@ -127,7 +127,7 @@ fn wishes(lines: &Lines, scale: &ScanScale) -> Wishes {
                 let t = off / (STRUCTURE * scale.noise);
                 // Tukey's weight.
                 let keep = (1.0 - t * t).max(0.0).powi(2);
-                sum[v] -= flank.normal(p) * (off * w * keep);
+                sum[v] -= normal * (off * w * keep);
                 weight[v] += w;
                 least[v] = least[v].min(far);
             }

@@ -76,16 +76,16 @@ impl Flank {
 
     /// Unit normal beside `p`.
     pub fn normal(&self, p: DVec3) -> DVec3 {
-        let ((x, y, _), c) = (self.place(p), &self.terms);
-        let (across, along) = (c[1] + 2.0 * c[4] * x + c[5] * y, c[2] + 2.0 * c[3] * y + c[5] * x);
-        (self.axes[2] - self.axes[0] * across - self.axes[1] * along).normalize()
+        self.beside(p).1
     }
 
-    /// Distance of `p`, to first order, positive outside.
-    pub fn distance(&self, p: DVec3) -> f64 {
+    /// Distance of `p`, to first order, positive outside, and the unit normal beside it.
+    pub fn beside(&self, p: DVec3) -> (f64, DVec3) {
         let ((x, y, z), c) = (self.place(p), &self.terms);
+        let (across, along) = (c[1] + 2.0 * c[4] * x + c[5] * y, c[2] + 2.0 * c[3] * y + c[5] * x);
+        let normal = (self.axes[2] - self.axes[0] * across - self.axes[1] * along).normalize();
         let height = z - (c[0] + c[1] * x + c[2] * y + c[3] * y * y + c[4] * x * x + c[5] * x * y);
-        height * self.normal(p).dot(self.axes[2])
+        (height * normal.dot(self.axes[2]), normal)
     }
 }
 
@@ -154,7 +154,7 @@ impl Lines<'_> {
         while at < faces.len() {
             for h in 3 * faces[at]..3 * faces[at] + 3 {
                 let o = self.adjacency.opposite[h as usize];
-                if o != NONE && !self.tagged[h as usize] && welcome(o / 3) && seen.insert(o / 3) {
+                if o != NONE && !self.tagged[h as usize] && seen.insert(o / 3) && welcome(o / 3) {
                     faces.push(o / 3);
                 }
             }
@@ -231,22 +231,20 @@ impl Lines<'_> {
         let y = (along - outwards * outwards.dot(along)).try_normalize()?;
         let axes = [outwards.cross(y), y, outwards];
         let widest = RADII[RADII.len() - 1] * scale.cell;
-        let mut faces: Vec<(f64, u32)> = self
-            .grow(&sector, seen, |f| off(f) < widest && self.faces(f, outwards))
-            .into_iter()
-            .map(|f| (off(f), f))
-            .collect();
-        faces.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        // What each window has beyond the one before.
+        let mut rings: [Moments; RADII.len()] = Default::default();
+        for f in self.grow(&sector, seen, |f| off(f) < widest && self.faces(f, outwards)) {
+            let p = (self.centers[f as usize] - at) / scale.cell;
+            let away = p.length();
+            let Some(ring) = RADII.iter().position(|radius| away <= *radius) else { continue };
+            // How many points of the scan a face stands for.
+            let weight = self.areas[f as usize].length() / (scale.spacing * scale.spacing);
+            rings[ring].add(p.dot(axes[0]), p.dot(axes[1]), p.dot(axes[2]), weight);
+        }
         let mut sums = Moments::default();
         let mut found: Vec<Estimate> = Vec::new();
-        let mut rest = faces.iter().peekable();
-        for radius in RADII {
-            while let Some((_, f)) = rest.next_if(|(d, _)| *d <= radius * scale.cell) {
-                let p = (self.centers[*f as usize] - at) / scale.cell;
-                // How many points of the scan a face stands for.
-                let weight = self.areas[*f as usize].length() / (scale.spacing * scale.spacing);
-                sums.add(p.dot(axes[0]), p.dot(axes[1]), p.dot(axes[2]), weight);
-            }
+        for ring in &rings {
+            sums.join(ring);
             if sums.matrix[0][0] >= FEWEST {
                 found.extend(MODELS.iter().filter_map(|&terms| sums.fit(terms, scale.noise / scale.cell)));
             }
@@ -275,6 +273,15 @@ impl Moments {
                 self.matrix[i][j] += weight * row[i] * row[j];
             }
             self.rhs[i] += weight * row[i] * z;
+        }
+    }
+
+    fn join(&mut self, other: &Moments) {
+        for i in 0..6 {
+            for j in 0..=i {
+                self.matrix[i][j] += other.matrix[i][j];
+            }
+            self.rhs[i] += other.rhs[i];
         }
     }
 
