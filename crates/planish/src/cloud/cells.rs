@@ -7,8 +7,9 @@
 use super::blend::Reach;
 use super::fit::{Ball, sheet};
 use super::front::{PRICE, VARIATION_PRICE};
+use super::joints::decided_cost;
 use super::nest::{self, Face, LIMIT, Seen, cost, nest};
-use super::points::{Points, decided_cost};
+use super::points::Points;
 use super::rim::rim;
 use super::sites::{Sites, in_pieces};
 use super::{Blend, Quadric, Sample};

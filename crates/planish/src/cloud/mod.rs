@@ -17,6 +17,7 @@ mod dipoles;
 mod fit;
 mod front;
 mod guides;
+mod joints;
 mod layers;
 mod link;
 mod moments;

@@ -8,7 +8,7 @@
 //! would not do: it lets every point choose its sheet, and noise alone then pays for a second one. For the same reason a
 //! point above which the surface lies m-fold pays 2 ln m: twice the area has half the density of points.
 
-use super::points::{Join, capped, folded, joined_cost, nearest_cost};
+use super::joints::{Join, capped, folded, joined_cost, nearest_cost};
 use glam::DVec3;
 
 /// Most sheets that are nested: a corner of four faces.
