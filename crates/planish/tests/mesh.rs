@@ -688,9 +688,9 @@ fn line_errors(mesh: &TriMesh, tags: &FeatureTags) -> (f64, f64) {
 
 #[test]
 fn lines_of_a_scanned_cube_come_three_times_as_near_and_their_angles_within_a_third() {
-    let (mut mesh, tags, scale) = scanned_cube();
+    let (mut mesh, mut tags, scale) = scanned_cube();
     let before = line_errors(&mesh, &tags);
-    let moved = fair_lines(&mut mesh, &tags, &scale);
+    let moved = fair_lines(&mut mesh, &mut tags, &scale);
     let after = line_errors(&mesh, &tags);
     assert!(moved > 1000, "{moved} moved");
     assert!(after.0 < before.0 / 3.0, "lines off by {before:?} before, {after:?} after");
@@ -701,22 +701,22 @@ fn lines_of_a_scanned_cube_come_three_times_as_near_and_their_angles_within_a_th
 
 #[test]
 fn lines_of_an_exact_cube_stay_where_they_are_within_1e_9() {
-    let (_, tags, scale) = scanned_cube();
+    let (_, mut tags, scale) = scanned_cube();
     let exact = shapes::cuboid(DVec3::ONE, 32);
     let mut mesh = exact.clone();
-    fair_lines(&mut mesh, &tags, &scale);
+    fair_lines(&mut mesh, &mut tags, &scale);
     let most = exact.points.iter().zip(&mesh.points).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
     assert!(most < 1e-9, "{most:e}");
     // Nothing is known of a mesh that was not scanned.
-    assert_eq!(fair_lines(&mut mesh, &tags, &ScanScale { noise: 0.0, ..scale }), 0);
+    assert_eq!(fair_lines(&mut mesh, &mut tags, &ScanScale { noise: 0.0, ..scale }), 0);
 }
 
 #[test]
 fn lines_are_faired_to_the_bit_on_1_and_4_threads() {
     let run = |threads| {
-        let (mut mesh, tags, scale) = scanned_cube();
+        let (mut mesh, mut tags, scale) = scanned_cube();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| fair_lines(&mut mesh, &tags, &scale));
+        pool.install(|| fair_lines(&mut mesh, &mut tags, &scale));
         mesh
     };
     assert_eq!(run(1), run(4));

@@ -14,11 +14,13 @@ use std::collections::BTreeMap;
 /// Least number of samples of a patch that is asked, and how many of them at most.
 const FEWEST: usize = 30;
 const ASKED: usize = 1000;
-/// Samples within this many radii of the place say nothing of its winding number: their planes go through it.
-const SKIP: f64 = 0.25;
+/// Samples within this share of the width that a sample stands for say nothing of its winding number: that is itself. Others
+/// count, though their planes may go through it: the rims of a short bore are not much farther away.
+const SKIP: f64 = 0.5;
 /// Product of a patch's own winding number and of what the rest has above one half, from which it turns: where it looks the
-/// right way both have opposite signs, and at the faces of a body about zero.
-const GAIN: f64 = 0.008;
+/// right way both have opposite signs, and at the faces of a body about zero. At a bore as short as samples are apart the number
+/// of the rest is too low by a tenth to a fifth: .009 was measured at those that look the right way, .017 at parts that do not.
+const GAIN: f64 = 0.012;
 
 /// Turns patches over, one after the other, the most certain first.
 ///
@@ -54,7 +56,7 @@ pub(super) fn wind(
                 if fits[i].gap.is_finite() {
                     continue;
                 }
-                let [all, own] = [&all, &alone].map(|d| d.number(fits[i].center, SKIP * fits[i].radius));
+                let [all, own] = [&all, &alone].map(|d| d.number(fits[i].center, SKIP * hints.areas[i].sqrt()));
                 gain += hints.areas[i] * own * (all - own - 0.5);
             }
             gain / f64::max(asked, 1e-300)
@@ -73,6 +75,24 @@ mod tests {
     use crate::cloud::Quadric;
     use glam::DVec3;
 
+    fn fit(center: DVec3, normal: DVec3, site: u32) -> Fit {
+        Fit {
+            quadric: Quadric::plane(center, 1.0, normal),
+            center,
+            normal,
+            radius: 0.1,
+            noise: 0.01,
+            thickness: 1.0,
+            error: 1e-3,
+            irregularity: 0.0,
+            class: 0,
+            site,
+            sheets: 1,
+            gap: f64::INFINITY,
+            owned: 10,
+        }
+    }
+
     /// A ball of samples that look outwards, those above `z` joined among themselves, the others, too, and both not.
     fn ball(z: f64) -> (Vec<Fit>, Vec<Vote>) {
         let fits: Vec<Fit> = (0..2000)
@@ -80,21 +100,7 @@ mod tests {
                 let h = 1.0 - (2 * k + 1) as f64 / 2000.0;
                 let (s, c) = (2.399963 * k as f64).sin_cos();
                 let normal = DVec3::new((1.0 - h * h).sqrt() * c, (1.0 - h * h).sqrt() * s, h);
-                Fit {
-                    quadric: Quadric::plane(normal, 1.0, normal),
-                    center: normal,
-                    normal,
-                    radius: 0.1,
-                    noise: 0.01,
-                    thickness: 1.0,
-                    error: 1e-3,
-                    irregularity: 0.0,
-                    class: 0,
-                    site: k,
-                    sheets: 1,
-                    gap: f64::INFINITY,
-                    owned: 10,
-                }
+                fit(normal, normal, k)
             })
             .collect();
         let votes = (1..2000u32)
@@ -117,6 +123,49 @@ mod tests {
         for z in [0.8, 0.0, -0.5] {
             assert!(turned(z, None, true).iter().all(|s| *s == 1.0), "{z}");
         }
+    }
+
+    /// Signs of a plate of 14 x 14 x 1.3 with a bore of radius 2.15, whose wall begins with sign `wall`; samples .65 apart,
+    /// those of the faces .18 off its rims.
+    fn bored(wall: f64) -> Vec<f64> {
+        let (half, high, bore, step, aside, keep_off) = (7.15, 0.65, 2.15, 0.65, 0.15, 0.18);
+        let grid = |half: f64| {
+            let n = (2.0 * half / step).round();
+            (0..n as usize).map(move |k| half * ((2 * k + 1) as f64 / n - 1.0))
+        };
+        let mut at: Vec<(DVec3, DVec3)> = Vec::new();
+        for (x, y) in grid(half)
+            .flat_map(|x| grid(half).map(move |y| (x, y)))
+            .filter(|(x, y)| (x - aside).hypot(*y) > bore + keep_off)
+        {
+            at.extend([1.0, -1.0].map(|s| (DVec3::new(x, y, s * high), DVec3::Z * s)));
+        }
+        for (x, z) in grid(half).flat_map(|x| grid(high).map(move |z| (x, z))) {
+            for s in [1.0, -1.0] {
+                at.push((DVec3::new(s * half, x, z), DVec3::X * s));
+                at.push((DVec3::new(x, s * half, z), DVec3::Y * s));
+            }
+        }
+        let outside = at.len();
+        for (k, z) in (0..21).flat_map(|k| grid(high).map(move |z| (k, z))) {
+            let (sin, cos) = (k as f64 * std::f64::consts::TAU / 21.0).sin_cos();
+            let out = DVec3::new(cos, sin, 0.0);
+            at.push((DVec3::new(aside, 0.0, z) + bore * out, -out));
+        }
+        let fits: Vec<Fit> = at.iter().enumerate().map(|(k, x)| fit(x.0, x.1, k as u32)).collect();
+        let votes: Vec<Vote> = (1..fits.len())
+            .filter(|&b| b != outside)
+            .map(|b| Vote { a: b as u32 - 1, b: b as u32, sign: 1.0, weight: 1.0, smooth: true })
+            .collect();
+        let mut sign: Vec<f64> = (0..fits.len()).map(|k| if k < outside { 1.0 } else { wall }).collect();
+        let areas = vec![step * step; fits.len()];
+        wind(&mut sign, &fits, &votes, &Hints { toward: None, normals: None, areas: &areas }, |_| true);
+        sign
+    }
+
+    #[test]
+    fn a_bore_as_short_as_samples_are_apart_looks_inwards_and_stays_so() {
+        assert!(bored(1.0).iter().all(|s| *s == 1.0));
     }
 
     #[test]

@@ -4,10 +4,13 @@
 //! and the line itself is where two unsure sheets meet. But most flanks go on smoothly for many cells. So
 //! 1. each side of each vertex of a line gets an estimate from far around ([`flanks`](super::flanks));
 //! 2. the vertex goes to where its flanks meet, those within some cells of the line towards the flanks beside them;
-//! 3. who turns a triangle over, or makes two meet, goes back half of the way, or all of it.
+//! 3. who turns a triangle over, or makes two meet, goes back half of the way, or all of it;
+//! 4. vertices in the way are merged into their neighbours ([`merging`](super::merging)), and who went back tries again.
 
 use super::flanks::{Lines, ScanScale, Seen};
-use super::{FeatureTags, TriMesh, self_intersections};
+use super::intersect::intersections_of;
+use super::merging::{Fault, Merging};
+use super::{FeatureTags, TriMesh};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -28,18 +31,32 @@ const AREA: f64 = 0.1;
 /// Rounds in which vertices go back half of the way, and rounds in all.
 const HALVES: usize = 6;
 const ROUNDS: usize = 24;
+/// A vertex this near to where it should be is there, in cells.
+const THERE: f64 = 1e-3;
+/// Vertices are merged over edges of so many cells at most, and triangles with an edge shorter than so many cells are too small.
+const MERGED: f64 = 1.0;
+const CRAMPED: f64 = 0.2;
+/// Rounds of that.
+const MERGES: usize = 24;
 
-/// Moves the lines of `tags` to where the surfaces beside them meet, and what is within four cells of them onto these surfaces.
-/// Returns the number of vertices that moved.
+/// Moves the lines of `tags` to where the surfaces beside them meet, and what is within four cells of them onto these surfaces;
+/// vertices that are in the way are merged into others. Returns the number of vertices that moved.
 ///
 /// No triangle turns over, and none comes to meet another. A mesh without noise stays as it is.
-pub fn fair_lines(mesh: &mut TriMesh, tags: &FeatureTags, scale: &ScanScale) -> usize {
+pub fn fair_lines(mesh: &mut TriMesh, tags: &mut FeatureTags, scale: &ScanScale) -> usize {
     let usable = [scale.noise, scale.spacing, scale.cell].iter().all(|x| *x > 0.0 && x.is_finite());
     if tags.edges.is_empty() || !usable {
         return 0;
     }
-    let Wishes { moves, expected } = wishes(&Lines::new(mesh, &tags.edges), scale);
-    settle(mesh, &moves, &expected)
+    let mut wishes = wishes(&Lines::new(mesh, &tags.edges), scale);
+    let mut moved = vec![false; mesh.points.len()];
+    settle(mesh, &wishes, &mut moved);
+    tidy(mesh, tags, &mut wishes);
+    settle(mesh, &wishes, &mut moved);
+    let mut stays = vec![false; mesh.points.len()];
+    mesh.triangles.iter().flatten().for_each(|&v| stays[v as usize] = true);
+    tags.keep(mesh, &stays);
+    moved.into_iter().zip(stays).filter(|x| x.0 && x.1).count()
 }
 
 struct Wishes {
@@ -47,6 +64,19 @@ struct Wishes {
     moves: Vec<(u32, DVec3)>,
     /// For each triangle its normal by the flanks; zero away from them.
     expected: Vec<DVec3>,
+    /// Edge of a cell.
+    cell: f64,
+}
+
+impl Wishes {
+    /// True if a triangle that had this normal looks the wrong way with these corners.
+    fn is_turned(&self, t: u32, normal: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
+        // What is expected leaves room; where nothing is, the triangle itself is.
+        let expected = self.expected[t as usize];
+        let wanted = if expected == DVec3::ZERO { normal } else { expected };
+        let now = (b - a).cross(c - a).normalize_or_zero();
+        now.dot(wanted) <= TURNED.min(normal.dot(wanted) - 1e-9)
+    }
 }
 
 /// What all flanks around say of one side of a vertex on a line.
@@ -157,38 +187,36 @@ fn wishes(lines: &Lines, scale: &ScanScale) -> Wishes {
     }
     moves.sort_unstable_by_key(|m| m.0);
     expected.iter_mut().for_each(|n| *n = n.normalize_or_zero());
-    Wishes { moves, expected }
+    Wishes { moves, expected, cell: scale.cell }
 }
 
-/// Moves vertices as far as the triangles allow; returns how many moved.
-fn settle(mesh: &mut TriMesh, moves: &[(u32, DVec3)], expected: &[DVec3]) -> usize {
+/// Moves vertices as far as the triangles allow, and marks them.
+fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool]) {
     let before = mesh.points.clone();
     let mut share = vec![0.0; mesh.points.len()];
-    moves.iter().for_each(|m| share[m.0 as usize] = 1.0);
-    let touched: Vec<u32> = (0..mesh.triangles.len() as u32)
-        .filter(|&t| mesh.triangles[t as usize].iter().any(|&v| share[v as usize] > 0.0))
-        .collect();
+    let is_there = |v: u32, p: DVec3| before[v as usize].distance(p) <= THERE * wishes.cell;
+    wishes.moves.iter().filter(|m| !is_there(m.0, m.1)).for_each(|m| share[m.0 as usize] = 1.0);
+    let moves =
+        |t: u32, share: &[f64], mesh: &TriMesh| mesh.triangles[t as usize].iter().any(|&v| share[v as usize] > 0.0);
+    let touched: Vec<u32> = (0..mesh.triangles.len() as u32).filter(|&t| moves(t, &share, mesh)).collect();
     let was: Vec<(DVec3, f64)> = touched.iter().map(|&t| (mesh.normal(t as usize), mesh.area(t as usize))).collect();
     for round in 0..ROUNDS {
-        for &(v, p) in moves {
+        for &(v, p) in &wishes.moves {
             mesh.points[v as usize] = before[v as usize].lerp(p, share[v as usize]);
         }
-        let moved = |t: u32, share: &[f64]| mesh.triangles[t as usize].iter().any(|&v| share[v as usize] > 0.0);
         let is_bad = |(&t, (normal, area)): (&u32, &(DVec3, f64))| {
-            let (now, wanted) = (mesh.normal(t as usize), expected[t as usize]);
-            // What is expected leaves room; where nothing is, the triangle itself is.
-            let wanted = if wanted == DVec3::ZERO { *normal } else { wanted };
-            let upright = now.dot(wanted) > TURNED.min(normal.dot(wanted) - 1e-9);
-            moved(t, &share) && !(upright && mesh.area(t as usize) >= AREA * area)
+            let fits = !wishes.is_turned(t, *normal, mesh.corners(t as usize)) && mesh.area(t as usize) >= AREA * area;
+            moves(t, &share, mesh) && !fits
         };
         let mut bad: Vec<u32> = touched.par_iter().zip(&was).filter(|x| is_bad(*x)).map(|(&t, _)| t).collect();
         let mut left = if round < HALVES { 0.5 } else { 0.0 };
         if bad.is_empty() {
-            bad = self_intersections(mesh).into_iter().flatten().filter(|&t| moved(t, &share)).collect();
+            bad = intersections_of(mesh, |t| moves(t, &share, mesh)).into_iter().flatten().collect();
             left = 0.0;
         }
         if bad.is_empty() {
-            return share.iter().filter(|&&s| s > 0.0).count();
+            (0..share.len()).filter(|&v| share[v] > 0.0).for_each(|v| moved[v] = true);
+            return;
         }
         let mut back: Vec<u32> = bad.iter().flat_map(|&t| mesh.triangles[t as usize]).collect();
         back.sort_unstable();
@@ -196,5 +224,29 @@ fn settle(mesh: &mut TriMesh, moves: &[(u32, DVec3)], expected: &[DVec3]) -> usi
         back.iter().for_each(|&v| share[v as usize] *= left);
     }
     mesh.points = before;
-    0
+}
+
+/// Merges vertices and flips edges where triangles look the wrong way or are too small.
+fn tidy(mesh: &mut TriMesh, tags: &mut FeatureTags, wishes: &mut Wishes) {
+    let mut merging = Merging::new(mesh, &tags.vertices, &tags.edges);
+    let fault = |t: u32, corners: [DVec3; 3]| {
+        let [a, b, c] = corners;
+        let least = a.distance(b).min(b.distance(c)).min(c.distance(a));
+        match wishes.expected[t as usize] {
+            DVec3::ZERO => Fault::None,
+            normal if wishes.is_turned(t, normal, corners) => Fault::Turned,
+            _ if least < CRAMPED * wishes.cell => Fault::Cramped,
+            _ => Fault::None,
+        }
+    };
+    let all = 0..mesh.triangles.len() as u32;
+    let mut faulty: Vec<u32> = all.filter(|&t| fault(t, mesh.corners(t as usize)) != Fault::None).collect();
+    for _ in 0..MERGES {
+        faulty = merging.round(&faulty, fault, MERGED * wishes.cell);
+    }
+    let Merging { triangles, lines, .. } = merging;
+    let expected = triangles.iter().zip(&wishes.expected).filter(|x| x.0.is_some());
+    wishes.expected = expected.map(|x| *x.1).collect();
+    mesh.triangles = triangles.into_iter().flatten().collect();
+    tags.edges = lines.into_iter().collect();
 }

@@ -13,6 +13,12 @@ use rayon::prelude::*;
 /// A triangle without area is a segment or a point, and counts as such. Vertices are told apart by their index: weld
 /// first where cracks shall not count.
 pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
+    intersections_of(mesh, |_| true)
+}
+
+/// As [`self_intersections`], of pairs of which one is `active`.
+pub(super) fn intersections_of(mesh: &TriMesh, active: impl Fn(u32) -> bool + Sync) -> Vec<[u32; 2]> {
+    let active: Vec<bool> = (0..mesh.triangles.len() as u32).into_par_iter().map(&active).collect();
     let boxes: Vec<[DVec3; 2]> = (0..mesh.triangles.len())
         .into_par_iter()
         .map(|t| {
@@ -23,28 +29,33 @@ pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
     let Some(size) = cell_size(&boxes) else { return Vec::new() };
     let origin = boxes.iter().fold(DVec3::INFINITY, |m, b| m.min(b[0]));
     let cell = |p: DVec3| ((p - origin) / size).floor().to_array().map(|x| x as i64);
+    let cells = |b: &[DVec3; 2]| {
+        let (low, high) = (cell(b[0]), cell(b[1]));
+        let rows = (low[2]..=high[2]).flat_map(move |z| (low[1]..=high[1]).map(move |y| (y, z)));
+        rows.flat_map(move |(y, z)| (low[0]..=high[0]).map(move |x| [x, y, z]))
+    };
+    let actives: Vec<usize> = (0..boxes.len()).filter(|&t| active[t]).collect();
+    let mut wanted: Vec<[i64; 3]> = actives.par_iter().flat_map_iter(|&t| cells(&boxes[t])).collect();
+    wanted.par_sort_unstable();
+    wanted.dedup();
+    let is_wanted = |c: &[i64; 3]| wanted.binary_search(c).is_ok();
     let mut entries: Vec<([i64; 3], u32)> = boxes
         .par_iter()
         .enumerate()
-        .flat_map_iter(|(t, b)| {
-            let (low, high) = (cell(b[0]), cell(b[1]));
-            (low[2]..=high[2]).flat_map(move |z| {
-                (low[1]..=high[1]).flat_map(move |y| (low[0]..=high[0]).map(move |x| ([x, y, z], t as u32)))
-            })
-        })
+        .flat_map_iter(|(t, b)| cells(b).filter(is_wanted).map(move |c| (c, t as u32)))
         .collect();
     entries.par_sort_unstable();
     let runs: Vec<&[([i64; 3], u32)]> = entries.chunk_by(|a, b| a.0 == b.0).filter(|r| r.len() > 1).collect();
     let mut found: Vec<[u32; 2]> = runs
         .par_iter()
         .flat_map_iter(|run| {
-            let boxes = &boxes;
+            let (boxes, active) = (&boxes, &active);
             run.iter().enumerate().flat_map(move |(n, &(at, s))| {
                 run[..n].iter().filter_map(move |&(_, t)| {
                     let (a, b) = (&boxes[s as usize], &boxes[t as usize]);
                     let (low, high) = (a[0].max(b[0]), a[1].min(b[1]));
                     // Each pair once: in the cell that holds the least corner of what the boxes share.
-                    if low.cmpgt(high).any() || cell(low) != at {
+                    if !(active[s as usize] || active[t as usize]) || low.cmpgt(high).any() || cell(low) != at {
                         return None;
                     }
                     let corners = |t: u32| mesh.corners(t as usize);

@@ -1,6 +1,7 @@
 //! Triangle meshes: flat arrays, adjacency, places on the surface.
 
 mod adjacency;
+mod broken_lines;
 pub mod compare;
 pub mod decimate;
 mod demo;
@@ -13,6 +14,7 @@ mod handles;
 mod holes;
 mod intersect;
 mod lids;
+mod merging;
 pub mod path;
 mod repair;
 mod rings;
@@ -26,6 +28,7 @@ mod trim;
 mod walk;
 
 pub use adjacency::{Adjacency, Fan, NONE, next, previous};
+pub use broken_lines::{bridge_gaps, cut_spikes, mend_lines};
 pub use compare::{CompareError, CompareParams, Comparison, compare};
 pub use decimate::{DecimateError, DecimateParams, DecimateTarget, Decimated, decimate};
 pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};

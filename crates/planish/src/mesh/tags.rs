@@ -69,6 +69,26 @@ impl FeatureTags {
             .collect()
     }
 
+    /// Leaves out the vertices of `mesh` that do not stay, with their triangles and tags.
+    pub fn keep(&mut self, mesh: &mut TriMesh, stays: &[bool]) {
+        let mut kept = Vec::new();
+        let mut fresh = vec![u32::MAX; mesh.points.len()];
+        for v in (0..mesh.points.len()).filter(|&v| stays[v]) {
+            fresh[v] = kept.len() as u32;
+            kept.push(v);
+        }
+        for a in &mut mesh.attributes {
+            let width = a.width;
+            a.values = kept.iter().flat_map(|&v| a.values[v * width..(v + 1) * width].to_vec()).collect();
+        }
+        mesh.points = kept.iter().map(|&v| mesh.points[v]).collect();
+        mesh.triangles.retain(|t| t.iter().all(|&v| stays[v as usize]));
+        mesh.triangles.iter_mut().for_each(|t| *t = t.map(|v| fresh[v as usize]));
+        self.edges.retain(|e| e.iter().all(|&v| stays[v as usize]));
+        self.edges.iter_mut().for_each(|e| *e = e.map(|v| fresh[v as usize]));
+        self.vertices = kept.iter().map(|&v| self.vertices[v]).collect();
+    }
+
     /// The kinds as an attribute of the mesh.
     pub fn attribute(&self) -> Attribute {
         let value = |k: &FeatureKind| match k {

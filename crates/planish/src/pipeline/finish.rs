@@ -8,7 +8,7 @@
 //! 2. small holes are closed before, so that they do not grow, and after ([`mesh::close_holes`])
 
 use crate::geom::KdTree;
-use crate::mesh::{self, FEATURE, FeatureTags, TriMesh, part_fans};
+use crate::mesh::{self, FeatureTags, TriMesh, part_fans};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -38,9 +38,6 @@ pub(super) fn finish(mesh: &mut TriMesh, tags: &mut FeatureTags, points: &[DVec3
     part(mesh, tags);
     if lids {
         closed += mesh::close_holes(mesh, tags, longest);
-    }
-    if let Some(a) = mesh.attributes.iter_mut().find(|a| a.name == FEATURE) {
-        *a = tags.attribute();
     }
     closed
 }

@@ -106,7 +106,9 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
     }
     let contour::Extracted { mesh, tags, .. } = &mut meshed.extracted;
     let cell = meshed.lattice.step.x;
+    mesh::mend_lines(mesh, tags);
     mesh::fair_lines(mesh, tags, &ScanScale { noise: samples.noise, spacing: samples.spacing, cell });
+    tags.mark(mesh);
     let mut reached = reach(scan, &meshed.extracted.mesh);
     let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags, &reached);
     if specks > 0 {
@@ -176,24 +178,8 @@ fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags, reached: &[(f64, u32)
     if specks == 0 {
         return 0;
     }
-    let mut fresh = vec![u32::MAX; mesh.points.len()];
-    let mut kept = Vec::new();
-    for v in 0..mesh.points.len() as u32 {
-        if stays(v) {
-            fresh[v as usize] = kept.len() as u32;
-            kept.push(v);
-        }
-    }
-    for a in &mut mesh.attributes {
-        let width = a.width;
-        a.values = kept.iter().flat_map(|&v| a.values[v as usize * width..(v as usize + 1) * width].to_vec()).collect();
-    }
-    mesh.points = kept.iter().map(|&v| mesh.points[v as usize]).collect();
-    mesh.triangles.retain(|t| fresh[t[0] as usize] != u32::MAX);
-    mesh.triangles.iter_mut().for_each(|t| *t = t.map(|v| fresh[v as usize]));
-    tags.edges.retain(|e| fresh[e[0] as usize] != u32::MAX);
-    tags.edges.iter_mut().for_each(|e| *e = e.map(|v| fresh[v as usize]));
-    tags.vertices = kept.iter().map(|&v| tags.vertices[v as usize]).collect();
+    let stays: Vec<bool> = (0..mesh.points.len() as u32).map(stays).collect();
+    tags.keep(mesh, &stays);
     specks
 }
 

@@ -6,7 +6,7 @@
 
 use super::LayoutParams;
 use crate::mesh::sets::Sets;
-use crate::mesh::{Adjacency, NONE, TriMesh, next, previous, sharp_edges};
+use crate::mesh::{Adjacency, NONE, TriMesh, bridge_gaps, cut_spikes, next, sharp_edges};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,12 +21,10 @@ const WIDE_ANGLE: f64 = 0.75;
 /// A line without loose ends is kept from this part of the length asked for: a closed line is rarely an accident.
 const CLOSED_SHARE: f64 = 0.5;
 
-/// A line that comes back within this angle around a single face, shorter around than this part of the length asked
-/// for, is a spike.
-const SPIKE_ANGLE: f64 = 80.0 / 180.0 * std::f64::consts::PI;
+/// A spike of a line ([`cut_spikes`]) is shorter around than this part of the length asked for.
 const SPIKE_SHARE: f64 = 0.25;
 
-/// Marks the half-edges on sharp edges that belong to a line worth keeping, and counts the sharp edges left out.
+/// Marks the half-edges on sharp edges that belong to a line worth keeping; gaps of lines are bridged.
 /// Noise makes short lines with loose ends and small meshes of lines; a part's edges close or meet others.
 /// * `tagged` - the half-edges that are sharp, where somebody knows; else the angles tell
 pub(super) fn feature_lines(
@@ -34,17 +32,14 @@ pub(super) fn feature_lines(
     adjacency: &Adjacency,
     tagged: &[bool],
     params: &LayoutParams,
-) -> (Vec<bool>, usize) {
+) -> Vec<bool> {
     if tagged.contains(&true) {
         let inner = |h: usize| adjacency.opposite[h] != NONE;
         let mut kept: Vec<bool> = tagged.iter().enumerate().map(|(h, &t)| t && inner(h)).collect();
-        let found = kept.iter().filter(|&&s| s).count();
         drop_detail(mesh, adjacency, params.feature_length * mesh.bounds().diagonal(), &mut kept);
-        let left = kept.iter().filter(|&&s| s).count();
-        return (kept, (found - left) / 2);
+        return kept;
     }
     let sharp = sharp_edges(mesh, adjacency, params.sharp_angle_deg);
-    let found = sharp.iter().filter(|&&s| s).count();
     let edges: f64 = (0..sharp.len() as u32).map(|h| length(mesh, h)).sum();
     let reach = REACH * edges / sharp.len().max(1) as f64;
     let least = (WIDE_ANGLE * params.sharp_angle_deg).to_radians().cos();
@@ -66,8 +61,7 @@ pub(super) fn feature_lines(
         }
     }
     drop_detail(mesh, adjacency, params.feature_length * mesh.bounds().diagonal(), &mut kept);
-    let left = kept.iter().filter(|&&s| s).count();
-    (kept, (found - left) / 2)
+    kept
 }
 
 fn length(mesh: &TriMesh, h: u32) -> f64 {
@@ -102,12 +96,13 @@ fn mean_normal(mesh: &TriMesh, adjacency: &Adjacency, sharp: &[bool], h: u32, re
     sum.normalize_or_zero()
 }
 
-/// Clears what is surface detail: lines with a loose end that are shorter than `shortest`, the lines around regions
+/// Bridges gaps of lines, and clears what is surface detail: lines with a loose end that are shorter than `shortest`, the lines around regions
 /// smaller than a circle of half that length around, spikes a quarter of it around, and connected lines shorter than
 /// half of it together.
 fn drop_detail(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut [bool]) {
     let around = CLOSED_SHARE * shortest;
     let smallest = around * around / (4.0 * std::f64::consts::PI);
+    bridge_gaps(mesh, adjacency, sharp);
     cut_spikes(mesh, adjacency, SPIKE_SHARE * shortest, sharp);
     while drop_loose(mesh, adjacency, shortest, sharp) | drop_regions(mesh, adjacency, smallest, sharp) {}
     drop_short(mesh, adjacency, around, sharp);
@@ -190,44 +185,6 @@ fn drop_regions(mesh: &TriMesh, adjacency: &Adjacency, smallest: f64, sharp: &mu
         rim.iter().for_each(|&h| clear(adjacency, sharp, h));
     }
     !rims.is_empty()
-}
-
-/// Leads lines that turn back on themselves around a single face along its third edge instead, if the face is less
-/// than `longest` around: edges of noise zigzag.
-fn cut_spikes(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bool]) {
-    let mut degree = vec![0u32; mesh.points.len()];
-    (0..sharp.len() as u32).filter(|&h| sharp[h as usize]).for_each(|h| degree[mesh.origin(h) as usize] += 1);
-    let mut faces: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
-    while !faces.is_empty() {
-        let mut changed = Vec::new();
-        for f in faces {
-            for h in 3 * f..3 * f + 3 {
-                let (g, third) = (previous(h), next(h));
-                let across = adjacency.opposite[third as usize];
-                let [tip, a, b] = [h, third, g].map(|h| mesh.origin(h));
-                if !sharp[h as usize]
-                    || !sharp[g as usize]
-                    || sharp[third as usize]
-                    || across == NONE
-                    || degree[tip as usize] != 2
-                    || adjacency.is_boundary_vertex(tip)
-                {
-                    continue;
-                }
-                let [p, q, r] = [tip, a, b].map(|v| mesh.points[v as usize]);
-                if (q - p).angle_between(r - p) < SPIKE_ANGLE && p.distance(q) + q.distance(r) + r.distance(p) < longest
-                {
-                    clear(adjacency, sharp, h);
-                    clear(adjacency, sharp, g);
-                    sharp[third as usize] = true;
-                    sharp[across as usize] = true;
-                    degree[tip as usize] = 0;
-                    changed.push(across / 3);
-                }
-            }
-        }
-        faces = changed;
-    }
 }
 
 /// Clears connected lines shorter together than `shortest`.

@@ -1,0 +1,319 @@
+//! Sharp lines that noise broke: gaps are bridged, spikes are cut.
+//!
+//! Noise hides a few edges of a line, or shifts it by an edge. A gap costs more than its length: a line with a loose end is
+//! taken for surface detail, or two patches run into one another there.
+
+use super::{Adjacency, FeatureKind, FeatureTags, NONE, TriMesh, next, path, previous};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+
+/// A gap costs at most so many mean edges of the mesh; an edge costs its length, a flat one twice that.
+const WIDEST: f64 = 8.0;
+/// An end that leads to the middle of a line, or to the boundary, counts so many times: it may as well end there.
+const BESIDE: f64 = 2.0;
+/// A line is at least so many gaps long; and what lies within so many gaps along its own line is no target of an end.
+const LONG: f64 = 3.0;
+/// The direction of a line at its end is that of so many mean edges.
+const LAST: f64 = 4.0;
+/// A bridge lies within this angle of the direction in which a line ends (cosine of 50 degrees), but for the shortest ones, of
+/// so many mean edges.
+const AHEAD: f64 = 0.64;
+const SHORTEST: f64 = 1.5;
+/// A line that comes back within this angle around a single face is a spike.
+const SPIKE_ANGLE: f64 = 80.0 / 180.0 * std::f64::consts::PI;
+
+/// A spike of a tagged line is shorter around than so many mean edges.
+const SPIKE: f64 = 6.0;
+
+/// Bridges the gaps of the tagged lines of a mesh, and cuts their spikes. Returns how many gaps were bridged.
+pub fn mend_lines(mesh: &TriMesh, tags: &mut FeatureTags) -> usize {
+    let adjacency = Adjacency::new(mesh);
+    let mut sharp: Vec<bool> = (0..3 * mesh.triangles.len() as u32)
+        .into_par_iter()
+        .map(|h| adjacency.opposite[h as usize] != NONE && tags.edges.binary_search(&ends(mesh, h)).is_ok())
+        .collect();
+    let bridged = bridge_gaps(mesh, &adjacency, &mut sharp);
+    cut_spikes(mesh, &adjacency, SPIKE * mean_edge(mesh), &mut sharp);
+    let edges = (0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| ends(mesh, h));
+    let was = std::mem::replace(tags, FeatureTags::from_edges(mesh.points.len(), edges));
+    // A corner of two edges stays one.
+    let plain = FeatureTags::from_edges(mesh.points.len(), was.edges);
+    for (v, kind) in tags.vertices.iter_mut().enumerate() {
+        let was_corner = was.vertices.get(v) == Some(&FeatureKind::Corner) && plain.vertices[v] == FeatureKind::Edge;
+        if *kind == FeatureKind::Edge && was_corner {
+            *kind = FeatureKind::Corner;
+        }
+    }
+    bridged
+}
+
+/// The last part of a line with a loose end.
+struct End {
+    /// Its vertices from the end on, with their distances along the line.
+    tail: Vec<(u32, f64)>,
+    /// Where the line would go on; a unit vector.
+    direction: DVec3,
+}
+
+struct Bridge {
+    cost: f64,
+    vertices: Vec<u32>,
+}
+
+/// Leads loose ends of sharp lines on to the loose ends that face them, to a line ahead, or to the boundary, where these are
+/// a few edges away. Returns how many gaps were bridged.
+/// * `sharp` - for each half-edge whether it is on a sharp line; both halves of an edge alike
+pub fn bridge_gaps(mesh: &TriMesh, adjacency: &Adjacency, sharp: &mut [bool]) -> usize {
+    let edge = mean_edge(mesh);
+    let mut bridged = 0;
+    loop {
+        let mut lines: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
+            lines.entry(mesh.origin(h)).or_default().push(h);
+        }
+        let loose = |v: &u32| lines[v].len() == 1 && !adjacency.is_boundary_vertex(*v);
+        let ends: BTreeMap<u32, End> =
+            lines.keys().copied().filter(loose).map(|v| (v, End::new(mesh, &lines, v, edge))).collect();
+        let search = |v: &u32| bridge(mesh, adjacency, &lines, &ends, *v, edge);
+        let mut bridges: Vec<Bridge> = ends.keys().filter_map(search).collect();
+        bridges.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.vertices.cmp(&b.vertices)));
+        // One at each place and time: others may lead elsewhere after it.
+        let mut taken: Vec<u32> = Vec::new();
+        for bridge in &bridges {
+            if bridge.vertices.iter().any(|v| taken.contains(v)) {
+                continue;
+            }
+            taken.extend(&bridge.vertices);
+            for pair in bridge.vertices.windows(2) {
+                let between = path::neighbours(mesh, adjacency, pair[0]).find(|n| n.0 == pair[1]);
+                let (_, h) = between.expect("a bridge runs along edges");
+                sharp[h as usize] = true;
+                sharp[adjacency.opposite[h as usize] as usize] = true;
+            }
+            bridged += 1;
+        }
+        if taken.is_empty() {
+            return bridged;
+        }
+    }
+}
+
+impl End {
+    fn new(mesh: &TriMesh, lines: &BTreeMap<u32, Vec<u32>>, v: u32, edge: f64) -> End {
+        let mut tail = vec![(v, 0.0)];
+        let (mut h, mut along) = (lines[&v][0], 0.0);
+        let mut from = None;
+        loop {
+            along += length(mesh, h);
+            let to = mesh.origin(next(h));
+            tail.push((to, along));
+            if from.is_none() && along >= LAST * edge {
+                from = Some(to);
+            }
+            let on = lines[&to].iter().find(|&&g| mesh.origin(next(g)) != mesh.origin(h));
+            match on {
+                Some(&g) if lines[&to].len() == 2 && along < LONG * WIDEST * edge && to != v => h = g,
+                _ => {
+                    let at = |v: u32| mesh.points[v as usize];
+                    return End { direction: (at(v) - at(from.unwrap_or(to))).normalize_or_zero(), tail };
+                }
+            }
+        }
+    }
+
+    /// Length of the line, as far as it matters.
+    fn length(&self) -> f64 {
+        self.tail.last().map_or(0.0, |t| t.1)
+    }
+
+    fn leads_to(&self, way: DVec3, edge: f64) -> bool {
+        way.length() <= SHORTEST * edge || way.dot(self.direction) > AHEAD * way.length()
+    }
+}
+
+/// The cheapest bridge from the loose end `v`; `None` if nothing is in reach.
+fn bridge(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    lines: &BTreeMap<u32, Vec<u32>>,
+    ends: &BTreeMap<u32, End>,
+    v: u32,
+    edge: f64,
+) -> Option<Bridge> {
+    let end = &ends[&v];
+    let at = |v: u32| mesh.points[v as usize];
+    let reach = (WIDEST * edge).min(end.length() / LONG);
+    let mut found: BTreeMap<u32, (f64, u32)> = BTreeMap::from([(v, (0.0, v))]);
+    let mut heap = BinaryHeap::from([Reverse((0, v))]);
+    let mut best: Option<(f64, u32)> = None;
+    while let Some(Reverse((bits, w))) = heap.pop() {
+        let cost = f64::from_bits(bits);
+        if best.is_some_and(|b| b.0 <= cost) {
+            break;
+        }
+        if cost > found[&w].0 {
+            continue;
+        }
+        if w != v && (lines.contains_key(&w) || adjacency.is_boundary_vertex(w)) {
+            let near = end.tail.iter().any(|t| t.0 == w && t.1 < LONG * cost);
+            let price = match ends.get(&w) {
+                Some(other) if other.leads_to(at(v) - at(w), edge) && LONG * cost <= other.length() => cost,
+                _ => BESIDE * cost,
+            };
+            if !near && price <= reach && end.leads_to(at(w) - at(v), edge) && best.is_none_or(|b| price < b.0) {
+                best = Some((price, w));
+            }
+            continue;
+        }
+        for (x, h) in path::neighbours(mesh, adjacency, w) {
+            let cost = cost + length(mesh, h) * (2.0 - bend(mesh, adjacency, h));
+            if cost <= reach && found.get(&x).is_none_or(|known| cost < known.0) {
+                found.insert(x, (cost, w));
+                heap.push(Reverse((cost.to_bits(), x)));
+            }
+        }
+    }
+    let (cost, target) = best?;
+    let mut vertices = vec![target];
+    while let Some(&w) = vertices.last()
+        && w != v
+    {
+        vertices.push(found[&w].1);
+    }
+    Some(Bridge { cost, vertices })
+}
+
+/// The vertices of a half-edge, the lesser first.
+fn ends(mesh: &TriMesh, h: u32) -> [u32; 2] {
+    let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
+    [a.min(b), a.max(b)]
+}
+
+fn mean_edge(mesh: &TriMesh) -> f64 {
+    let count = 3 * mesh.triangles.len();
+    (0..count as u32).map(|h| length(mesh, h)).sum::<f64>() / count.max(1) as f64
+}
+
+fn length(mesh: &TriMesh, h: u32) -> f64 {
+    mesh.points[mesh.origin(h) as usize].distance(mesh.points[mesh.origin(next(h)) as usize])
+}
+
+/// How much the surface bends at an edge: the sine of the angle there, 1 beyond a right angle.
+fn bend(mesh: &TriMesh, adjacency: &Adjacency, h: u32) -> f64 {
+    let o = adjacency.opposite[h as usize];
+    if o == NONE {
+        return 0.0;
+    }
+    let (m, n) = (mesh.normal(h as usize / 3), mesh.normal(o as usize / 3));
+    if m.dot(n) < 0.0 { 1.0 } else { m.cross(n).length() }
+}
+
+/// Leads lines that turn back on themselves around a single face along its third edge instead, if the face is less
+/// than `longest` around: edges of noise zigzag.
+pub fn cut_spikes(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bool]) {
+    let mut degree = vec![0u32; mesh.points.len()];
+    (0..sharp.len() as u32).filter(|&h| sharp[h as usize]).for_each(|h| degree[mesh.origin(h) as usize] += 1);
+    let mut faces: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
+    while !faces.is_empty() {
+        let mut changed = Vec::new();
+        for f in faces {
+            for h in 3 * f..3 * f + 3 {
+                let (g, third) = (previous(h), next(h));
+                let across = adjacency.opposite[third as usize];
+                let [tip, a, b] = [h, third, g].map(|h| mesh.origin(h));
+                if !sharp[h as usize]
+                    || !sharp[g as usize]
+                    || sharp[third as usize]
+                    || across == NONE
+                    || degree[tip as usize] != 2
+                    || adjacency.is_boundary_vertex(tip)
+                {
+                    continue;
+                }
+                let [p, q, r] = [tip, a, b].map(|v| mesh.points[v as usize]);
+                if (q - p).angle_between(r - p) < SPIKE_ANGLE && p.distance(q) + q.distance(r) + r.distance(p) < longest
+                {
+                    sharp[h as usize] = false;
+                    sharp[adjacency.opposite[h as usize] as usize] = false;
+                    sharp[g as usize] = false;
+                    sharp[adjacency.opposite[g as usize] as usize] = false;
+                    sharp[third as usize] = true;
+                    sharp[across as usize] = true;
+                    degree[tip as usize] = 0;
+                    changed.push(across / 3);
+                }
+            }
+        }
+        faces = changed;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    const CELLS: usize = 60;
+
+    /// Half-edges of a sheet of 60 x 60 cells along chains of its vertices.
+    fn lines(chains: &[&[(usize, usize)]]) -> (TriMesh, Adjacency, Vec<bool>) {
+        let mesh = shapes::rectangle(1.0, 1.0, CELLS, CELLS);
+        let adjacency = Adjacency::new(&mesh);
+        let low = mesh.bounds().min;
+        let vertex = |(i, j): (usize, usize)| {
+            let p = low + DVec3::new(i as f64, j as f64, 0.0) / CELLS as f64;
+            mesh.points.iter().position(|q| q.distance(p) < 1e-9).expect("a vertex there") as u32
+        };
+        let mut sharp = vec![false; adjacency.opposite.len()];
+        for pair in chains.iter().flat_map(|c| c.windows(2)) {
+            let (a, b) = (vertex(pair[0]), vertex(pair[1]));
+            for h in 0..sharp.len() as u32 {
+                let ends = (mesh.origin(h), mesh.origin(next(h)));
+                sharp[h as usize] |= ends == (a, b) || ends == (b, a);
+            }
+        }
+        (mesh, adjacency, sharp)
+    }
+
+    fn row(j: usize, from: usize, to: usize) -> Vec<(usize, usize)> {
+        (from..=to).map(|i| (i, j)).collect()
+    }
+
+    fn bridged(chains: &[&[(usize, usize)]]) -> (usize, usize) {
+        let (mesh, adjacency, mut sharp) = lines(chains);
+        let before = sharp.iter().filter(|&&s| s).count() / 2;
+        let count = bridge_gaps(&mesh, &adjacency, &mut sharp);
+        (count, sharp.iter().filter(|&&s| s).count() / 2 - before)
+    }
+
+    #[test]
+    fn a_gap_of_three_edges_is_bridged_by_them_and_one_of_six_is_none() {
+        assert_eq!(bridged(&[&row(30, 5, 25), &row(30, 28, 55)]), (1, 3));
+        assert_eq!(bridged(&[&row(30, 5, 25), &row(30, 31, 55)]), (0, 0));
+    }
+
+    #[test]
+    fn ends_that_face_elsewhere_and_lines_no_longer_than_the_gap_stay_apart() {
+        // Both end at the same column, three edges apart, and go left.
+        assert_eq!(bridged(&[&row(28, 5, 30), &row(31, 5, 30)]), (0, 0));
+        assert_eq!(bridged(&[&row(30, 20, 25), &row(30, 28, 33)]), (0, 0));
+    }
+
+    #[test]
+    fn an_end_right_before_a_line_leads_to_it() {
+        let column: Vec<(usize, usize)> = (5..=55).map(|j| (31, j)).collect();
+        assert_eq!(bridged(&[&row(30, 5, 30), &column]), (1, 1));
+        assert_eq!(bridged(&[&row(30, 5, 27), &column]), (0, 0));
+    }
+
+    #[test]
+    fn tags_with_a_step_of_one_edge_come_out_as_one_line() {
+        let (mesh, _, sharp) = lines(&[&row(30, 5, 30), &row(31, 30, 55)]);
+        let edges = (0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| ends(&mesh, h));
+        let mut tags = FeatureTags::from_edges(mesh.points.len(), edges);
+        assert_eq!(mend_lines(&mesh, &mut tags), 1);
+        assert_eq!(tags.vertices.iter().filter(|&&k| k == FeatureKind::Corner).count(), 2);
+    }
+}

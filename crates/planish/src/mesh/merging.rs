@@ -1,0 +1,363 @@
+//! Triangles that are not as they should be: vertices merged into neighbours and edges flipped, one disk at a time.
+
+use super::intersect::intersections_of;
+use super::{FeatureKind, TriMesh};
+use glam::DVec3;
+use std::collections::BTreeSet;
+
+/// Height of a triangle over its longest edge that is enough.
+const SHAPE: f64 = 0.1;
+
+/// How bad a triangle is.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Fault {
+    /// It may stay.
+    None,
+    /// It is too small.
+    Cramped,
+    /// It looks the wrong way.
+    Turned,
+}
+
+/// A mesh whose vertices are merged and whose edges are flipped. No vertex moves.
+pub(super) struct Merging<'a> {
+    points: &'a [DVec3],
+    kinds: &'a [FeatureKind],
+    /// The triangles; `None` where one is gone.
+    pub triangles: Vec<Option<[u32; 3]>>,
+    /// Edges of lines, the lesser vertex first.
+    pub lines: BTreeSet<[u32; 2]>,
+    stars: Vec<Vec<u32>>,
+}
+
+/// What was before a change.
+struct Change {
+    triangles: Vec<(u32, Option<[u32; 3]>)>,
+    stars: Vec<(u32, Vec<u32>)>,
+    removed: Vec<[u32; 2]>,
+    added: Option<[u32; 2]>,
+}
+
+impl<'a> Merging<'a> {
+    /// * `kinds` - of the vertices; corners stay
+    /// * `lines` - edges of sharp lines: a vertex on one is merged along it only, and they are not flipped
+    pub fn new(mesh: &'a TriMesh, kinds: &'a [FeatureKind], lines: &[[u32; 2]]) -> Merging<'a> {
+        let mut stars = vec![Vec::new(); mesh.points.len()];
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            triangle.iter().for_each(|&v| stars[v as usize].push(t as u32));
+        }
+        Merging {
+            points: &mesh.points,
+            kinds,
+            triangles: mesh.triangles.iter().copied().map(Some).collect(),
+            lines: lines.iter().copied().collect(),
+            stars,
+        }
+    }
+
+    /// Changes what is around faulty triangles where that leaves fewer faults; no triangle comes to meet another. Returns
+    /// triangles that may be faulty still; empty if nothing changed.
+    /// * `fault` - of a triangle with these corners
+    /// * `longest` - vertices are merged over edges that are at most so long
+    pub fn round(&mut self, faulty: &[u32], fault: impl Fn(u32, [DVec3; 3]) -> Fault, longest: f64) -> Vec<u32> {
+        let mut taken = BTreeSet::new();
+        let mut changes: Vec<Change> = Vec::new();
+        for &t in faulty {
+            let Some(corners) = self.triangles[t as usize] else { continue };
+            if fault(t, corners.map(|v| self.points[v as usize])) == Fault::None {
+                continue;
+            }
+            let around: BTreeSet<u32> = corners.iter().flat_map(|&v| self.around(v)).chain(corners).collect();
+            if around.iter().any(|v| taken.contains(v)) {
+                continue;
+            }
+            let change = self.merge_any(corners, &fault, longest).or_else(|| self.flip_any(t, corners, &fault));
+            if let Some(change) = change {
+                taken.extend(around);
+                changes.push(change);
+            }
+        }
+        let back = self.undo_meeting(&mut changes);
+        if changes.is_empty() {
+            return Vec::new();
+        }
+        let changed = changes.iter().flat_map(|c| c.triangles.iter().map(|t| t.0));
+        let next: BTreeSet<u32> = faulty.iter().copied().chain(changed).collect();
+        next.difference(&back).copied().collect()
+    }
+
+    /// Takes back changes whose triangles meet others; returns the triangles of these.
+    fn undo_meeting(&mut self, changes: &mut Vec<Change>) -> BTreeSet<u32> {
+        let mut undone = BTreeSet::new();
+        while !changes.is_empty() {
+            let left: Vec<u32> =
+                (0..self.triangles.len() as u32).filter(|&t| self.triangles[t as usize].is_some()).collect();
+            let triangles = self.triangles.iter().flatten().copied().collect();
+            let mesh = TriMesh { points: self.points.to_vec(), triangles, attributes: Vec::new() };
+            let mut changed = vec![false; self.triangles.len()];
+            changes.iter().flat_map(|c| &c.triangles).for_each(|t| changed[t.0 as usize] = true);
+            let meeting = intersections_of(&mesh, |t| changed[left[t as usize] as usize]);
+            let meeting: BTreeSet<u32> = meeting.into_iter().flatten().map(|t| left[t as usize]).collect();
+            let meets = |c: &Change| c.triangles.iter().any(|t| meeting.contains(&t.0));
+            let (back, stay): (Vec<Change>, Vec<Change>) = std::mem::take(changes).into_iter().partition(meets);
+            *changes = stay;
+            if back.is_empty() {
+                break;
+            }
+            for change in back {
+                undone.extend(change.triangles.iter().map(|t| t.0));
+                self.undo(change);
+            }
+        }
+        undone
+    }
+
+    fn undo(&mut self, change: Change) {
+        change.triangles.into_iter().for_each(|(t, was)| self.triangles[t as usize] = was);
+        change.stars.into_iter().for_each(|(v, was)| self.stars[v as usize] = was);
+        if let Some(edge) = change.added {
+            self.lines.remove(&edge);
+        }
+        self.lines.extend(change.removed);
+    }
+
+    /// What is there before these triangles change.
+    fn before(&self, triangles: &[u32]) -> Change {
+        let vertices: BTreeSet<u32> = triangles.iter().flat_map(|&t| self.corners(t)).collect();
+        Change {
+            triangles: triangles.iter().map(|&t| (t, self.triangles[t as usize])).collect(),
+            stars: vertices.into_iter().map(|v| (v, self.stars[v as usize].clone())).collect(),
+            removed: Vec::new(),
+            added: None,
+        }
+    }
+
+    fn corners(&self, t: u32) -> [u32; 3] {
+        self.triangles[t as usize].unwrap_or_default()
+    }
+
+    fn places(&self, corners: [u32; 3]) -> [DVec3; 3] {
+        corners.map(|v| self.points[v as usize])
+    }
+
+    fn is_line(&self, v: u32, w: u32) -> bool {
+        self.lines.contains(&[v.min(w), v.max(w)])
+    }
+
+    /// Neighbours of `v`, ascending.
+    fn around(&self, v: u32) -> Vec<u32> {
+        let star = self.stars[v as usize].iter();
+        let mut around: Vec<u32> = star.flat_map(|&t| self.corners(t)).filter(|&x| x != v).collect();
+        around.sort_unstable();
+        around.dedup();
+        around
+    }
+
+    /// Merges a vertex of a triangle into another where that helps, over the shortest edge.
+    fn merge_any(
+        &mut self,
+        [a, b, c]: [u32; 3],
+        fault: &impl Fn(u32, [DVec3; 3]) -> Fault,
+        longest: f64,
+    ) -> Option<Change> {
+        let mut ways: Vec<(f64, u32, u32)> = [(a, b), (b, a), (b, c), (c, b), (c, a), (a, c)]
+            .into_iter()
+            .map(|(v, w)| (self.points[v as usize].distance(self.points[w as usize]), v, w))
+            .filter(|way| way.0 <= longest)
+            .collect();
+        ways.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
+        let (_, v, w) = ways.into_iter().find(|&(_, v, w)| self.is_mergeable(v, w) && self.helps(v, w, fault))?;
+        Some(self.merge(v, w))
+    }
+
+    /// True if the mesh stays a manifold with its lines when `v` becomes `w`.
+    fn is_mergeable(&self, v: u32, w: u32) -> bool {
+        let (own, other) = (self.around(v), self.around(w));
+        // At the boundary there are fewer triangles than neighbours.
+        let is_inner = own.len() == self.stars[v as usize].len() && other.len() == self.stars[w as usize].len();
+        let both: Vec<u32> = own.iter().copied().filter(|x| other.binary_search(x).is_ok()).collect();
+        let beside: Vec<u32> = own.iter().copied().filter(|&x| self.is_line(v, x)).collect();
+        let keeps_lines = match beside[..] {
+            [] => self.kinds[v as usize] != FeatureKind::Corner,
+            [a, b] => {
+                let is_along = a == w || b == w;
+                self.kinds[v as usize] != FeatureKind::Corner && is_along && !both.iter().any(|x| beside.contains(x))
+            }
+            _ => false,
+        };
+        is_inner && keeps_lines && both.len() == 2 && own.len() + other.len() > 7
+    }
+
+    /// True if there are fewer faults when `v` becomes `w`, and nothing is turned.
+    fn helps(&self, v: u32, w: u32, fault: &impl Fn(u32, [DVec3; 3]) -> Fault) -> bool {
+        let (mut before, mut after) = (0, 0);
+        for &t in &self.stars[v as usize] {
+            let corners = self.corners(t);
+            let at = self.places(corners);
+            before += fault(t, at) as usize;
+            if corners.contains(&w) {
+                continue;
+            }
+            let then = self.places(corners.map(|x| if x == v { w } else { x }));
+            let left = fault(t, then);
+            if left == Fault::Turned || shape(then) < shape(at).min(SHAPE) {
+                return false;
+            }
+            after += left as usize;
+        }
+        after < before
+    }
+
+    fn merge(&mut self, v: u32, w: u32) -> Change {
+        let star = self.stars[v as usize].clone();
+        let mut change = self.before(&star);
+        for t in star {
+            let corners = self.corners(t);
+            if corners.contains(&w) {
+                corners.iter().for_each(|&x| self.stars[x as usize].retain(|&s| s != t));
+                self.triangles[t as usize] = None;
+            } else {
+                self.triangles[t as usize] = Some(corners.map(|x| if x == v { w } else { x }));
+                self.stars[w as usize].push(t);
+            }
+        }
+        self.stars[v as usize].clear();
+        let ring: Vec<u32> = change.stars.iter().map(|s| s.0).filter(|&x| x != v && self.is_line(v, x)).collect();
+        for x in ring {
+            change.removed.push([v.min(x), v.max(x)]);
+            self.lines.remove(&[v.min(x), v.max(x)]);
+            if x != w {
+                self.lines.insert([x.min(w), x.max(w)]);
+                change.added = Some([x.min(w), x.max(w)]);
+            }
+        }
+        change
+    }
+
+    /// Flips an edge of `t` where that helps.
+    fn flip_any(&mut self, t: u32, corners: [u32; 3], fault: &impl Fn(u32, [DVec3; 3]) -> Fault) -> Option<Change> {
+        (0..3).find_map(|k| self.flip(t, corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3], fault))
+    }
+
+    /// Flips the edge from `a` to `b` of the triangle `t = [a, b, c]`.
+    fn flip(&mut self, t: u32, a: u32, b: u32, c: u32, fault: &impl Fn(u32, [DVec3; 3]) -> Fault) -> Option<Change> {
+        let mut others = self.stars[a as usize].iter().filter(|&&s| s != t && self.corners(s).contains(&b));
+        let (&other, None) = (others.next()?, others.next()) else { return None };
+        let d = self.corners(other).into_iter().find(|&x| x != a && x != b)?;
+        if self.is_line(a, b) || self.around(c).contains(&d) || self.around(a).len() < 4 || self.around(b).len() < 4 {
+            return None;
+        }
+        let (own, new) = (self.places([a, d, c]), self.places([d, b, c]));
+        let was = [self.places([a, b, c]), self.places(self.corners(other))];
+        let faults = [fault(t, own), fault(other, new)];
+        let before = fault(t, was[0]) as usize + fault(other, was[1]) as usize;
+        let is_shaped = shape(own).min(shape(new)) >= shape(was[0]).min(shape(was[1])).min(SHAPE);
+        if faults.contains(&Fault::Turned) || faults.iter().map(|&f| f as usize).sum::<usize>() >= before || !is_shaped
+        {
+            return None;
+        }
+        let change = self.before(&[t, other]);
+        self.triangles[t as usize] = Some([a, d, c]);
+        self.triangles[other as usize] = Some([d, b, c]);
+        self.stars[a as usize].retain(|&s| s != other);
+        self.stars[b as usize].retain(|&s| s != t);
+        self.stars[c as usize].push(other);
+        self.stars[d as usize].push(t);
+        Some(change)
+    }
+}
+
+/// Height over the longest edge.
+fn shape([a, b, c]: [DVec3; 3]) -> f64 {
+    let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
+    (b - a).cross(c - a).length() / longest.max(f64::MIN_POSITIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{FeatureTags, diagnose, self_intersections, shapes};
+
+    /// A sheet of 8 x 8 cells of size 1, whose middle vertex lies at `middle`.
+    fn sheet(middle: DVec3) -> (TriMesh, u32) {
+        let mut mesh = shapes::rectangle(8.0, 8.0, 8, 8);
+        let center = mesh.bounds().center();
+        let v = (0..mesh.points.len())
+            .min_by(|&a, &b| mesh.points[a].distance(center).total_cmp(&mesh.points[b].distance(center)));
+        let v = v.unwrap();
+        mesh.points.iter_mut().for_each(|p| *p -= center);
+        mesh.points[v] = middle;
+        (mesh, v as u32)
+    }
+
+    fn merged(
+        mesh: &TriMesh,
+        lines: &[[u32; 2]],
+        fault: impl Fn(u32, [DVec3; 3]) -> Fault,
+    ) -> (TriMesh, Vec<[u32; 2]>) {
+        let tags = FeatureTags::from_edges(mesh.points.len(), lines.iter().copied());
+        let mut merging = Merging::new(mesh, &tags.vertices, &tags.edges);
+        let mut faulty: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
+        while !faulty.is_empty() {
+            faulty = merging.round(&faulty, &fault, 2.0);
+        }
+        let triangles = merging.triangles.into_iter().flatten().collect();
+        let lines = merging.lines.into_iter().collect();
+        (TriMesh { points: mesh.points.clone(), triangles, attributes: Vec::new() }, lines)
+    }
+
+    fn cramped(_: u32, [a, b, c]: [DVec3; 3]) -> Fault {
+        let least = a.distance(b).min(b.distance(c)).min(c.distance(a));
+        if least < 0.3 { Fault::Cramped } else { Fault::None }
+    }
+
+    #[test]
+    fn a_vertex_too_near_to_another_becomes_that_and_the_sheet_stays_whole() {
+        let (mesh, _) = sheet(DVec3::new(0.9, 0.0, 0.0));
+        let (got, _) = merged(&mesh, &[], cramped);
+        assert_eq!(got.triangles.len(), mesh.triangles.len() - 2);
+        let (was, now) = (diagnose(&mesh), diagnose(&got));
+        assert_eq!((now.boundary_loops, now.components), (was.boundary_loops, was.components));
+        let area: f64 = (0..got.triangles.len()).map(|t| got.area(t)).sum();
+        assert!((area - 64.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_vertex_on_a_line_is_merged_along_it_alone() {
+        let (mesh, v) = sheet(DVec3::new(0.9, 0.0, 0.0));
+        let at = |p: DVec3| mesh.points.iter().position(|q| q.distance(p) < 1e-9).unwrap() as u32;
+        // A line from the left to the right goes on through the vertex beside it; one from below to above stays at its place.
+        let along = [[at(DVec3::new(-1.0, 0.0, 0.0)), v], [v, at(DVec3::new(1.0, 0.0, 0.0))]];
+        let sorted = |e: &[[u32; 2]]| e.iter().map(|e| [e[0].min(e[1]), e[0].max(e[1])]).collect::<Vec<_>>();
+        let (got, lines) = merged(&mesh, &sorted(&along), cramped);
+        assert_eq!((got.triangles.len(), lines.len()), (mesh.triangles.len() - 2, 1));
+        let across = sorted(&[[at(DVec3::new(0.0, -1.0, 0.0)), v], [v, at(DVec3::new(0.0, 1.0, 0.0))]]);
+        let (_, lines) = merged(&mesh, &across, cramped);
+        let mut was = across;
+        was.sort_unstable();
+        assert_eq!(lines, was);
+    }
+
+    #[test]
+    fn what_would_meet_another_triangle_is_taken_back() {
+        let (mut mesh, _) = sheet(DVec3::new(0.0, 0.0, 0.9));
+        // Only the tip itself may go: what comes to it in place of a neighbour is too long.
+        let flat = |_: u32, t: [DVec3; 3]| {
+            let longest = (0..3).map(|k| t[k].distance(t[(k + 1) % 3])).fold(0.0, f64::max);
+            match t.iter().any(|p| p.z > 0.5) {
+                true if longest > 1.9 => Fault::Turned,
+                true => Fault::Cramped,
+                false => Fault::None,
+            }
+        };
+        let is_high = |mesh: &TriMesh| (0..mesh.triangles.len()).any(|t| mesh.corners(t).iter().any(|p| p.z > 0.5));
+        assert!(!is_high(&merged(&mesh, &[], flat).0));
+        // Under the tent a triangle stands that reaches through the level of the sheet.
+        let first = mesh.points.len() as u32;
+        mesh.points.extend([(-0.05, -0.1), (0.05, -0.1), (0.0, 0.3)].map(|(x, z)| DVec3::new(x, 0.02, z)));
+        mesh.triangles.push([first, first + 1, first + 2]);
+        let (got, _) = merged(&mesh, &[], flat);
+        assert!(is_high(&got));
+        assert!(self_intersections(&got).is_empty());
+    }
+}
