@@ -408,12 +408,7 @@ pub struct AllStages {
 impl AllStages {
     /// The parameters of all stages: defaults with the given options in place.
     pub fn params(&self, seed: Option<u64>) -> Result<PipelineParams, Failure> {
-        Ok(PipelineParams {
-            layout: self.layout.params(seed)?,
-            grid: self.grid.params(seed)?,
-            fit: self.fit.params(seed)?,
-            stitch: self.stitch.params(seed)?,
-        })
+        self.params_suiting(PipelineParams::default(), seed)
     }
 
     /// The parameters for the surfaces of a model that is there already: `stored` with the given options in place.
@@ -429,9 +424,14 @@ impl AllStages {
         Ok(PipelineParams { fit, stitch, ..stored })
     }
 
-    /// The parameters of the fit: `suited` with the given options in place.
-    pub fn fit_over(&self, suited: FitParams, seed: Option<u64>) -> Result<FitParams, Failure> {
-        self.fit.params_over(suited, seed)
+    /// The parameters of all stages: `suited` with the given options in place.
+    pub fn params_suiting(&self, suited: PipelineParams, seed: Option<u64>) -> Result<PipelineParams, Failure> {
+        Ok(PipelineParams {
+            layout: self.layout.params_over(suited.layout, seed)?,
+            grid: self.grid.params_over(suited.grid, seed)?,
+            fit: self.fit.params_over(suited.fit, seed)?,
+            stitch: self.stitch.params_over(suited.stitch, seed)?,
+        })
     }
 
     /// True if no option of any stage is given.

@@ -22,7 +22,7 @@ use planish::cloud::{self, CleanParams, Cloud, ScannerParams, virtual_scan};
 use planish::contour::ContourParams;
 use planish::geom::{Bvh, KdTree, random};
 use planish::mesh::{Adjacency, TriMesh, diagnose, shapes, sharp_edges};
-use planish::pipeline::{self, PipelineParams, ScanParams, mesh_scan};
+use planish::pipeline::{self, ScanParams, mesh_scan};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -217,7 +217,7 @@ fn row(kind: &str, mesh: &TriMesh, level: f64) -> Option<BTreeMap<&'static str, 
     if kind == "handover" {
         let start = Instant::now();
         let tags = &made.meshed.extracted.tags;
-        let params = PipelineParams { fit: pipeline::fit_params_for(&made.samples), ..PipelineParams::default() };
+        let params = pipeline::params_for(&made);
         match pipeline::fit_tagged(got, Some(tags), None, &params, &Silent) {
             Ok(fitted) => {
                 // A tenth of a percent, at noise above that two tenths.

@@ -7,7 +7,7 @@ use crate::failure::{Failure, Status};
 use crate::products::Staged;
 use planish::cloud::{ScannerParams, virtual_scan};
 use planish::mesh::shapes;
-use planish::pipeline::{Figure, PipelineParams};
+use planish::pipeline::Figure;
 use planish_io::{Up, WriteOptions};
 use std::path::Path;
 
@@ -31,7 +31,7 @@ pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
     let wrong = |name: &str, e: &dyn std::fmt::Display| Failure::usage(args.output.join(name), e);
     planish_io::write_mesh(staged.path(TRUTH), &truth, &options).map_err(|e| wrong(TRUTH, &e))?;
     planish_io::write_scan(staged.path(SCAN), &scan.cloud).map_err(|e| wrong(SCAN, &e))?;
-    let Scanned { mesh, tags, mut facts, fit, records } =
+    let Scanned { mesh, tags, mut facts, suited, records } =
         from_scan(session, Path::new(SCAN), &scan.cloud, None, &staged)?;
     let strays = scan.stray.iter().filter(|&&s| s).count();
     facts.quality.insert("truth.outliers".into(), Figure::Count(strays as u64));
@@ -42,7 +42,7 @@ pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
         input: &mesh,
         tags: Some(&tags),
         network: None,
-        params: PipelineParams { fit, ..PipelineParams::default() },
+        params: suited,
         demanded: None,
         output: &args.output,
         up: Up::Z,

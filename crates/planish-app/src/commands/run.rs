@@ -12,7 +12,6 @@ use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{HistoryEntry, Model};
 use planish::network::Network;
 use planish::pipeline::{self, Fitted, PipelineParams, StageRecord};
-use planish::surface::FitParams;
 use planish_io::report::{self, Report, SeamRow, count, distance, number, percent};
 use planish_io::{StepInput, Up, WriteOptions};
 use std::path::Path;
@@ -24,9 +23,9 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
     let mut extra = None;
     let (input, tags) = if planish_io::is_scan(&args.input) {
         let (scan, read) = session.step("read", || files::scan(&args.input, &args.scan))?;
-        let Scanned { mesh, tags, facts, fit, records } =
+        let Scanned { mesh, tags, facts, suited, records } =
             from_scan(session, &args.input, &scan, args.holes.choice(), &staged)?;
-        params.fit = args.stages.fit_over(fit, session.common.seed)?;
+        params = args.stages.params_suiting(suited, session.common.seed)?;
         before.push(read);
         before.extend(records);
         extra = Some(facts);
@@ -61,8 +60,8 @@ pub struct Scanned {
     pub tags: FeatureTags,
     /// What was found.
     pub facts: ScanFacts,
-    /// How surfaces are fitted to it.
-    pub fit: FitParams,
+    /// The parameters that suit it.
+    pub suited: PipelineParams,
     /// The stages that ran.
     pub records: Vec<StageRecord>,
 }
@@ -124,9 +123,9 @@ pub fn from_scan(
     for (p, &off) in scan.points.iter().zip(&points.strays) {
         facts.points[usize::from(off)].push(*p);
     }
-    let fit = pipeline::fit_params_for(&made.samples);
+    let suited = pipeline::params_for(&made);
     let (mesh, tags) = (made.meshed.extracted.mesh, made.meshed.extracted.tags);
-    Ok(Scanned { mesh, tags, facts, fit, records: vec![record, project] })
+    Ok(Scanned { mesh, tags, facts, suited, records: vec![record, project] })
 }
 
 /// A mesh on its way to a model.

@@ -2,11 +2,12 @@
 
 use super::finish::finish;
 use super::record::Figure;
-use super::{Quality, Warning};
+use super::{PipelineParams, Quality, Warning};
 use crate::cloud::{self, CleanParams, Cloud, CloudError, Samples};
 use crate::contour::{self, ContourParams, Meshed, MeshingError, Sampling};
 use crate::field::{SampleField, Spacing};
 use crate::geom::Bvh;
+use crate::grid::GridParams;
 use crate::mesh::sets::Sets;
 use crate::mesh::{self, FeatureTags, ScanScale, TriMesh};
 use crate::observe::Observer;
@@ -128,16 +129,27 @@ const FIT_CLOSEST: f64 = 2e-4;
 /// the noise beside sharp edges, more flattens what bends there.
 const FIT_SMOOTHING: f64 = 0.05;
 
-/// How surfaces are fitted to the mesh of a scan.
-pub fn fit_params_for(samples: &Samples) -> FitParams {
-    let usual = FitParams::default();
-    let noise = samples.noise / samples.diagonal;
-    let resolution = match usual.resolution {
+/// Grids of the mesh of a scan have so many points, but at most so many per vertex: beside its sharp edges the surface
+/// is mended within two cells, and what a coarse grid leaves out there is angle of the edge.
+const GRID_POINTS: f64 = 3e5;
+const GRID_DENSITY: f64 = 4.0;
+
+/// The parameters that suit the mesh of a scan: how fine its grids are, and how closely surfaces are fitted to it.
+pub fn params_for(made: &ScanMeshed) -> PipelineParams {
+    let usual = PipelineParams::default();
+    let noise = made.samples.noise / made.samples.diagonal;
+    let resolution = match usual.fit.resolution {
         Resolution::Tolerance(most) => Resolution::Tolerance((FIT_NOISE * noise).max(FIT_CLOSEST).min(most)),
         other => other,
     };
-    let smoothing = (FIT_SMOOTHING * (noise / 1e-3).powi(2)).clamp(usual.smoothing, 1.0);
-    FitParams { resolution, smoothing, ..usual }
+    let smoothing = (FIT_SMOOTHING * (noise / 1e-3).powi(2)).clamp(usual.fit.smoothing, 1.0);
+    let vertices = made.meshed.extracted.mesh.points.len().max(1);
+    let density = (GRID_POINTS / vertices as f64).min(GRID_DENSITY).max(usual.grid.density);
+    PipelineParams {
+        fit: FitParams { resolution, smoothing, ..usual.fit },
+        grid: GridParams { density, ..usual.grid },
+        ..usual
+    }
 }
 
 struct Share<'a> {
