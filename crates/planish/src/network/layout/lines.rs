@@ -96,9 +96,9 @@ fn mean_normal(mesh: &TriMesh, adjacency: &Adjacency, sharp: &[bool], h: u32, re
     sum.normalize_or_zero()
 }
 
-/// Bridges gaps of lines, and clears what is surface detail: lines with a loose end that are shorter than `shortest`, the lines around regions
-/// smaller than a circle of half that length around, spikes a quarter of it around, and connected lines shorter than
-/// half of it together.
+/// Bridges gaps of lines, and clears what is surface detail: lines with a loose end that are shorter than `shortest`, the
+/// lines around regions smaller than a circle of half that length around, spikes a quarter of it around, and connected
+/// lines shorter than half of it together.
 fn drop_detail(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut [bool]) {
     let around = CLOSED_SHARE * shortest;
     let smallest = around * around / (4.0 * std::f64::consts::PI);
