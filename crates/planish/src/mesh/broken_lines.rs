@@ -5,7 +5,6 @@
 
 use super::{Adjacency, FeatureKind, FeatureTags, NONE, TriMesh, next, path, previous};
 use glam::DVec3;
-use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
@@ -30,10 +29,8 @@ const SPIKE: f64 = 6.0;
 /// Bridges the gaps of the tagged lines of a mesh, and cuts their spikes. Returns how many gaps were bridged.
 pub fn mend_lines(mesh: &TriMesh, tags: &mut FeatureTags) -> usize {
     let adjacency = Adjacency::new(mesh);
-    let mut sharp: Vec<bool> = (0..3 * mesh.triangles.len() as u32)
-        .into_par_iter()
-        .map(|h| adjacency.opposite[h as usize] != NONE && tags.edges.binary_search(&ends(mesh, h)).is_ok())
-        .collect();
+    let mut sharp = tags.on(mesh);
+    sharp.iter_mut().zip(&adjacency.opposite).for_each(|(s, &o)| *s &= o != NONE);
     let bridged = bridge_gaps(mesh, &adjacency, &mut sharp);
     cut_spikes(mesh, &adjacency, SPIKE * mean_edge(mesh), &mut sharp);
     let edges = (0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| ends(mesh, h));

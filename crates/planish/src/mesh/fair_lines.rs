@@ -48,7 +48,7 @@ pub fn fair_lines(mesh: &mut TriMesh, tags: &mut FeatureTags, scale: &ScanScale)
     if tags.edges.is_empty() || !usable {
         return 0;
     }
-    let mut wishes = wishes(&Lines::new(mesh, &tags.edges), scale);
+    let mut wishes = wishes(&Lines::new(mesh, tags), scale);
     let mut moved = vec![false; mesh.points.len()];
     settle(mesh, &wishes, &mut moved);
     tidy(mesh, tags, &mut wishes);

@@ -7,7 +7,7 @@
 //!
 //! A flank is a polynomial over its tangent plane: a plane, one that bends along the line, or a quadric.
 
-use super::{Adjacency, NONE, TriMesh, next};
+use super::{Adjacency, FeatureTags, NONE, TriMesh, next};
 use crate::linalg::solve_dense;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -106,24 +106,16 @@ impl Seen {
 }
 
 impl Lines<'_> {
-    /// * `edges` - those of the lines, two vertices each, the lesser first, ascending
-    pub fn new<'a>(mesh: &'a TriMesh, edges: &[[u32; 2]]) -> Lines<'a> {
-        let half_edges = 3 * mesh.triangles.len() as u32;
-        let tagged = (0..half_edges)
-            .into_par_iter()
-            .map(|h| {
-                let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
-                edges.binary_search(&[a.min(b), a.max(b)]).is_ok()
-            })
-            .collect();
+    /// The lines that `tags` mark.
+    pub fn new<'a>(mesh: &'a TriMesh, tags: &FeatureTags) -> Lines<'a> {
         let mut on_line = vec![false; mesh.points.len()];
-        edges.iter().flatten().for_each(|&v| on_line[v as usize] = true);
+        tags.edges.iter().flatten().for_each(|&v| on_line[v as usize] = true);
         let faces = 0..mesh.triangles.len();
         let center = |t: usize| mesh.corners(t).into_iter().sum::<DVec3>() / 3.0;
         Lines {
             mesh,
             adjacency: Adjacency::new(mesh),
-            tagged,
+            tagged: tags.on(mesh),
             on_line,
             centers: faces.clone().into_par_iter().map(center).collect(),
             areas: faces.into_par_iter().map(|t| mesh.area_vector(t)).collect(),

@@ -2,6 +2,7 @@
 
 use super::{Attribute, TriMesh};
 use glam::DVec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// What a vertex marks.
@@ -48,6 +49,18 @@ impl FeatureTags {
             };
         }
         FeatureTags { vertices: kinds, edges }
+    }
+
+    /// Marks the half-edges of `mesh`, whose tags these are, on the tagged edges.
+    pub(super) fn on(&self, mesh: &TriMesh) -> Vec<bool> {
+        let ends = |h: u32| (mesh.origin(h), mesh.origin(super::next(h)));
+        (0..3 * mesh.triangles.len() as u32)
+            .into_par_iter()
+            .map(|h| {
+                let (a, b) = ends(h);
+                self.edges.binary_search(&[a.min(b), a.max(b)]).is_ok()
+            })
+            .collect()
     }
 
     /// Marks the half-edges of `mesh` that lie on the tagged edges of `input`, told by the positions of their ends: `mesh`
