@@ -33,16 +33,7 @@ pub fn mend_lines(mesh: &TriMesh, tags: &mut FeatureTags) -> usize {
     sharp.iter_mut().zip(&adjacency.opposite).for_each(|(s, &o)| *s &= o != NONE);
     let bridged = bridge_gaps(mesh, &adjacency, &mut sharp);
     cut_spikes(mesh, &adjacency, SPIKE * mean_edge(mesh), &mut sharp);
-    let edges = (0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| ends(mesh, h));
-    let was = std::mem::replace(tags, FeatureTags::from_edges(mesh.points.len(), edges));
-    // A corner of two edges stays one.
-    let plain = FeatureTags::from_edges(mesh.points.len(), was.edges);
-    for (v, kind) in tags.vertices.iter_mut().enumerate() {
-        let was_corner = was.vertices.get(v) == Some(&FeatureKind::Corner) && plain.vertices[v] == FeatureKind::Edge;
-        if *kind == FeatureKind::Edge && was_corner {
-            *kind = FeatureKind::Corner;
-        }
-    }
+    *tags = tags.with_edges((0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| ends(mesh, h)));
     bridged
 }
 

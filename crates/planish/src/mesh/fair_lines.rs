@@ -2,16 +2,19 @@
 //!
 //! Where two sheets of a scan meet, each has the points of one side only, so the surface is least sure right beside a sharp line,
 //! and the line itself is where two unsure sheets meet. But most flanks go on smoothly for many cells. So
-//! 1. each side of each vertex of a line gets an estimate from far around ([`flanks`](super::flanks));
+//! 1. each side of each vertex of a line gets an estimate from far around ([`flanks`](super::flanks)); lines that these tell
+//!    to be rounded edges are no lines ([`rounded`](super::rounded));
 //! 2. the vertex goes to where its flanks meet, those within some cells of the line towards the flanks beside them;
 //! 3. who turns a triangle over, or makes two meet, goes back half of the way, or all of it;
 //! 4. vertices in the way are merged into their neighbours ([`merging`](super::merging)), and who went back tries again.
 
-use super::flanks::{Lines, ScanScale, Seen};
+use super::flanks::{Flank, Plane, ScanScale};
 use super::intersect::intersections_of;
+use super::lines::{Lines, Seen};
 use super::merging::{Fault, Merging};
+use super::rounded::{self, meet};
 use super::{FeatureTags, TriMesh};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// The flanks are followed within so many cells of the line, fully within half of that.
@@ -22,8 +25,6 @@ const FARTHEST: f64 = 2.0;
 const STRUCTURE: f64 = 1.0;
 /// Variance of a flank's slope that counts as none: half a degree.
 const SURE: f64 = 8e-5;
-/// Damping of the place where flanks meet: two at less than two degrees have none.
-const DAMPING: f64 = 1e-3;
 /// A triangle may turn so far from what is expected of it (cosine) if it was no farther before.
 const TURNED: f64 = 0.7;
 /// A triangle keeps so much of its area.
@@ -48,7 +49,16 @@ pub fn fair_lines(mesh: &mut TriMesh, tags: &mut FeatureTags, scale: &ScanScale)
     if tags.edges.is_empty() || !usable {
         return 0;
     }
-    let mut wishes = wishes(&Lines::new(mesh, tags), scale);
+    let mut lines = Lines::new(mesh, tags);
+    let mut flanks = lines.flanks(scale);
+    let [sharp, round] = rounded::split(&lines, &tags.edges, &flanks, scale);
+    lines.forget(&round);
+    flanks.retain(|f| lines.on_line[f.0 as usize]);
+    let mut wishes = wishes(&lines, &flanks, scale);
+    if !round.is_empty() {
+        wishes.add(mesh, rounded::smoothed(&lines, &round, scale));
+        *tags = tags.with_edges(sharp);
+    }
     let mut moved = vec![false; mesh.points.len()];
     settle(mesh, &wishes, &mut moved);
     tidy(mesh, tags, &mut wishes);
@@ -69,6 +79,19 @@ struct Wishes {
 }
 
 impl Wishes {
+    /// Adds vertices with their places and normals, ascending, in place of what was wished there.
+    fn add(&mut self, mesh: &TriMesh, others: Vec<(u32, Plane)>) {
+        let find = |v: u32| others.binary_search_by_key(&v, |o| o.0).ok();
+        self.moves.retain(|m| find(m.0).is_none());
+        self.moves.extend(others.iter().map(|(v, plane)| (*v, mesh.points[*v as usize] - plane.normal * plane.off)));
+        self.moves.sort_unstable_by_key(|m| m.0);
+        for (expected, triangle) in self.expected.iter_mut().zip(&mesh.triangles) {
+            if let [Some(a), Some(b), Some(c)] = triangle.map(find) {
+                *expected = [a, b, c].iter().map(|&i| others[i].1.normal).sum::<DVec3>().normalize_or_zero();
+            }
+        }
+    }
+
     /// True if a triangle that had this normal looks the wrong way with these corners.
     fn is_turned(&self, t: u32, normal: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
         // What is expected leaves room; where nothing is, the triangle itself is.
@@ -99,9 +122,8 @@ impl Shared {
     }
 }
 
-fn wishes(lines: &Lines, scale: &ScanScale) -> Wishes {
+fn wishes(lines: &Lines, flanks: &[(u32, Vec<Flank>)], scale: &ScanScale) -> Wishes {
     let mesh = lines.mesh;
-    let flanks = lines.flanks(scale);
     let reach = REACH * scale.cell;
     // What each flank says of the faces beside it.
     let beside: Vec<Vec<Vec<u32>>> = flanks
@@ -109,9 +131,9 @@ fn wishes(lines: &Lines, scale: &ScanScale) -> Wishes {
         .map_init(
             || Seen::new(mesh.triangles.len()),
             |seen, (_, flanks)| {
-                let one = |f: &super::flanks::Flank, seen: &mut Seen| {
+                let one = |f: &Flank, seen: &mut Seen| {
                     let near = |t: u32| mesh.corners(t as usize).iter().any(|p| p.distance(f.at) < reach);
-                    lines.grow(&f.sector, seen, |t| near(t) && lines.is_facing(t, f))
+                    lines.grow(&f.sector, seen, |t| near(t) && lines.is_facing(t, f.axes[2]))
                 };
                 flanks.iter().map(|f| one(f, seen)).collect()
             },
@@ -171,16 +193,12 @@ fn wishes(lines: &Lines, scale: &ScanScale) -> Wishes {
         })
         .collect();
     let mut at = 0;
-    for (v, flanks) in &flanks {
+    for (v, flanks) in flanks {
         let from = mesh.points[*v as usize];
-        let (mut matrix, mut rhs) = (DMat3::from_diagonal(DVec3::splat(DAMPING)), DVec3::ZERO);
-        for shared in &shared[at..at + flanks.len()] {
-            let n = shared.normal.normalize_or_zero();
-            matrix += DMat3::from_cols(n * n.x, n * n.y, n * n.z);
-            rhs -= n * (shared.off / shared.weight.max(f64::MIN_POSITIVE));
-        }
+        let plane =
+            |s: &Shared| Plane { normal: s.normal.normalize_or_zero(), off: s.off / s.weight.max(f64::MIN_POSITIVE) };
+        let way = meet(shared[at..at + flanks.len()].iter().map(plane));
         at += flanks.len();
-        let way = matrix.inverse() * rhs;
         if way.length() <= FARTHEST * scale.noise {
             moves.push((*v, from + way));
         }

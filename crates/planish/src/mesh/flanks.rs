@@ -7,7 +7,7 @@
 //!
 //! A flank is a polynomial over its tangent plane: a plane, one that bends along the line, or a quadric.
 
-use super::{Adjacency, FeatureTags, NONE, TriMesh, next};
+use super::lines::{Lines, Seen};
 use crate::linalg::solve_dense;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -24,23 +24,10 @@ const FEWEST: f64 = 8.0;
 const AGREE: f64 = 1.4;
 /// Least share of an estimate's own variance that counts as that of its difference to a more precise one.
 const SHARED: f64 = 0.25;
-/// A first normal comes from within so many cells.
+/// A first normal comes from within so many cells, as does the direction of the line.
 const NEAR: f64 = 3.0;
-/// A flank ends where its faces turn away from that by more than 60 degrees (cosine).
-const FACING: f64 = 0.5;
-
-/// A mesh with its sharp lines.
-pub(super) struct Lines<'a> {
-    pub mesh: &'a TriMesh,
-    adjacency: Adjacency,
-    /// Half-edges on lines.
-    tagged: Vec<bool>,
-    /// Vertices on lines.
-    pub on_line: Vec<bool>,
-    centers: Vec<DVec3>,
-    /// Area vectors.
-    areas: Vec<DVec3>,
-}
+/// What lies this near to a line, in cells, may be the rounding of an edge.
+const ROUNDING: f64 = 1.5;
 
 /// The scales of a mesh that was made of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,13 +46,24 @@ pub(super) struct Flank {
     /// The vertex.
     pub at: DVec3,
     /// Across the line, along it, and outwards.
-    axes: [DVec3; 3],
+    pub axes: [DVec3; 3],
     /// Coefficients of `1, x, y, y², x², xy`.
     terms: [f64; 6],
     /// Variance of the slope across the line.
     pub variance: f64,
+    /// The same, as told by what is beyond [`ROUNDING`] alone; `None` if too little is.
+    pub beyond: Option<Plane>,
     /// Faces around the vertex on this side.
     pub sector: Vec<u32>,
+}
+
+/// A plane beside a vertex.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plane {
+    /// Unit normal, outwards.
+    pub normal: DVec3,
+    /// Distance of the vertex from the plane, positive outside.
+    pub off: f64,
 }
 
 impl Flank {
@@ -89,133 +87,39 @@ impl Flank {
     }
 }
 
-/// Marks of the faces that a search has seen.
-pub(super) struct Seen {
-    mark: Vec<u32>,
-    round: u32,
-}
-
-impl Seen {
-    pub fn new(faces: usize) -> Seen {
-        Seen { mark: vec![0; faces], round: 0 }
-    }
-
-    fn insert(&mut self, face: u32) -> bool {
-        std::mem::replace(&mut self.mark[face as usize], self.round) != self.round
-    }
-}
-
 impl Lines<'_> {
-    /// The lines that `tags` mark.
-    pub fn new<'a>(mesh: &'a TriMesh, tags: &FeatureTags) -> Lines<'a> {
-        let mut on_line = vec![false; mesh.points.len()];
-        tags.edges.iter().flatten().for_each(|&v| on_line[v as usize] = true);
-        let faces = 0..mesh.triangles.len();
-        let center = |t: usize| mesh.corners(t).into_iter().sum::<DVec3>() / 3.0;
-        Lines {
-            mesh,
-            adjacency: Adjacency::new(mesh),
-            tagged: tags.on(mesh),
-            on_line,
-            centers: faces.clone().into_par_iter().map(center).collect(),
-            areas: faces.into_par_iter().map(|t| mesh.area_vector(t)).collect(),
-        }
-    }
-
-    /// The faces around `v` between its lines, sector by sector.
-    fn sectors(&self, v: u32) -> Vec<Vec<u32>> {
-        let fan: Vec<u32> = self.adjacency.fan(v).collect();
-        let start = fan.iter().position(|&h| self.tagged[h as usize]).unwrap_or(0);
-        let mut sectors: Vec<Vec<u32>> = Vec::new();
-        for i in 0..fan.len() {
-            let h = fan[(start + i) % fan.len()];
-            match sectors.last_mut() {
-                Some(last) if !self.tagged[h as usize] => last.push(h / 3),
-                _ => sectors.push(vec![h / 3]),
-            }
-        }
-        sectors
-    }
-
-    /// Faces joined with those of `sector` not across a line, as far as they are welcome; `sector` first.
-    pub fn grow(&self, sector: &[u32], seen: &mut Seen, welcome: impl Fn(u32) -> bool) -> Vec<u32> {
-        seen.round += 1;
-        let mut faces = sector.to_vec();
-        faces.iter().for_each(|&f| _ = seen.insert(f));
-        let mut at = 0;
-        while at < faces.len() {
-            for h in 3 * faces[at]..3 * faces[at] + 3 {
-                let o = self.adjacency.opposite[h as usize];
-                if o != NONE && !self.tagged[h as usize] && seen.insert(o / 3) && welcome(o / 3) {
-                    faces.push(o / 3);
-                }
-            }
-            at += 1;
-        }
-        faces
-    }
-
-    /// True if a face looks the way of `flank`.
-    pub fn is_facing(&self, face: u32, flank: &Flank) -> bool {
-        self.faces(face, flank.axes[2])
-    }
-
-    fn faces(&self, face: u32, normal: DVec3) -> bool {
-        let area = self.areas[face as usize];
-        area.dot(normal) > FACING * area.length()
-    }
-
     /// The flanks of every vertex on a line that parts its surroundings, in the order of the vertices; none where one of them
     /// is not known.
     pub fn flanks(&self, scale: &ScanScale) -> Vec<(u32, Vec<Flank>)> {
-        let vertices: Vec<u32> = (0..self.on_line.len() as u32).filter(|&v| self.on_line[v as usize]).collect();
-        let found = vertices.into_par_iter().map_init(
-            || Seen::new(self.mesh.triangles.len()),
-            |seen, v| {
-                if self.adjacency.is_boundary_vertex(v) {
-                    return None;
-                }
-                let sectors = self.sectors(v);
-                let along = self.direction(v, scale.cell)?;
-                let flanks: Option<Vec<Flank>> =
-                    sectors.into_iter().map(|sector| self.flank(v, sector, along, scale, seen)).collect();
-                flanks.filter(|f| f.len() > 1).map(|flanks| (v, flanks))
-            },
-        );
+        let inside = |v: &u32| self.on_line[*v as usize] && !self.adjacency.is_boundary_vertex(*v);
+        let vertices: Vec<u32> = (0..self.on_line.len() as u32).filter(inside).collect();
+        let seen = || Seen::new(self.mesh.triangles.len());
+        let beside = |seen: &mut Seen, &v: &u32| {
+            let at = self.mesh.points[v as usize];
+            let near = |f: u32| self.centers[f as usize].distance(at) < ROUNDING * scale.cell;
+            self.sectors(v).iter().flat_map(|sector| self.grow(sector, seen, near)).collect::<Vec<u32>>()
+        };
+        let mut is_beside = vec![false; self.mesh.triangles.len()];
+        let found: Vec<Vec<u32>> = vertices.par_iter().map_init(seen, beside).collect();
+        found.into_iter().flatten().for_each(|f| is_beside[f as usize] = true);
+        let found = vertices.into_par_iter().map_init(seen, |seen, v| {
+            let along = self.direction(v, NEAR * scale.cell)?;
+            let one = |sector| self.flank(v, sector, along, scale, &is_beside, seen);
+            let flanks: Option<Vec<Flank>> = self.sectors(v).into_iter().map(one).collect();
+            flanks.filter(|f| f.len() > 1).map(|flanks| (v, flanks))
+        });
         found.flatten().collect()
     }
 
-    /// The line's direction at `v`, over [`NEAR`] cells; at a corner that of one line.
-    fn direction(&self, v: u32, cell: f64) -> Option<DVec3> {
-        let mut ends = self.tagged_from(v).map(|h| self.follow(h, NEAR * cell));
-        match (ends.next(), ends.next(), ends.next()) {
-            (Some(a), Some(b), None) => Some(b - a),
-            (Some(a), ..) => Some(a - self.mesh.points[v as usize]),
-            _ => None,
-        }
-    }
-
-    fn tagged_from(&self, v: u32) -> impl Iterator<Item = u32> {
-        self.adjacency.fan(v).filter(|&h| self.tagged[h as usize])
-    }
-
-    /// Where a line that begins with half-edge `h` is after `length`, or where it ends or meets others.
-    fn follow(&self, mut h: u32, length: f64) -> DVec3 {
-        let from = self.mesh.origin(h);
-        let mut run = 0.0;
-        loop {
-            let [a, b] = [self.mesh.origin(h), self.mesh.origin(next(h))];
-            let end = self.mesh.points[b as usize];
-            run += self.mesh.points[a as usize].distance(end);
-            let mut on = self.tagged_from(b).filter(|&o| self.mesh.origin(next(o)) != a);
-            match (on.next(), on.next()) {
-                (Some(o), None) if run < length && b != from => h = o,
-                _ => return end,
-            }
-        }
-    }
-
-    fn flank(&self, v: u32, sector: Vec<u32>, along: DVec3, scale: &ScanScale, seen: &mut Seen) -> Option<Flank> {
+    fn flank(
+        &self,
+        v: u32,
+        sector: Vec<u32>,
+        along: DVec3,
+        scale: &ScanScale,
+        is_beside: &[bool],
+        seen: &mut Seen,
+    ) -> Option<Flank> {
         let at = self.mesh.points[v as usize];
         let off = |f: u32| self.centers[f as usize].distance(at);
         let near = self.grow(&sector, seen, |f| off(f) < NEAR * scale.cell);
@@ -223,42 +127,54 @@ impl Lines<'_> {
         let y = (along - outwards * outwards.dot(along)).try_normalize()?;
         let axes = [outwards.cross(y), y, outwards];
         let widest = RADII[RADII.len() - 1] * scale.cell;
-        // What each window has beyond the one before.
-        let mut rings: [Moments; RADII.len()] = Default::default();
-        for f in self.grow(&sector, seen, |f| off(f) < widest && self.faces(f, outwards)) {
+        // What each window has more than the one before: all, and what is beyond the rounding.
+        let mut rings: [[Moments; RADII.len()]; 2] = Default::default();
+        for f in self.grow(&sector, seen, |f| off(f) < widest && self.is_facing(f, outwards)) {
             let p = (self.centers[f as usize] - at) / scale.cell;
             let away = p.length();
             let Some(ring) = RADII.iter().position(|radius| away <= *radius) else { continue };
             // How many points of the scan a face stands for.
             let weight = self.areas[f as usize].length() / (scale.spacing * scale.spacing);
-            rings[ring].add(p.dot(axes[0]), p.dot(axes[1]), p.dot(axes[2]), weight);
-        }
-        let mut sums = Moments::default();
-        let mut found: Vec<Estimate> = Vec::new();
-        for ring in &rings {
-            sums.join(ring);
-            if sums.matrix[0][0] >= FEWEST {
-                found.extend(MODELS.iter().filter_map(|&terms| sums.fit(terms, scale.noise / scale.cell)));
+            for rings in &mut rings[..if is_beside[f as usize] { 1 } else { 2 }] {
+                rings[ring].add(p.dot(axes[0]), p.dot(axes[1]), p.dot(axes[2]), weight);
             }
         }
-        found.sort_by(|a, b| b.variance[1].total_cmp(&a.variance[1]));
-        let best = (0..found.len()).rev().find(|&j| found[..j].iter().all(|i| found[j].agrees(i)))?;
-        let Estimate { mut terms, variance } = found[best].clone();
+        let noise = scale.noise / scale.cell;
+        let beyond = best(&rings[1], noise).map(|Estimate { terms, .. }| {
+            let normal = (outwards - axes[0] * terms[1] - axes[1] * terms[2]).normalize();
+            Plane { normal, off: -terms[0] * scale.cell * normal.dot(outwards) }
+        });
+        let Estimate { mut terms, variance } = best(&rings[0], noise)?;
         let s = scale.cell;
         terms.iter_mut().zip([s, 1.0, 1.0, 1.0 / s, 1.0 / s, 1.0 / s]).for_each(|(c, unit)| *c *= unit);
-        Some(Flank { at, axes, terms, variance: variance[1], sector })
+        Some(Flank { at, axes, terms, variance: variance[1], beyond, sector })
     }
+}
+
+/// The most precise estimate that agrees with all less precise ones.
+fn best(rings: &[Moments], noise: f64) -> Option<Estimate> {
+    let mut sums = Moments::default();
+    let mut found: Vec<Estimate> = Vec::new();
+    for ring in rings {
+        sums.join(ring);
+        if sums.matrix[0][0] >= FEWEST {
+            found.extend(MODELS.iter().filter_map(|&terms| sums.fit(terms, noise)));
+        }
+    }
+    found.sort_by(|a, b| b.variance[1].total_cmp(&a.variance[1]));
+    let best = (0..found.len()).rev().find(|&j| found[..j].iter().all(|i| found[j].agrees(i)))?;
+    Some(found.swap_remove(best))
 }
 
 /// Weighted sums of products of `1, x, y, y², x², xy`, lengths in cells.
 #[derive(Default)]
-struct Moments {
+pub(super) struct Moments {
     matrix: [[f64; 6]; 6],
     rhs: [f64; 6],
 }
 
 impl Moments {
-    fn add(&mut self, x: f64, y: f64, z: f64, weight: f64) {
+    pub fn add(&mut self, x: f64, y: f64, z: f64, weight: f64) {
         let row = [1.0, x, y, y * y, x * x, x * y];
         for i in 0..6 {
             for j in 0..=i {
@@ -278,7 +194,7 @@ impl Moments {
     }
 
     /// Least squares with the first `n` terms, of points with this noise.
-    fn fit(&self, n: usize, noise: f64) -> Option<Estimate> {
+    pub fn fit(&self, n: usize, noise: f64) -> Option<Estimate> {
         let mut matrix: Vec<f64> = Vec::with_capacity(n * n);
         let mut columns: Vec<f64> = Vec::with_capacity(4 * n);
         for i in 0..n {
@@ -297,8 +213,8 @@ impl Moments {
 
 /// A polynomial, and the variances of its height and of its slopes across and along the line.
 #[derive(Clone)]
-struct Estimate {
-    terms: [f64; 6],
+pub(super) struct Estimate {
+    pub terms: [f64; 6],
     variance: [f64; 3],
 }
 

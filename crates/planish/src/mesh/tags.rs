@@ -51,6 +51,21 @@ impl FeatureTags {
         FeatureTags { vertices: kinds, edges }
     }
 
+    /// The tags of the same mesh with other `edges`. A corner of two edges stays one.
+    pub(super) fn with_edges(&self, edges: impl IntoIterator<Item = [u32; 2]>) -> FeatureTags {
+        let count = self.vertices.len();
+        let mut tags = FeatureTags::from_edges(count, edges);
+        // What has two edges and was a corner by more than its number of edges, or has lost some.
+        let plain = FeatureTags::from_edges(count, self.edges.iter().copied());
+        for (v, kind) in tags.vertices.iter_mut().enumerate() {
+            let was_corner = self.vertices[v] == FeatureKind::Corner && plain.vertices[v] == FeatureKind::Edge;
+            if *kind == FeatureKind::Edge && was_corner {
+                *kind = FeatureKind::Corner;
+            }
+        }
+        tags
+    }
+
     /// Marks the half-edges of `mesh`, whose tags these are, on the tagged edges.
     pub(super) fn on(&self, mesh: &TriMesh) -> Vec<bool> {
         let ends = |h: u32| (mesh.origin(h), mesh.origin(super::next(h)));
