@@ -3,7 +3,7 @@
 //! Noise hides a few edges of a line, or shifts it by an edge. A gap costs more than its length: a line with a loose end is
 //! taken for surface detail, or two patches run into one another there.
 
-use super::{Adjacency, FeatureKind, FeatureTags, NONE, TriMesh, next, path, previous};
+use super::{Adjacency, FeatureTags, NONE, TriMesh, next, path, previous};
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -241,7 +241,7 @@ pub fn cut_spikes(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &m
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::mesh::{FeatureKind, shapes};
 
     const CELLS: usize = 60;
 
