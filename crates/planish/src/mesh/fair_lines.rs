@@ -195,9 +195,8 @@ fn wishes(lines: &Lines, flanks: &[(u32, Vec<Flank>)], scale: &ScanScale) -> Wis
     let mut at = 0;
     for (v, flanks) in flanks {
         let from = mesh.points[*v as usize];
-        let plane =
-            |s: &Shared| Plane { normal: s.normal.normalize_or_zero(), off: s.off / s.weight.max(f64::MIN_POSITIVE) };
-        let way = meet(shared[at..at + flanks.len()].iter().map(plane));
+        let side = |s: &Shared| (s.normal.normalize_or_zero(), s.off / s.weight.max(f64::MIN_POSITIVE));
+        let way = meet(shared[at..at + flanks.len()].iter().map(side));
         at += flanks.len();
         if way.length() <= FARTHEST * scale.noise {
             moves.push((*v, from + way));

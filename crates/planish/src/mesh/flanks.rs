@@ -24,6 +24,9 @@ const FEWEST: f64 = 8.0;
 const AGREE: f64 = 1.4;
 /// Least share of an estimate's own variance that counts as that of its difference to a more precise one.
 const SHARED: f64 = 0.25;
+/// Where what is right beside a line does not count, the first so many windows must have so many of these.
+const CLOSE: usize = 2;
+const SOME: f64 = 4.0;
 /// A first normal comes from within so many cells, as does the direction of the line.
 const NEAR: f64 = 3.0;
 /// What lies this near to a line, in cells, may be the rounding of an edge.
@@ -64,6 +67,8 @@ pub(super) struct Plane {
     pub normal: DVec3,
     /// Distance of the vertex from the plane, positive outside.
     pub off: f64,
+    /// Variance of that distance.
+    pub variance: f64,
 }
 
 impl Flank {
@@ -140,10 +145,12 @@ impl Lines<'_> {
             }
         }
         let noise = scale.noise / scale.cell;
-        let beyond = best(&rings[1], noise).map(|Estimate { terms, .. }| {
-            let normal = (outwards - axes[0] * terms[1] - axes[1] * terms[2]).normalize();
-            Plane { normal, off: -terms[0] * scale.cell * normal.dot(outwards) }
-        });
+        let mut beyond = best(&rings[1], noise).map(|estimate| estimate.plane(axes, scale.cell));
+        // What is seen from afar alone may bend in between.
+        let close: f64 = rings[1][..CLOSE].iter().map(|ring| ring.matrix[0][0]).sum();
+        if let Some(plane) = beyond.as_mut().filter(|_| close < SOME) {
+            plane.variance = f64::INFINITY;
+        }
         let Estimate { mut terms, variance } = best(&rings[0], noise)?;
         let s = scale.cell;
         terms.iter_mut().zip([s, 1.0, 1.0, 1.0 / s, 1.0 / s, 1.0 / s]).for_each(|(c, unit)| *c *= unit);
@@ -219,6 +226,14 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
+    /// The plane beside the vertex.
+    /// * `axes` - of the polynomial; `cell` - its unit of length
+    pub fn plane(&self, axes: [DVec3; 3], cell: f64) -> Plane {
+        let normal = (axes[2] - axes[0] * self.terms[1] - axes[1] * self.terms[2]).normalize();
+        let upright = cell * normal.dot(axes[2]);
+        Plane { normal, off: -self.terms[0] * upright, variance: self.variance[0] * upright * upright }
+    }
+
     /// True if a less precise estimate differs by no more than its noise.
     fn agrees(&self, coarse: &Estimate) -> bool {
         (0..3).all(|k| {

@@ -12,9 +12,11 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// An edge is rounded if the surface stays short of it by so many noise levels, and by such a share of a cell ...
+/// An edge is rounded if the surface stays short of it by so many noise levels, and by such a share of a cell, ...
 const SHORT: f64 = 1.0;
 const COARSE: f64 = 0.1;
+/// ... by so many standard deviations of what its flanks say ...
+const SURE: f64 = 1.0;
 /// ... and goes on to be so where it stays short by this share of that.
 const WEAK: f64 = 0.5;
 /// Half of the vertices of a line within so many cells decide; no shorter piece is other than what is around it.
@@ -33,21 +35,24 @@ pub(super) fn split(
     flanks: &[(u32, Vec<Flank>)],
     scale: &ScanScale,
 ) -> [Vec<[u32; 2]>; 2] {
-    let short: BTreeMap<u32, f64> = flanks.iter().filter_map(|(v, f)| Some((*v, shortfall(lines, f)?))).collect();
+    let short: BTreeMap<u32, (f64, f64)> =
+        flanks.iter().filter_map(|(v, f)| Some((*v, shortfall(lines, f)?))).collect();
     let least = (SHORT * scale.noise).max(COARSE * scale.cell);
-    let half = |v: u32| {
-        let around = lines.around(v, ALONG * scale.cell);
-        let mut known: Vec<f64> = around.iter().filter_map(|v| short.get(v).copied()).collect();
-        known.sort_unstable_by(f64::total_cmp);
-        known[(known.len() - 1) / 2]
+    // 2 if half of the vertices around are short for certain, 1 if they may be.
+    let verdict = |v: u32| {
+        let known: Vec<_> = lines.around(v, ALONG * scale.cell).iter().filter_map(|v| short.get(v)).copied().collect();
+        let half =
+            |is: fn(f64, f64, f64) -> bool| 2 * known.iter().filter(|k| is(k.0, k.1, least)).count() > known.len();
+        if half(|short, deviation, least| short > least && short > SURE * deviation) {
+            2
+        } else {
+            u8::from(half(|short, _, least| short > WEAK * least))
+        }
     };
-    let medians: BTreeMap<u32, f64> = short.keys().map(|&v| (v, half(v))).collect();
-    let is_round = |e: &[u32; 2], least: f64| {
-        let known = || e.iter().filter_map(|v| medians.get(v));
-        known().next().is_some() && known().all(|&short| short > least)
-    };
-    let (weak, mut sharp): (Vec<[u32; 2]>, Vec<[u32; 2]>) = edges.iter().partition(|e| is_round(e, WEAK * least));
-    let is_sure = |piece: &Vec<[u32; 2]>| piece.iter().any(|e| is_round(e, least));
+    let verdicts: BTreeMap<u32, u8> = short.keys().map(|&v| (v, verdict(v))).collect();
+    let of = |e: &[u32; 2]| e.iter().filter_map(|v| verdicts.get(v)).min().copied().unwrap_or(0);
+    let (weak, mut sharp): (Vec<[u32; 2]>, Vec<[u32; 2]>) = edges.iter().partition(|e| of(e) > 0);
+    let is_sure = |piece: &Vec<[u32; 2]>| piece.iter().any(|e| of(e) > 1);
     let (sure, unsure): (Vec<_>, Vec<_>) = pieces(lines.mesh, &weak).into_iter().partition(is_sure);
     let mut round = sure.concat();
     sharp.extend(unsure.concat());
@@ -77,21 +82,24 @@ fn join_short(mesh: &TriMesh, edges: &mut Vec<[u32; 2]>, others: &mut Vec<[u32; 
     others.extend(short.concat());
 }
 
-/// How far a vertex stays short of where its two flanks meet, as told by what is beyond a rounding.
-fn shortfall(lines: &Lines, flanks: &[Flank]) -> Option<f64> {
+/// How far a vertex stays short of where its two flanks meet, as told by what is beyond a rounding, and the standard deviation
+/// of that.
+fn shortfall(lines: &Lines, flanks: &[Flank]) -> Option<(f64, f64)> {
     let [a, b] = flanks else { return None };
     let planes = [a.beyond?, b.beyond?];
     let between = (planes[0].normal + planes[1].normal).try_normalize()?;
-    let way = meet(planes).dot(between);
+    let way = meet(planes.map(|plane| (plane.normal, plane.off))).dot(between);
+    // The planes meet off the vertex along `between` by the sum of their distances over twice the cosine to it.
+    let deviation = (planes[0].variance + planes[1].variance).sqrt() / (2.0 * between.dot(planes[0].normal)).max(0.1);
     let inwards = b.sector.iter().map(|&t| lines.centers[t as usize] - b.at).sum::<DVec3>();
     let is_convex = inwards.dot(planes[0].normal) < 0.0;
-    Some(if is_convex { way } else { -way })
+    Some((if is_convex { way } else { -way }, deviation))
 }
 
-/// Way of a vertex to where the surfaces beside it meet.
-pub(super) fn meet(planes: impl IntoIterator<Item = Plane>) -> DVec3 {
+/// Way of a vertex to where planes beside it meet: each with its unit normal, and how far outside the vertex is.
+pub(super) fn meet(planes: impl IntoIterator<Item = (DVec3, f64)>) -> DVec3 {
     let (mut matrix, mut rhs) = (DMat3::from_diagonal(DVec3::splat(DAMPING)), DVec3::ZERO);
-    for Plane { normal: n, off } in planes {
+    for (n, off) in planes {
         matrix += DMat3::from_cols(n * n.x, n * n.y, n * n.z);
         rhs -= n * off;
     }
@@ -146,7 +154,5 @@ fn surface(lines: &Lines, v: u32, along: DVec3, scale: &ScanScale, seen: &mut Se
         let bell = (1.0 - far).max(0.0).powi(2);
         sums.add(p.x, p.y, p.z, bell * lines.areas[f as usize].length() / (scale.spacing * scale.spacing));
     }
-    let [height, slope_x, slope_y, ..] = sums.fit(6, scale.noise / scale.cell)?.terms;
-    let normal = (outwards - x * slope_x - y * slope_y).normalize();
-    Some(Plane { normal, off: -height * scale.cell * normal.dot(outwards) })
+    Some(sums.fit(6, scale.noise / scale.cell)?.plane([x, y, outwards], scale.cell))
 }
