@@ -47,7 +47,9 @@ const WIDE: f64 = 2.0;
 /// Cosine of 20 degrees: sheets that meet flatter are one, with a bend.
 const TURNED: f64 = 0.94;
 /// Points that must be nearest to a sheet.
-const NEEDED: usize = 3;
+const NEEDED: u32 = 3;
+/// Fits near a point that are asked which of them explains it.
+const RIVALS: usize = 10;
 /// Neighbours asked whether they carry a sheet on, how many must, and how far off they may be over their distance.
 const AROUND: usize = 16;
 const COMPANY: usize = 4;
@@ -142,32 +144,52 @@ pub(super) fn other_sheet(fits: &[Fit], i: usize) -> Option<usize> {
     [i.wrapping_sub(1), i + 1].into_iter().find(|&j| fits.get(j).is_some_and(|g| g.site == fits[i].site))
 }
 
-/// Drops sheets that hardly any point is nearest to.
-fn supported(points: &[DVec3], fits: Vec<Fit>) -> Vec<Fit> {
-    let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
-    let tree = KdTree::new(&centers);
-    let best: Vec<u32> = points
-        .par_iter()
-        .map_init(Default::default, |(near, last), &p| {
-            tree.nearest_after(p, 10, last, near);
-            near.iter()
-                .map(|n| {
-                    let f = &fits[n.1 as usize];
-                    ((f.quadric.distance(p).0 / f.noise.max(1e-300)).powi(2) + 9.0 * n.0 / (f.radius * f.radius), n.1)
-                })
-                .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
-                .map_or(u32::MAX, |b| b.1)
-        })
-        .collect();
-    let mut count = vec![0usize; fits.len()];
-    best.iter().filter(|&&b| b != u32::MAX).for_each(|&b| count[b as usize] += 1);
-    let fits: Vec<Fit> =
-        fits.into_iter().zip(count).filter(|(_, c)| *c >= NEEDED).map(|(f, c)| Fit { owned: c as u32, ..f }).collect();
-    accompanied(fits)
+/// Drops sheets that hardly any point is nearest to, or no neighbour carries on.
+fn supported(points: &[DVec3], mut fits: Vec<Fit>) -> Vec<Fit> {
+    let mut owner = vec![u32::MAX; points.len()];
+    own(points, &mut fits, &mut owner);
+    let kept = |fits: &[Fit]| (0..fits.len()).filter(|&i| fits[i].owned >= NEEDED).collect();
+    keep(kept(&fits), &mut fits, &mut owner);
+    keep(accompanied(&fits), &mut fits, &mut owner);
+    // The points of those that are dropped are still there: without them a surface has less area beside its edges.
+    own(points, &mut fits, &mut owner);
+    // A sheet whose other one is dropped is no side of a plate.
+    for i in 0..fits.len() {
+        if other_sheet(&fits, i).is_none() {
+            fits[i].gap = f64::INFINITY;
+        }
+    }
+    fits
 }
 
-/// Drops sheets that hardly any neighbour carries on: a fit across a crease stands alone, a face does not.
-fn accompanied(fits: Vec<Fit>) -> Vec<Fit> {
+/// Drops all fits but these; their points have none then.
+fn keep(kept: Vec<usize>, fits: &mut Vec<Fit>, owner: &mut [u32]) {
+    let mut place = vec![u32::MAX; fits.len()];
+    kept.iter().enumerate().for_each(|(k, &i)| place[i] = k as u32);
+    owner.iter_mut().filter(|o| **o != u32::MAX).for_each(|o| *o = place[*o as usize]);
+    *fits = kept.into_iter().map(|i| fits[i]).collect();
+}
+
+/// Gives every point that has none the fit that explains it best.
+fn own(points: &[DVec3], fits: &mut [Fit], owner: &mut [u32]) {
+    let tree = KdTree::new(&fits.iter().map(|f| f.center).collect::<Vec<_>>());
+    let all: &[Fit] = fits;
+    let homeless = points.par_iter().zip(&mut *owner).filter(|o| *o.1 == u32::MAX);
+    homeless.for_each_init(Default::default, |(near, last), (&p, own)| {
+        tree.nearest_after(p, RIVALS, last, near);
+        let off = |n: &(f64, u32)| {
+            let f = &all[n.1 as usize];
+            (f.quadric.distance(p).0 / f.noise.max(1e-300)).powi(2) + 9.0 * n.0 / (f.radius * f.radius)
+        };
+        let best = near.iter().map(|n| (off(n), n.1)).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        *own = best.map_or(u32::MAX, |b| b.1);
+    });
+    fits.iter_mut().for_each(|f| f.owned = 0);
+    owner.iter().filter(|&&o| o != u32::MAX).for_each(|&o| fits[o as usize].owned += 1);
+}
+
+/// All but sheets that hardly any neighbour carries on: a fit across a crease stands alone, a face does not.
+fn accompanied(fits: &[Fit]) -> Vec<usize> {
     let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
     let tree = KdTree::new(&centers);
     let company: Vec<usize> = (0..fits.len())
@@ -189,14 +211,7 @@ fn accompanied(fits: Vec<Fit>) -> Vec<Fit> {
                 .count()
         })
         .collect();
-    let mut fits: Vec<Fit> = fits.into_iter().zip(company).filter(|(_, c)| *c >= COMPANY).map(|(f, _)| f).collect();
-    // A sheet whose other one is dropped is no side of a plate.
-    for i in 0..fits.len() {
-        if other_sheet(&fits, i).is_none() {
-            fits[i].gap = f64::INFINITY;
-        }
-    }
-    fits
+    (0..fits.len()).filter(|&i| company[i] >= COMPANY).collect()
 }
 
 fn fit_site(
