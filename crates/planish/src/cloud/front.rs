@@ -464,3 +464,32 @@ fn expected(s: &Sheet, p: DVec3, radius: f64, ball: &Points, noise: f64) -> f64 
     let excess = (between - freedom).max(0.0);
     noise * ((s.parameters + excess) / f64::max(count, 1.0)).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{KdTree, sites};
+    use super::*;
+    use crate::geom::random;
+    use crate::observe::Silent;
+
+    #[test]
+    fn fits_of_a_box_with_noise_own_all_of_its_points_and_have_its_area_within_3_percent() {
+        let noise = 0.004;
+        let place = |i: u64| {
+            let of = |k: u64| random::unit(11, 9 * i + k);
+            let mut p = DVec3::new(of(0), of(1), of(2));
+            p[i as usize % 3] = (i / 3 % 2) as f64;
+            let gauss = |k: u64| random::normal(of(k), of(k + 1));
+            p + noise * DVec3::new(gauss(3), gauss(5), gauss(7))
+        };
+        let points: Vec<DVec3> = (0..30_000).map(place).collect();
+        let tree = KdTree::new(&points);
+        let points: Vec<DVec3> = tree.order().iter().map(|&i| points[i as usize]).collect();
+        let tree = KdTree::new(&points);
+        let sites = sites::choose(&points, &tree, &Silent).unwrap();
+        let fits = grow(&points, &tree, &sites, &Silent).unwrap();
+        assert_eq!(fits.iter().map(|f| f.owned as usize).sum::<usize>(), points.len());
+        let area: f64 = fits.iter().map(|f| f64::from(f.owned) * sites.survey[f.site as usize].spacing.powi(2)).sum();
+        assert!((area / 6.0 - 1.0).abs() < 0.03, "{area}");
+    }
+}
