@@ -327,9 +327,8 @@ fn choose(
     let all: Vec<Seen> =
         asked.iter().map(|a| Seen { residuals: residuals(&a.0), normal: a.0.distance(p).1, price: PRICE }).collect();
     let Some(found) = nest(&all, true, MOST) else { return alone };
-    if found.cost + PRICE * (found.order.len() - 1) as f64
-        > (good + PRICE * (found.order.len() - 1) as f64).min(own_cost + OWN_PRICE)
-    {
+    // Whether sheets fit is a matter of their points alone; what else they cost is the same for all who fit.
+    if found.cost - found.folds > good || found.cost + PRICE * (found.order.len() - 1) as f64 > own_cost + OWN_PRICE {
         return alone;
     }
     // The points nearest to each sheet tell where it begins to grow.
@@ -491,5 +490,40 @@ mod tests {
         assert_eq!(fits.iter().map(|f| f.owned as usize).sum::<usize>(), points.len());
         let area: f64 = fits.iter().map(|f| f64::from(f.owned) * sites.survey[f.site as usize].spacing.powi(2)).sum();
         assert!((area / 6.0 - 1.0).abs() < 0.03, "{area}");
+    }
+
+    #[test]
+    fn points_between_two_fitted_planes_three_and_a_half_noise_levels_apart_take_both() {
+        let noise = 0.01;
+        let plane = |center: DVec3| Fit {
+            quadric: Quadric::plane(center, 1.0, DVec3::Z),
+            center,
+            normal: DVec3::Z,
+            radius: 10.0 * noise,
+            noise,
+            thickness: 1.0,
+            error: 0.1 * noise,
+            irregularity: 0.0,
+            class: 0,
+            site: 0,
+            sheets: 1,
+            gap: f64::INFINITY,
+            owned: 10,
+        };
+        let sides = [1.75 * noise, -1.75 * noise];
+        let fits = sides.map(|z| plane(DVec3::new(0.1, 0.0, z)));
+        let place = |i: u64| {
+            let of = |k: u64| 2.0 * random::unit(13, 4 * i + k) - 1.0;
+            let gauss = random::normal(random::unit(13, 4 * i + 2), random::unit(13, 4 * i + 3));
+            DVec3::new(0.2 * of(0), 0.2 * of(1), sides[i as usize % 2] + noise * gauss)
+        };
+        let points: Vec<DVec3> = (0..2000).map(place).collect();
+        let closed = KdTree::new(&fits.map(|f| f.center));
+        let closed = Closed { fits: &fits, tree: &closed };
+        let own = Quadric::plane(DVec3::ZERO, 1.0, DVec3::Z);
+        let found = choose(&KdTree::new(&points), 10.0 * noise, 10.0 * noise, own, noise, closed, &mut Vec::new());
+        let mut at: Vec<f64> = found.iter().map(|s| s.sheet.distance(DVec3::ZERO).0.abs()).collect();
+        at.retain(|d| (d - sides[0]).abs() < 1e-12);
+        assert_eq!((found.len(), at.len()), (2, 2));
     }
 }

@@ -52,6 +52,8 @@ pub(super) struct Nesting {
     pub concave: u8,
     /// Sum of squared residuals, each at most the square of [`LIMIT`], and of what folds of the surface cost.
     pub cost: f64,
+    /// What folds cost of that.
+    pub folds: f64,
     /// Cost and the prices of its sheets.
     pub total: f64,
 }
@@ -100,8 +102,14 @@ pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
     let alone = |i: usize| nearest_cost(&[&squares[i]], f64::INFINITY);
     let first = (0..asked.len()).map(|i| (alone(i) + asked[i].price, i)).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let price = |order: &[usize]| order.iter().map(|&k| asked[k].price).sum::<f64>();
-    let mut best =
-        Nesting { order: vec![first.1], flipped: 0, concave: 0, cost: first.0 - asked[first.1].price, total: first.0 };
+    let mut best = Nesting {
+        order: vec![first.1],
+        flipped: 0,
+        concave: 0,
+        cost: first.0 - asked[first.1].price,
+        folds: 0.0,
+        total: first.0,
+    };
     let step = asked[0].residuals.len().div_ceil(ENOUGH).max(1);
     let all: Vec<&[f64]> = asked.iter().map(|a| &a.residuals[..]).collect();
     let mut thinned: Vec<Vec<f64>> = vec![Vec::new(); asked.len()];
@@ -154,7 +162,14 @@ pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
                         let least = found.as_ref().map_or(f64::INFINITY, |n| n.cost);
                         let part = nesting_cost(|i| &thinned[i], &order, flipped, concave, least);
                         if part < least {
-                            found = Some(Nesting { order: order.clone(), flipped, concave, cost: part, total: 0.0 });
+                            found = Some(Nesting {
+                                order: order.clone(),
+                                flipped,
+                                concave,
+                                cost: part,
+                                folds: 0.0,
+                                total: 0.0,
+                            });
                         }
                     }
                 }
@@ -168,7 +183,8 @@ pub(super) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
                     normal: asked[i].normal,
                 };
                 let faces: Vec<Face> = found.order.iter().enumerate().map(face).collect();
-                found.cost += folds(&faces, found.concave);
+                found.folds = folds(&faces, found.concave);
+                found.cost += found.folds;
                 found.total = found.cost + priced;
                 if found.total < limit {
                     next = Some(found);
