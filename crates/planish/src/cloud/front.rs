@@ -259,9 +259,7 @@ fn fit_site(
             })
         })
         .collect();
-    if survey.layer.is_some()
-        && let [f, g] = &mut fits[..]
-    {
+    if let [f, g] = &mut fits[..] {
         // The two are a plate or a gap if they still are side by side: each sees the other on the side that it is seen on.
         let ((d, n), (e, m)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
         let turns = [n.dot(g.normal), m.dot(f.normal)];
