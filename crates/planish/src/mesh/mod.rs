@@ -30,7 +30,8 @@ mod trim;
 mod walk;
 
 pub use adjacency::{Adjacency, Fan, NONE, next, previous};
-pub use broken_lines::{bridge_gaps, cut_spikes, mend_lines};
+pub use broken_lines::mend_lines;
+pub(crate) use broken_lines::{bridge_gaps, cut_spikes};
 pub use compare::{CompareError, CompareParams, Comparison, compare};
 pub use decimate::{DecimateError, DecimateParams, DecimateTarget, Decimated, decimate};
 pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
