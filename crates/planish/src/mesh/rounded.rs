@@ -20,7 +20,7 @@ const SURE: f64 = 1.0;
 /// ... and goes on to be so where it stays short by this share of that.
 const WEAK: f64 = 0.5;
 /// Half of the vertices of a line within so many cells decide; no shorter piece is other than what is around it.
-const ALONG: f64 = 4.0;
+const ALONG: f64 = 6.0;
 /// Vertices are made smooth within so many cells of a rounding, as told by what is this far across it and along it.
 const BESIDE: f64 = 2.0;
 const WINDOW: [f64; 2] = [2.0, 6.0];
