@@ -132,7 +132,7 @@ const FIT_SMOOTHING: f64 = 0.05;
 /// Grids of the mesh of a scan have so many points, but at most so many per vertex: beside its sharp edges the surface
 /// is mended within two cells, and what a coarse grid leaves out there is angle of the edge.
 const GRID_POINTS: f64 = 3e5;
-const GRID_DENSITY: f64 = 4.0;
+const GRID_DENSITY: f64 = 6.0;
 
 /// The parameters that suit the mesh of a scan: how fine its grids are, and how closely surfaces are fitted to it.
 pub fn params_for(made: &ScanMeshed) -> PipelineParams {
