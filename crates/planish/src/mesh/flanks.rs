@@ -54,7 +54,7 @@ pub(super) struct Flank {
     terms: [f64; 6],
     /// Variance of the slope across the line.
     pub variance: f64,
-    /// The same, as told by what is beyond [`ROUNDING`] alone; `None` if too little is.
+    /// The surface beside the vertex as told by what is beyond [`ROUNDING`] of lines alone; `None` if too little is.
     pub beyond: Option<Plane>,
     /// Faces around the vertex on this side.
     pub sector: Vec<u32>,
@@ -221,7 +221,7 @@ impl Moments {
 /// A polynomial, and the variances of its height and of its slopes across and along the line.
 #[derive(Clone)]
 pub(super) struct Estimate {
-    pub terms: [f64; 6],
+    terms: [f64; 6],
     variance: [f64; 3],
 }
 
