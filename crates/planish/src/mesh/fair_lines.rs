@@ -53,13 +53,13 @@ pub fn fair_lines(mesh: &mut TriMesh, tags: &mut FeatureTags, scale: &ScanScale)
     let mut lines = Lines::new(mesh, tags);
     let mut flanks = lines.flanks(scale);
     let [sharp, round] = rounded::split(&lines, &tags.edges, &flanks, scale);
-    lines.forget(&round);
-    flanks.retain(|f| lines.on_line[f.0 as usize]);
-    let mut wishes = wishes(&lines, &flanks, scale);
     if !round.is_empty() {
-        wishes.add(mesh, rounded::smoothed(&lines, &round, scale));
         *tags = tags.with_edges(sharp);
+        lines.mark(tags);
+        flanks.retain(|f| lines.on_line[f.0 as usize]);
     }
+    let mut wishes = wishes(&lines, &flanks, scale);
+    wishes.add(mesh, rounded::smoothed(&lines, &round, scale));
     let mut moved = vec![false; mesh.points.len()];
     settle(mesh, &wishes, &mut moved);
     tidy(mesh, tags, &mut wishes);
@@ -82,6 +82,9 @@ struct Wishes {
 impl Wishes {
     /// Adds vertices with their places and normals, ascending, in place of what was wished there.
     fn add(&mut self, mesh: &TriMesh, others: Vec<(u32, Plane)>) {
+        if others.is_empty() {
+            return;
+        }
         let find = |v: u32| others.binary_search_by_key(&v, |o| o.0).ok();
         self.moves.retain(|m| find(m.0).is_none());
         self.moves.extend(others.iter().map(|(v, plane)| (*v, mesh.points[*v as usize] - plane.normal * plane.off)));

@@ -3,7 +3,6 @@
 use super::{Adjacency, FeatureTags, NONE, TriMesh, next};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 
 /// A face that turns away from a normal by more than 60 degrees (cosine) is on another side.
 const FACING: f64 = 0.5;
@@ -41,30 +40,25 @@ impl Seen {
 impl Lines<'_> {
     /// The lines that `tags` mark.
     pub fn new<'a>(mesh: &'a TriMesh, tags: &FeatureTags) -> Lines<'a> {
-        let mut on_line = vec![false; mesh.points.len()];
-        tags.edges.iter().flatten().for_each(|&v| on_line[v as usize] = true);
         let faces = 0..mesh.triangles.len();
         let center = |t: usize| mesh.corners(t).into_iter().sum::<DVec3>() / 3.0;
-        Lines {
+        let mut lines = Lines {
             mesh,
             adjacency: Adjacency::new(mesh),
-            tagged: tags.on(mesh),
-            on_line,
+            tagged: Vec::new(),
+            on_line: Vec::new(),
             centers: faces.clone().into_par_iter().map(center).collect(),
             areas: faces.into_par_iter().map(|t| mesh.area_vector(t)).collect(),
-        }
+        };
+        lines.mark(tags);
+        lines
     }
 
-    /// Makes `edges` no lines.
-    /// * `edges` - the lesser vertex first
-    pub fn forget(&mut self, edges: &[[u32; 2]]) {
-        let gone: BTreeSet<[u32; 2]> = edges.iter().copied().collect();
-        self.on_line.fill(false);
-        for h in 0..self.tagged.len() {
-            let [a, b] = [self.mesh.origin(h as u32), self.mesh.origin(next(h as u32))];
-            self.tagged[h] &= !gone.contains(&[a.min(b), a.max(b)]);
-            [a, b].iter().for_each(|&v| self.on_line[v as usize] |= self.tagged[h]);
-        }
+    /// Makes what `tags` mark the lines.
+    pub fn mark(&mut self, tags: &FeatureTags) {
+        self.tagged = tags.on(self.mesh);
+        self.on_line = vec![false; self.mesh.points.len()];
+        tags.edges.iter().flatten().for_each(|&v| self.on_line[v as usize] = true);
     }
 
     /// The faces around `v` between its lines, sector by sector.

@@ -55,7 +55,7 @@ impl FeatureTags {
     pub(super) fn with_edges(&self, edges: impl IntoIterator<Item = [u32; 2]>) -> FeatureTags {
         let count = self.vertices.len();
         let mut tags = FeatureTags::from_edges(count, edges);
-        // What has two edges and was a corner by more than its number of edges, or has lost some.
+        // What is a corner though two edges meet there.
         let plain = FeatureTags::from_edges(count, self.edges.iter().copied());
         for (v, kind) in tags.vertices.iter_mut().enumerate() {
             let was_corner = self.vertices[v] == FeatureKind::Corner && plain.vertices[v] == FeatureKind::Edge;
