@@ -274,6 +274,10 @@ fn fit_site(
 /// Sheets side by side turn by less than this cosine (30 degrees) from each other: the flanks of a wedge do so, too.
 const SIDE_BY_SIDE: f64 = 0.866;
 
+/// Middles of the points of two sheets are at most this far from each other along them, as a share of the ball, where the
+/// sheets lie above each other. Side by side, halves of a disc have .85.
+const MIXED: f64 = 0.4;
+
 /// The sheets that explain the points around a site, each with the middle of the points that are nearest to it there.
 fn choose(
     tree: &KdTree,
@@ -325,10 +329,6 @@ fn choose(
     let all: Vec<Seen> =
         asked.iter().map(|a| Seen { residuals: residuals(&a.0), normal: a.0.distance(p).1, price: PRICE }).collect();
     let Some(found) = nest(&all, true, MOST) else { return alone };
-    // Whether sheets fit is a matter of their points alone; what else they cost is the same for all who fit.
-    if found.cost - found.folds > good || found.cost + PRICE * (found.order.len() - 1) as f64 > own_cost + OWN_PRICE {
-        return alone;
-    }
     // The points nearest to each sheet tell where it begins to grow.
     let mut middle = vec![(0usize, DVec3::ZERO); found.order.len()];
     for (i, q) in ball.iter().enumerate() {
@@ -341,16 +341,22 @@ fn choose(
             middle[k].1 += q;
         }
     }
+    middle.iter_mut().filter(|m| m.0 > 0).for_each(|m| m.1 /= m.0 as f64);
+    // Points of two sheets that lie above each other are a fold, which is no misfit. Next to each other they are a step.
+    let fold = match found.order[..] {
+        [a, _] => (middle[0].1 - middle[1].1).reject_from(all[a].normal).length() < MIXED * wide,
+        _ => false,
+    };
+    let misfit = found.cost - if fold { found.folds } else { 0.0 };
+    if misfit > good || found.cost + PRICE * (found.order.len() - 1) as f64 > own_cost + OWN_PRICE {
+        return alone;
+    }
     found
         .order
         .iter()
         .zip(&middle)
         .filter(|(_, m)| m.0 > 0)
-        .map(|(&k, m)| Start {
-            sheet: asked[k].0,
-            at: m.1 / m.0 as f64,
-            radius: asked[k].1.min(CARRIED * radius).max(radius),
-        })
+        .map(|(&k, m)| Start { sheet: asked[k].0, at: m.1, radius: asked[k].1.min(CARRIED * radius).max(radius) })
         .collect()
 }
 
@@ -490,8 +496,8 @@ mod tests {
         assert!((area / 6.0 - 1.0).abs() < 0.03, "{area}");
     }
 
-    #[test]
-    fn points_between_two_fitted_planes_three_and_a_half_noise_levels_apart_take_both() {
+    /// How many of two fitted planes 3.5 noise levels apart are chosen for points of which the i-th, at x, is on `side(i, x)`.
+    fn chosen(side: impl Fn(u64, f64) -> usize) -> usize {
         let noise = 0.01;
         let plane = |center: DVec3| Fit {
             quadric: Quadric::plane(center, 1.0, DVec3::Z),
@@ -513,15 +519,25 @@ mod tests {
         let place = |i: u64| {
             let of = |k: u64| 2.0 * random::unit(13, 4 * i + k) - 1.0;
             let gauss = random::normal(random::unit(13, 4 * i + 2), random::unit(13, 4 * i + 3));
-            DVec3::new(0.2 * of(0), 0.2 * of(1), sides[i as usize % 2] + noise * gauss)
+            let x = 0.2 * of(0);
+            DVec3::new(x, 0.2 * of(1), sides[side(i, x)] + noise * gauss)
         };
         let points: Vec<DVec3> = (0..2000).map(place).collect();
         let closed = KdTree::new(&fits.map(|f| f.center));
         let closed = Closed { fits: &fits, tree: &closed };
         let own = Quadric::plane(DVec3::ZERO, 1.0, DVec3::Z);
         let found = choose(&KdTree::new(&points), 10.0 * noise, 10.0 * noise, own, noise, closed, &mut Vec::new());
-        let mut at: Vec<f64> = found.iter().map(|s| s.sheet.distance(DVec3::ZERO).0.abs()).collect();
-        at.retain(|d| (d - sides[0]).abs() < 1e-12);
-        assert_eq!((found.len(), at.len()), (2, 2));
+        let is_fitted = |s: &&Start| (s.sheet.distance(DVec3::ZERO).0.abs() - sides[0]).abs() < 1e-12;
+        found.iter().filter(is_fitted).count()
+    }
+
+    #[test]
+    fn points_of_two_fitted_planes_that_lie_above_each_other_take_both() {
+        assert_eq!(chosen(|i, _| i as usize % 2), 2);
+    }
+
+    #[test]
+    fn the_two_sides_of_a_step_are_no_plate() {
+        assert_eq!(chosen(|_, x| usize::from(x > 0.0)), 0);
     }
 }
