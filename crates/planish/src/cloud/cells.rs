@@ -32,8 +32,10 @@ const FEWEST_OWN: usize = 12;
 /// Rounds of that, and the balls that are tried, over the one that is heard.
 const REFINED: usize = 3;
 const WIDTHS: [f64; 3] = [1.0, 1.5, 2.2];
-/// Passes over all cells: the second chooses among what the first has found.
+/// Passes over all cells: the second chooses among what the first has found, but for cells whose points cost less than this
+/// each, in squared noise levels. They hardly ever find better ones.
 const PASSES: usize = 2;
+const KEPT: f64 = 1.2;
 /// The middle of the points of a cell is at most this many supports from its surface: at a corner of 90 degrees a tenth.
 const AWAY: f64 = 0.25;
 /// Squared bias of a cell in the blend for the cost of its points beyond one.
@@ -129,7 +131,7 @@ pub(super) fn cells(
         let before = &made;
         let fresh = in_pieces(places.len(), (span[0], span[1]), observer, |s, site| {
             let old = &before[site];
-            if old.as_ref().is_some_and(|f| f.plain) {
+            if old.as_ref().is_some_and(|f| f.cost < KEPT) {
                 return old.clone();
             }
             let new = find(&places[site], site as u32, pass > 0, tree, &candidates, &around, &mut s.around);
@@ -222,8 +224,6 @@ struct Found {
     total: f64,
     /// What its points cost on the average, in squared noise levels.
     cost: f64,
-    /// One sheet that explains all.
-    plain: bool,
 }
 
 impl Found {
@@ -278,7 +278,7 @@ fn find(
         let total = cost(&residuals(&c.quadric));
         if c.owner == site && total < PLAIN * count + count.sqrt() {
             let sheets = vec![(c.quadric, c.at, c.error)];
-            return Some(Found { sheets, concave: 0, total, cost: total / count, plain: true });
+            return Some(Found { sheets, concave: 0, total, cost: total / count });
         }
     }
     let mut asked: Vec<&Candidate> = Vec::new();
@@ -361,9 +361,8 @@ fn find(
         let normal = if end.groove { -end.normal } else { end.normal };
         sheets.push((Quadric::plane(end.at, support, normal), end.at, sheets[0].2));
     }
-    let plain = sheets.len() == 1 && spent < PLAIN * count + count.sqrt();
     let total = spent + prices.iter().sum::<f64>();
-    Some(Found { sheets, concave, total, cost: spent / count, plain })
+    Some(Found { sheets, concave, total, cost: spent / count })
 }
 
 /// One sheet of a cell as its points see it.

@@ -100,8 +100,15 @@ pub(super) struct Fit {
     pub owned: u32,
 }
 
-/// Fits all sites. `None` if cancelled.
-pub(super) fn grow(points: &[DVec3], tree: &KdTree, sites: &Sites, observer: &dyn Observer) -> Option<Vec<Fit>> {
+/// Fits sites, leaning on what is fitted already, and adds what it found. `None` if cancelled.
+/// * `open` - the sites, ascending
+pub(super) fn grow(
+    tree: &KdTree,
+    sites: &Sites,
+    open: &[u32],
+    mut closed: Vec<Fit>,
+    observer: &dyn Observer,
+) -> Option<Vec<Fit>> {
     let irregularity: Vec<f64> = sites
         .survey
         .iter()
@@ -112,24 +119,25 @@ pub(super) fn grow(points: &[DVec3], tree: &KdTree, sites: &Sites, observer: &dy
         .collect();
     let mut ranks: Vec<u32> = (0..irregularity.len() as u32).collect();
     ranks.sort_by(|&a, &b| irregularity[a as usize].total_cmp(&irregularity[b as usize]).then(a.cmp(&b)));
-    let mut closed: Vec<Fit> = Vec::new();
-    let mut start = 0;
-    for class in 0..=CLASSES.len() {
-        let end = CLASSES.get(class).map_or(ranks.len(), |q| (q * ranks.len() as f64).round() as usize).max(start);
-        let mut open: Vec<u32> = ranks[start..end].to_vec();
-        open.sort_unstable();
-        let span = [start, end].map(|x| x as f64 / ranks.len().max(1) as f64);
-        start = end;
-        let centers: Vec<DVec3> = closed.iter().map(|f| f.center).collect();
-        let closed_tree = KdTree::new(&centers);
+    let ends = CLASSES.map(|q| (q * ranks.len() as f64).round() as usize);
+    let mut class = vec![0; ranks.len()];
+    for (rank, &site) in ranks.iter().enumerate() {
+        class[site as usize] = ends.iter().filter(|&&end| end <= rank).count() as u8;
+    }
+    let mut done = 0;
+    for now in 0..=CLASSES.len() as u8 {
+        let fresh: Vec<u32> = open.iter().copied().filter(|&site| class[site as usize] == now).collect();
+        let span = [done, done + fresh.len()].map(|x| x as f64 / open.len().max(1) as f64);
+        done += fresh.len();
+        let closed_tree = KdTree::new(&closed.iter().map(|f| f.center).collect::<Vec<_>>());
         let snapshot = Closed { fits: &closed, tree: &closed_tree };
-        let fitted = in_pieces(open.len(), (span[0], span[1]), observer, |s, k| {
-            let site = open[k] as usize;
-            fit_site(tree, sites, site, irregularity[site], class as u8, snapshot, &mut s.around)
+        let fitted = in_pieces(fresh.len(), (span[0], span[1]), observer, |s, k| {
+            let site = fresh[k] as usize;
+            fit_site(tree, sites, site, irregularity[site], now, snapshot, &mut s.around)
         })?;
         closed.extend(fitted.into_iter().flatten());
     }
-    Some(supported(points, closed))
+    Some(closed)
 }
 
 /// What is fitted already.
@@ -144,8 +152,8 @@ pub(super) fn other_sheet(fits: &[Fit], i: usize) -> Option<usize> {
     [i.wrapping_sub(1), i + 1].into_iter().find(|&j| fits.get(j).is_some_and(|g| g.site == fits[i].site))
 }
 
-/// Drops sheets that hardly any point is nearest to, or no neighbour carries on.
-fn supported(points: &[DVec3], mut fits: Vec<Fit>) -> Vec<Fit> {
+/// All but sheets that hardly any point is nearest to, or no neighbour carries on, each with the points that it owns.
+pub(super) fn supported(points: &[DVec3], mut fits: Vec<Fit>) -> Vec<Fit> {
     let mut owner = vec![u32::MAX; points.len()];
     own(points, &mut fits, &mut owner);
     let kept = |fits: &[Fit]| (0..fits.len()).filter(|&i| fits[i].owned >= NEEDED).collect();
@@ -490,7 +498,8 @@ mod tests {
         let points: Vec<DVec3> = tree.order().iter().map(|&i| points[i as usize]).collect();
         let tree = KdTree::new(&points);
         let sites = sites::choose(&points, &tree, &Silent).unwrap();
-        let fits = grow(&points, &tree, &sites, &Silent).unwrap();
+        let open: Vec<u32> = (0..sites.point.len() as u32).collect();
+        let fits = supported(&points, grow(&tree, &sites, &open, Vec::new(), &Silent).unwrap());
         assert_eq!(fits.iter().map(|f| f.owned as usize).sum::<usize>(), points.len());
         let area: f64 = fits.iter().map(|f| f64::from(f.owned) * sites.survey[f.site as usize].spacing.powi(2)).sum();
         assert!((area / 6.0 - 1.0).abs() < 0.03, "{area}");

@@ -229,9 +229,13 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
     if sites.point.is_empty() {
         return Err(CloudError::NoSurface { points: points.len() });
     }
+    let mut open: Vec<u32> = (0..sites.point.len() as u32).collect();
+    let mut grown = Vec::new();
     let mut round = 0;
     let (fits, areas, oriented) = loop {
-        let fits = front::grow(&points, &tree, &sites, &part(0.45, 0.85)).ok_or(CloudError::Cancelled)?;
+        let [from, to] = if round == 0 { [0.45, 0.85] } else { [0.85, 0.9] };
+        grown = front::grow(&tree, &sites, &open, grown, &part(from, to)).ok_or(CloudError::Cancelled)?;
+        let fits = front::supported(&points, grown.clone());
         if fits.is_empty() {
             return Err(CloudError::NoSurface { points: points.len() });
         }
@@ -250,6 +254,9 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
         }
         round += 1;
         sites.join(&tree, &twice);
+        open = twice.iter().map(|t| t.0).collect();
+        open.sort_unstable();
+        grown.retain(|f: &front::Fit| open.binary_search(&f.site).is_err());
     };
     let mut samples: Vec<Sample> = fits
         .iter()
