@@ -1,6 +1,7 @@
 //! Triangle meshes: flat arrays, adjacency, places on the surface.
 
 mod adjacency;
+mod bent;
 mod broken_lines;
 pub mod compare;
 pub mod decimate;
@@ -30,6 +31,7 @@ mod trim;
 mod walk;
 
 pub use adjacency::{Adjacency, Fan, NONE, next, previous};
+pub(crate) use bent::split_bent;
 pub use broken_lines::mend_lines;
 pub(crate) use broken_lines::{bridge_gaps, cut_spikes};
 pub use compare::{CompareError, CompareParams, Comparison, compare};

@@ -109,6 +109,7 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
     let cell = meshed.lattice.step.x;
     mesh::mend_lines(mesh, tags);
     mesh::fair_lines(mesh, tags, &ScanScale { noise: samples.noise, spacing: samples.spacing, cell });
+    mesh::split_bent(mesh, tags, BENT * fit_tolerance(&samples) * samples.diagonal);
     tags.mark(mesh);
     let mut reached = reach(scan, &meshed.extracted.mesh);
     let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags, &reached);
@@ -125,6 +126,8 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
 /// A surface fitted to a scan follows its mesh to this share of the noise, within these shares of the diagonal.
 const FIT_NOISE: f64 = 0.5;
 const FIT_CLOSEST: f64 = 2e-4;
+/// Edges of the mesh of a scan that pass more than this share of that beside the surface are split.
+const BENT: f64 = 0.1;
 /// Smoothing at noise of a thousandth of the diagonal; it goes with the square of the noise, as in Wiener's filter. Less leaves
 /// the noise beside sharp edges, more flattens what bends there.
 const FIT_SMOOTHING: f64 = 0.05;
@@ -134,12 +137,17 @@ const FIT_SMOOTHING: f64 = 0.05;
 const GRID_POINTS: f64 = 3e5;
 const GRID_DENSITY: f64 = 6.0;
 
+/// How closely a surface is fitted to a scan, as a share of the diagonal.
+fn fit_tolerance(samples: &Samples) -> f64 {
+    (FIT_NOISE * samples.noise / samples.diagonal).max(FIT_CLOSEST)
+}
+
 /// The parameters that suit the mesh of a scan: how fine its grids are, and how closely surfaces are fitted to it.
 pub fn params_for(made: &ScanMeshed) -> PipelineParams {
     let usual = PipelineParams::default();
     let noise = made.samples.noise / made.samples.diagonal;
     let resolution = match usual.fit.resolution {
-        Resolution::Tolerance(most) => Resolution::Tolerance((FIT_NOISE * noise).max(FIT_CLOSEST).min(most)),
+        Resolution::Tolerance(most) => Resolution::Tolerance(fit_tolerance(&made.samples).min(most)),
         other => other,
     };
     let smoothing = (FIT_SMOOTHING * (noise / 1e-3).powi(2)).clamp(usual.fit.smoothing, 1.0);
