@@ -77,16 +77,21 @@ fn lesser_first((a, b): (u32, u32)) -> (u32, u32) {
 fn bends(mesh: &TriMesh, tags: &FeatureTags, least: f64) -> Vec<Split> {
     let lines = Lines::new(mesh, tags);
     let on = tags.on(mesh);
-    // The normal at every corner: that of the faces around it up to lines.
-    let mut normals = vec![DVec3::ZERO; 3 * mesh.triangles.len()];
-    for v in (0..mesh.points.len() as u32).filter(|&v| lines.adjacency.outgoing[v as usize] != super::NONE) {
-        for sector in lines.sectors(v) {
-            let corners = sector.iter().flat_map(|&t| 3 * t..3 * t + 3).filter(|&h| mesh.origin(h) == v);
-            let corners: Vec<u32> = corners.collect();
-            let normal = corners.iter().map(|&h| corner_angle(mesh, h) * mesh.normal(h as usize / 3)).sum::<DVec3>();
-            corners.iter().for_each(|&h| normals[h as usize] = normal.normalize_or_zero());
+    let sum = |corners: &mut dyn Iterator<Item = u32>| -> DVec3 {
+        let all = corners.map(|h| corner_angle(mesh, h) * lines.areas[h as usize / 3].normalize_or_zero());
+        all.sum::<DVec3>().normalize_or_zero()
+    };
+    // Normals of vertices, and on lines those of their sectors.
+    let whole = |v: u32| if lines.on_line[v as usize] { DVec3::ZERO } else { sum(&mut lines.adjacency.fan(v)) };
+    let normals: Vec<DVec3> = (0..mesh.points.len() as u32).into_par_iter().map(whole).collect();
+    let normal = |h: u32| {
+        let v = mesh.origin(h);
+        if !lines.on_line[v as usize] {
+            return normals[v as usize];
         }
-    }
+        let own = lines.sectors(v).into_iter().find(|sector| sector.contains(&(h / 3))).unwrap_or_default();
+        sum(&mut lines.adjacency.fan(v).filter(|g| own.contains(&(g / 3))))
+    };
     // The tangent of every line at its vertices.
     let mut along: Vec<Vec<u32>> = vec![Vec::new(); mesh.points.len()];
     for e in &tags.edges {
@@ -113,7 +118,7 @@ fn bends(mesh: &TriMesh, tags: &FeatureTags, least: f64) -> Vec<Split> {
         let aside = if on[h as usize] {
             [a, b].map(tangent).map(|t| if t == DVec3::ZERO { t } else { e - t * e.dot(t) })
         } else {
-            [h, next(h)].map(|h| normals[h as usize]).map(|n| n * e.dot(n))
+            [h, next(h)].map(normal).map(|n| n * e.dot(n))
         };
         let way = (aside[1] - aside[0]) / 8.0;
         let is_bent = way.length() >= least.max(BENT * e.length());
