@@ -380,6 +380,25 @@ fn an_open_sheet_ends_within_four_spacings_of_its_points_and_large_holes_stay() 
     assert!(found > area && found < area + rims * 2.5 / 48_000f64.sqrt(), "{found} for {area}");
 }
 
+#[test]
+fn a_step_whose_wall_has_no_points_is_upright_within_eight_noise_levels() {
+    let (noise, deep) = (1e-3, 0.03);
+    let place = |i: u64| {
+        let r = |k: u64| 2.0 * random::unit(21, 2 * i + k) - 1.0;
+        let p = DVec3::new(r(0), r(1), if r(0) > 0.0 { -deep } else { 0.0 });
+        p + noise * DVec3::from_array([0, 1, 2].map(|k| normal(22, 3 * i + k)))
+    };
+    let samples = clean((0..20_000).map(place).collect());
+    let field = SampleField::new(&samples, false);
+    let side = |x: f64| {
+        let values = (-80..=80).map(|k| field.value(DVec3::new(x, 0.01 * f64::from(k), -deep / 2.0)));
+        values.filter(|value| value.signum() == x.signum()).count()
+    };
+    // Inside below the higher sheet, outside above the lower one.
+    let [inside, outside] = [-8.0 * noise, 8.0 * noise].map(side);
+    assert!(inside.min(outside) >= 157, "{inside} and {outside} of 161");
+}
+
 /// The mesh of a scan with default parameters.
 fn meshed(points: Vec<DVec3>, close: Option<bool>) -> TriMesh {
     scanned(points, close).meshed.extracted.mesh

@@ -7,11 +7,12 @@
 use super::blend::Reach;
 use super::fit::{Ball, sheet};
 use super::front::{PRICE, VARIATION_PRICE};
-use super::joints::decided_cost;
+use super::joints::{capped, decided_cost, nearest_cost};
 use super::nest::{self, Face, LIMIT, Seen, cost, nest};
 use super::points::Points;
 use super::rim::rim;
 use super::sites::{Sites, in_pieces};
+use super::step::step;
 use super::{Blend, Quadric, Sample};
 use crate::geom::{Aabb, KdTree};
 use crate::observe::Observer;
@@ -49,6 +50,10 @@ const ASKED: usize = 16;
 /// A cell with one sheet is taken as it is if its points cost at most this much each, in squared noise levels, and what
 /// chance adds.
 const PLAIN: f64 = 1.05;
+/// Steps are looked for where points cost more than this each, in squared noise levels.
+const UNEXPLAINED: f64 = 1.3;
+/// A higher sheet, the wall joined by the maximum, the lower one by the minimum.
+const WALLED: u8 = 0b100;
 /// Of one sheet if the normals differ by less than this cosine (8 degrees) and the offsets by less than so many levels.
 const SAME_TURN: f64 = 0.99;
 const SAME_LEVEL: f64 = 0.7;
@@ -215,6 +220,12 @@ struct Candidate {
     owner: u32,
 }
 
+impl Candidate {
+    fn sheet(&self) -> Sheet {
+        (self.quadric, self.at, self.error)
+    }
+}
+
 /// What a cell takes.
 #[derive(Clone)]
 struct Found {
@@ -307,17 +318,13 @@ fn find(
         })
         .collect();
     let found = nest(&all, false, MOST)?;
-    let mut sheets: Vec<Sheet> = found.order.iter().map(|&k| (asked[k].quadric, asked[k].at, asked[k].error)).collect();
+    let mut sheets: Vec<Sheet> = found.order.iter().map(|&k| asked[k].sheet()).collect();
     let mut prices: Vec<f64> = found.order.iter().map(|&k| all[k].price).collect();
     let mut concave = found.concave;
     let mut spent = found.cost;
     // Every point tells of the sheet that decides at it, and of no other. The wider the ball the less chance has a say, as
     // long as the points around the site agree: Akaike's criterion, here with points of which some are not asked.
-    let look = |s: &Sheet| Spread {
-        residuals: residuals(&s.0),
-        normal: s.0.distance(center).1,
-        luck: 2.0 * (s.2 / noise).powi(2),
-    };
+    let look = |s: &Sheet| Spread::of(s, place, &ball);
     // What the site has found before is refined already.
     let known = again && found.order.iter().all(|&k| asked[k].owner == site);
     let rounds = if sheets.len() > 1 && !known { REFINED } else { 0 };
@@ -361,8 +368,45 @@ fn find(
         let normal = if end.groove { -end.normal } else { end.normal };
         sheets.push((Quadric::plane(end.at, support, normal), end.at, sheets[0].2));
     }
-    let total = spent + prices.iter().sum::<f64>();
+    let mut total = spent + prices.iter().sum::<f64>();
+    if spent > UNEXPLAINED * count
+        && let Some(found) = stepped(&asked, &all, place, &ball, total)
+    {
+        (sheets, concave, spent, total) = found;
+    }
     Some(Found { sheets, concave, total, cost: spent / count })
+}
+
+/// A step that explains the points for less than `most`, prices included: its sheets, how they are joined, cost, and cost with
+/// prices.
+fn stepped(
+    asked: &[&Candidate],
+    seen: &[Seen],
+    place: &Place,
+    ball: &Points,
+    most: f64,
+) -> Option<(Vec<Sheet>, u8, f64, f64)> {
+    let squares: Vec<Vec<f64>> = seen.iter().map(|s| capped(&s.residuals)).collect();
+    let (mut best, mut least) = (None, most);
+    for (i, j) in (1..asked.len()).flat_map(|j| (0..j).map(move |i| (i, j))) {
+        let price = seen[i].price + seen[j].price + PRICE;
+        // Hardly a point is explained by the wall alone.
+        if nearest_cost(&[&squares[i], &squares[j]], least - price) + price >= least {
+            continue;
+        }
+        let pair = [i, j].map(|k| (&asked[k].quadric, &seen[k]));
+        let Some(step) = step(pair, ball, place.center, HEARD * place.support, place.noise) else { continue };
+        let [higher, lower] = if step.higher == 0 { [i, j] } else { [j, i] }.map(|k| asked[k].sheet());
+        let wall = (Quadric::plane(step.at, place.support, step.normal), step.at, higher.2.max(lower.2));
+        let sheets = vec![higher, wall, lower];
+        let spreads: Vec<Spread> = sheets.iter().map(|s| Spread::of(s, place, ball)).collect();
+        let cost = spread(&spreads.iter().collect::<Vec<_>>(), WALLED).0;
+        if cost + price < least {
+            least = cost + price;
+            best = Some((sheets, WALLED, cost, least));
+        }
+    }
+    best
 }
 
 /// One sheet of a cell as its points see it.
@@ -372,6 +416,16 @@ struct Spread {
     normal: DVec3,
     /// Twice the variance of the fit, in squared noise levels.
     luck: f64,
+}
+
+impl Spread {
+    fn of(sheet: &Sheet, place: &Place, ball: &Points) -> Spread {
+        Spread {
+            residuals: ball.levels(&sheet.0, place.noise),
+            normal: sheet.0.distance(place.center).1,
+            luck: 2.0 * (sheet.2 / place.noise).powi(2),
+        }
+    }
 }
 
 /// What the points cost with a nesting, alone and with what each owes to chance.

@@ -30,6 +30,7 @@ mod rim;
 mod scanner;
 mod segments;
 mod sites;
+mod step;
 mod strays;
 mod survey;
 mod views;
