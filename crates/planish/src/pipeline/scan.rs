@@ -127,7 +127,7 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
 const FIT_NOISE: f64 = 0.5;
 const FIT_CLOSEST: f64 = 2e-4;
 /// Edges of the mesh of a scan that pass more than this share of that beside the surface are split.
-const BENT: f64 = 0.1;
+const BENT: f64 = 0.2;
 /// Smoothing at noise of a thousandth of the diagonal; it goes with the square of the noise, as in Wiener's filter. Less leaves
 /// the noise beside sharp edges, more flattens what bends there.
 const FIT_SMOOTHING: f64 = 0.05;
