@@ -2,7 +2,8 @@
 //!
 //! Every site asks which nested maxima and minima (`nest`) of the oriented samples around explain its points. The blend of
 //! these functions keeps edges sharp, and where one site errs its neighbours outvote it. A plate ends where its points do
-//! (`rim`), and a cell that faces the wrong way beside cells of several sheets is left hardly a say.
+//! (`rim`), a step has a wall where they change over (`step`), and a cell that faces the wrong way beside cells of several
+//! sheets is left hardly a say.
 
 use super::blend::Reach;
 use super::fit::{Ball, sheet};
