@@ -73,9 +73,9 @@ pub(super) fn step(
         let w = angle.cos() * u + angle.sin() * v;
         let mut along = [0, 1].map(|k| own[k].iter().map(|p| w.dot(*p)).collect::<Vec<f64>>());
         along.iter_mut().for_each(|x| x.sort_unstable_by(f64::total_cmp));
-        let [last, first] = [along[0].len() - 1, 0].map(|k| k as f64);
+        let last = (along[0].len() - 1) as f64;
         let [s, t] = [0, 1].map(|k| ASTRAY * along[k].len() as f64);
-        let at = (along[0][(last - s) as usize] + along[1][(first + t) as usize]) / 2.0;
+        let at = (along[0][(last - s) as usize] + along[1][t as usize]) / 2.0;
         let beyond = along[0].iter().filter(|x| **x > at).count() + along[1].iter().filter(|x| **x < at).count();
         (beyond, at, w)
     };

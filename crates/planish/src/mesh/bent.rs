@@ -76,7 +76,6 @@ fn lesser_first((a, b): (u32, u32)) -> (u32, u32) {
 /// The edges that pass `least` or more beside the surface, ascending by their ends.
 fn bends(mesh: &TriMesh, tags: &FeatureTags, least: f64) -> Vec<Split> {
     let lines = Lines::new(mesh, tags);
-    let on = tags.on(mesh);
     let sum = |corners: &mut dyn Iterator<Item = u32>| -> DVec3 {
         let all = corners.map(|h| corner_angle(mesh, h) * lines.areas[h as usize / 3].normalize_or_zero());
         all.sum::<DVec3>().normalize_or_zero()
@@ -115,7 +114,7 @@ fn bends(mesh: &TriMesh, tags: &FeatureTags, least: f64) -> Vec<Split> {
         }
         let [p, q] = [a, b].map(|v| mesh.points[v as usize]);
         let e = q - p;
-        let aside = if on[h as usize] {
+        let aside = if lines.tagged[h as usize] {
             [a, b].map(tangent).map(|t| if t == DVec3::ZERO { t } else { e - t * e.dot(t) })
         } else {
             [h, next(h)].map(normal).map(|n| n * e.dot(n))

@@ -12,7 +12,7 @@ pub(super) struct Lines<'a> {
     pub mesh: &'a TriMesh,
     pub adjacency: Adjacency,
     /// Half-edges on lines.
-    tagged: Vec<bool>,
+    pub tagged: Vec<bool>,
     /// Vertices on lines.
     pub on_line: Vec<bool>,
     /// Middles of the faces.
