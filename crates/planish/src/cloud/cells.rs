@@ -6,14 +6,14 @@
 //! sheets is left hardly a say.
 
 use super::blend::Reach;
-use super::fit::{Ball, sheet};
 use super::front::{PRICE, VARIATION_PRICE};
-use super::joints::{capped, decided_cost, nearest_cost};
-use super::nest::{self, Face, LIMIT, Seen, cost, nest};
+use super::joints::{capped, nearest_cost};
+use super::nest::{self, LIMIT, Seen, cost, nest};
 use super::points::Points;
+use super::refine::{Nested, WIDEST, explained};
 use super::rim::rim;
 use super::sites::{Sites, in_pieces};
-use super::step::step;
+use super::step::{is_alike, step};
 use super::{Blend, Quadric, Sample};
 use crate::geom::{Aabb, KdTree};
 use crate::observe::Observer;
@@ -29,11 +29,6 @@ const BLENDED: f64 = 1.2;
 const MOST: usize = nest::MOST;
 /// Samples within this many supports are candidates.
 const ASIDE: f64 = 2.0;
-/// A sheet is fitted again to at least this many points of its own: twice the parameters of a height field.
-const FEWEST_OWN: usize = 12;
-/// Rounds of that, and the balls that are tried, over the one that is heard.
-const REFINED: usize = 3;
-const WIDTHS: [f64; 3] = [1.0, 1.5, 2.2];
 /// Passes over all cells: the second chooses among what the first has found, but for cells whose points cost less than this
 /// each, in squared noise levels. They hardly ever find better ones.
 const PASSES: usize = 2;
@@ -204,14 +199,14 @@ fn outvoted(cells: Vec<Cell>, noise: &[f64]) -> Vec<Cell> {
 }
 
 /// Where a cell is.
-struct Place {
-    center: DVec3,
-    support: f64,
-    noise: f64,
+pub(super) struct Place {
+    pub center: DVec3,
+    pub support: f64,
+    pub noise: f64,
 }
 
 /// A sheet of a cell: quadric, middle of its points and expected error.
-type Sheet = (Quadric, DVec3, f64);
+pub(super) type Sheet = (Quadric, DVec3, f64);
 
 /// A sheet that a cell may take.
 struct Candidate {
@@ -319,47 +314,19 @@ fn find(
         })
         .collect();
     let found = nest(&all, false, MOST)?;
-    let mut sheets: Vec<Sheet> = found.order.iter().map(|&k| asked[k].sheet()).collect();
-    let mut prices: Vec<f64> = found.order.iter().map(|&k| all[k].price).collect();
-    let mut concave = found.concave;
-    let mut spent = found.cost;
-    // Every point tells of the sheet that decides at it, and of no other. The wider the ball the less chance has a say, as
-    // long as the points around the site agree: Akaike's criterion, here with points of which some are not asked.
-    let look = |s: &Sheet| Spread::of(s, place, &ball);
+    let mut nested = Nested {
+        sheets: found.order.iter().map(|&k| asked[k].sheet()).collect(),
+        prices: found.order.iter().map(|&k| all[k].price).collect(),
+        concave: found.concave,
+        cost: found.cost,
+    };
     // What the site has found before is refined already.
     let known = again && found.order.iter().all(|&k| asked[k].owner == site);
-    let rounds = if sheets.len() > 1 && !known { REFINED } else { 0 };
-    let mut worth = spread(&sheets.iter().map(look).collect::<Vec<_>>().iter().collect::<Vec<_>>(), concave).1;
-    let mut widths = WIDTHS.to_vec();
-    let widest = WIDTHS.into_iter().fold(0.0, f64::max) * HEARD * support;
-    let wide = if rounds > 0 { around_place(center, widest, PLENTY, tree, scratch) } else { Points::default() };
-    for _ in 0..rounds {
-        let owned = owned(&sheets, concave, noise, &wide);
-        let tried = widths.iter().map(|width| {
-            let better = refined(&sheets, place, width * HEARD * support, &wide, &owned);
-            let seen: Vec<Spread> = better.iter().map(look).collect();
-            let (cost, worth) = spread(&seen.iter().collect::<Vec<_>>(), concave);
-            (better, cost, worth, *width, seen)
-        });
-        let Some(best) = tried.min_by(|a, b| a.2.total_cmp(&b.2)).filter(|b| b.2 < worth) else { break };
-        (sheets, spent, worth) = (best.0, best.1, best.2);
-        widths = vec![best.3];
-        let mut seen = best.4;
-        // What better sheets leave nothing to explain for goes: it may lie on another one, turned over.
-        while sheets.len() > 1 {
-            let fewer = (0..sheets.len()).map(|k| {
-                let rest: Vec<&Spread> = (0..seen.len()).filter(|&i| i != k).map(|i| &seen[i]).collect();
-                let (cost, worth) = spread(&rest, without(concave, k));
-                (k, cost, worth)
-            });
-            let least = fewer.min_by(|a, b| (a.2 - prices[a.0]).total_cmp(&(b.2 - prices[b.0])));
-            let Some((k, cost, rest)) = least.filter(|l| l.2 - prices[l.0] < worth) else { break };
-            (concave, spent, worth) = (without(concave, k), cost, rest);
-            prices.remove(k);
-            sheets.remove(k);
-            seen.remove(k);
-        }
+    if nested.sheets.len() > 1 && !known {
+        let wide = around_place(center, WIDEST * HEARD * support, PLENTY, tree, scratch);
+        nested.refine(place, HEARD * support, &ball, wide);
     }
+    let Nested { mut sheets, prices, mut concave, cost: mut spent } = nested;
     // A plate ends where its points do: no sheet says so, if it is as thin as the noise.
     let found = sheets.len();
     while found > 1 && sheets.len() < MOST {
@@ -390,6 +357,9 @@ fn stepped(
     let squares: Vec<Vec<f64>> = seen.iter().map(|s| capped(&s.residuals)).collect();
     let (mut best, mut least) = (None, most);
     for (i, j) in (1..asked.len()).flat_map(|j| (0..j).map(move |i| (i, j))) {
+        if !is_alike([i, j].map(|k| seen[k].normal)) {
+            continue;
+        }
         let price = seen[i].price + seen[j].price + PRICE;
         // Hardly a point is explained by the wall alone.
         if nearest_cost(&[&squares[i], &squares[j]], least - price) + price >= least {
@@ -400,49 +370,13 @@ fn stepped(
         let [higher, lower] = if step.higher == 0 { [i, j] } else { [j, i] }.map(|k| asked[k].sheet());
         let wall = (Quadric::plane(step.at, place.support, step.normal), step.at, higher.2.max(lower.2));
         let sheets = vec![higher, wall, lower];
-        let spreads: Vec<Spread> = sheets.iter().map(|s| Spread::of(s, place, ball)).collect();
-        let cost = spread(&spreads.iter().collect::<Vec<_>>(), WALLED).0;
+        let cost = explained(&sheets, WALLED, place, ball);
         if cost + price < least {
             least = cost + price;
             best = Some((sheets, WALLED, cost, least));
         }
     }
     best
-}
-
-/// One sheet of a cell as its points see it.
-struct Spread {
-    /// Signed distances, in noise levels.
-    residuals: Vec<f64>,
-    normal: DVec3,
-    /// Twice the variance of the fit, in squared noise levels.
-    luck: f64,
-}
-
-impl Spread {
-    fn of(sheet: &Sheet, place: &Place, ball: &Points) -> Spread {
-        Spread {
-            residuals: ball.levels(&sheet.0, place.noise),
-            normal: sheet.0.distance(place.center).1,
-            luck: 2.0 * (sheet.2 / place.noise).powi(2),
-        }
-    }
-}
-
-/// What the points cost with a nesting, alone and with what each owes to chance.
-fn spread(sheets: &[&Spread], concave: u8) -> (f64, f64) {
-    let faces: Vec<Face> =
-        sheets.iter().map(|s| Face { residuals: &s.residuals, sign: 1.0, normal: s.normal }).collect();
-    let rows: Vec<(&[f64], f64)> = sheets.iter().map(|s| (&s.residuals[..], s.luck)).collect();
-    let (cost, lucky) = decided_cost(&rows, concave);
-    let cost = nest::folds(&faces, concave) + cost;
-    (cost, cost + lucky)
-}
-
-/// How the other sheets of a nesting are joined without its sheet `k`.
-fn without(concave: u8, k: usize) -> u8 {
-    let below = concave & ((1 << k) - 1);
-    (below | (concave >> (k + 1)) << k) & !1
 }
 
 /// The sheet that decides at a point and its signed distance.
@@ -456,53 +390,4 @@ fn around_place(center: DVec3, radius: f64, enough: usize, tree: &KdTree, near: 
     tree.within(center, radius, |_, q, _| near.push(q));
     let step = near.len().div_ceil(enough).max(1);
     Points::every(near, step)
-}
-
-/// For each point the sheet that decides there, `u8::MAX` if the point does not lie on the nesting.
-fn owned(sheets: &[Sheet], concave: u8, noise: f64, points: &Points) -> Vec<u8> {
-    let (mut value, mut next) = (Vec::new(), Vec::new());
-    points.distances(&sheets[0].0, &mut value);
-    let mut owner = vec![0; value.len()];
-    for (k, sheet) in sheets.iter().enumerate().skip(1) {
-        points.distances(&sheet.0, &mut next);
-        let least = concave >> k & 1 == 1;
-        for ((v, o), &n) in value.iter_mut().zip(&mut owner).zip(&next) {
-            if (n < *v) == least {
-                (*v, *o) = (n, k as u8);
-            }
-        }
-    }
-    owner.iter_mut().zip(&value).filter(|(_, v)| v.abs() >= LIMIT * noise).for_each(|(o, _)| *o = u8::MAX);
-    owner
-}
-
-/// Every sheet fitted again to those of its points that lie in a ball.
-fn refined(sheets: &[Sheet], place: &Place, radius: f64, points: &Points, owner: &[u8]) -> Vec<Sheet> {
-    let inverse = 1.0 / radius;
-    let mut parts: Vec<Points> =
-        (0..sheets.len()).map(|k| Points::with_capacity(owner.iter().filter(|&&o| o as usize == k).count())).collect();
-    for (q, &k) in points.iter().zip(owner).filter(|o| *o.1 != u8::MAX) {
-        let y = (q - place.center) * inverse;
-        if y.length_squared() <= 1.0 {
-            parts[k as usize].push(y);
-        }
-    }
-    sheets
-        .iter()
-        .zip(&parts)
-        .map(|(old, own)| {
-            if own.len() < FEWEST_OWN {
-                return *old;
-            }
-            let ones = vec![1.0; own.len()];
-            let noise = place.noise / radius;
-            let ball = Ball { center: place.center, scale: radius, points: own, weights: &ones, guides: &[], noise };
-            let Some(found) = sheet(&ball, &old.0, 1) else { return *old };
-            let middle = place.center + radius * own.iter().sum::<DVec3>() / own.len() as f64;
-            let foot = found.quadric.project(middle).0;
-            let fresh = found.quadric.normalized_at(foot);
-            let fresh = if fresh.distance(foot).1.dot(old.0.distance(foot).1) > 0.0 { fresh } else { fresh.flipped() };
-            (fresh, foot, place.noise * (found.parameters / own.len() as f64).sqrt())
-        })
-        .collect()
 }

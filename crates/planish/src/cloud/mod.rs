@@ -12,6 +12,7 @@
 
 mod blend;
 mod cells;
+mod chance;
 mod dense;
 mod dipoles;
 mod fit;
@@ -26,6 +27,7 @@ mod orient;
 mod points;
 mod project;
 mod quadric;
+mod refine;
 mod rim;
 mod scanner;
 mod segments;

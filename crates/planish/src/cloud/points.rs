@@ -106,16 +106,19 @@ impl Points {
 
     /// First-order signed distance of every point to a quadric, as [`Quadric::distance`], in the units of the points.
     pub(super) fn distances(&self, q: &Quadric, out: &mut Vec<f64>) {
-        out.resize(self.len(), 0.0);
-        Arch::new().dispatch(Distances { at: self.columns(), q, out });
+        self.distances_in(1.0, q, out);
     }
 
     /// These distances over a noise level.
     pub(super) fn levels(&self, q: &Quadric, noise: f64) -> Vec<f64> {
         let mut levels = Vec::new();
-        self.distances(q, &mut levels);
-        levels.iter_mut().for_each(|r| *r /= noise);
+        self.distances_in(noise, q, &mut levels);
         levels
+    }
+
+    fn distances_in(&self, unit: f64, q: &Quadric, out: &mut Vec<f64>) {
+        out.resize(self.len(), 0.0);
+        Arch::new().dispatch(Distances { at: self.columns(), q, unit, out });
     }
 
     /// Weighted sums of the monomials.
@@ -165,6 +168,7 @@ pub(super) fn lanes(row: &[f64], first: usize) -> [f64; LANES] {
 struct Distances<'a> {
     at: [&'a [f64]; 3],
     q: &'a Quadric,
+    unit: f64,
     out: &'a mut [f64],
 }
 
@@ -173,7 +177,7 @@ impl WithSimd for Distances<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let (n, out) = (self.out.len(), self.out);
+        let (n, unit, out) = (self.out.len(), self.unit, self.out);
         let [x, y, z] = self.at.map(|c| &c[..n]);
         let (a, c, scale, inverse) = (self.q.a, self.q.center, self.q.scale, 1.0 / self.q.scale);
         if a[..6] == [0.0; 6] {
@@ -183,7 +187,7 @@ impl WithSimd for Distances<'_> {
             for i in 0..n {
                 let (x, y, z) = ((x[i] - c.x) * inverse, (y[i] - c.y) * inverse, (z[i] - c.z) * inverse);
                 let d = scale * (a[6] * x + a[7] * y + a[8] * z + a[9]) / length;
-                out[i] = if square > 0.0 { d } else { f64::INFINITY };
+                out[i] = if square > 0.0 { d / unit } else { f64::INFINITY };
             }
             return;
         }
@@ -196,7 +200,7 @@ impl WithSimd for Distances<'_> {
             let f = hx * x + hy * y + hz * z + a[6] * x + a[7] * y + a[8] * z + a[9];
             let square = gx * gx + gy * gy + gz * gz;
             let d = scale * f / square.sqrt();
-            out[i] = if square > 0.0 { d } else { f64::INFINITY };
+            out[i] = if square > 0.0 { d / unit } else { f64::INFINITY };
         }
     }
 }

@@ -34,6 +34,11 @@ pub(super) struct Step {
     pub at: DVec3,
 }
 
+/// True if two sheets may be those of a step.
+pub(super) fn is_alike([a, b]: [DVec3; 2]) -> bool {
+    a.dot(b) >= ALIKE
+}
+
 /// The step between two sheets in a ball of `radius` around `center`, if their points lie on two sides of a line.
 /// * `points` - those of the ball
 /// * `noise` - standard deviation of the points, world units
@@ -45,7 +50,7 @@ pub(super) fn step(
     noise: f64,
 ) -> Option<Step> {
     let normals = sheets.map(|s| s.1.normal);
-    if normals[0].dot(normals[1]) < ALIKE {
+    if !is_alike(normals) {
         return None;
     }
     let up = (normals[0] + normals[1]).try_normalize()?;
@@ -69,17 +74,21 @@ pub(super) fn step(
     let u = between.normalize();
     let v = up.cross(u);
     // Where the wall stands in a direction, and how many points lie beyond it.
-    let wall = |angle: f64| {
+    let mut along: [Vec<f64>; 2] = Default::default();
+    let mut wall = |angle: f64| {
         let w = angle.cos() * u + angle.sin() * v;
-        let mut along = [0, 1].map(|k| own[k].iter().map(|p| w.dot(*p)).collect::<Vec<f64>>());
-        along.iter_mut().for_each(|x| x.sort_unstable_by(f64::total_cmp));
+        for (along, own) in along.iter_mut().zip(&own) {
+            along.clear();
+            along.extend(own.iter().map(|p| w.dot(*p)));
+        }
         let last = (along[0].len() - 1) as f64;
         let [s, t] = [0, 1].map(|k| ASTRAY * along[k].len() as f64);
-        let at = (along[0][(last - s) as usize] + along[1][t as usize]) / 2.0;
+        let mut ranked = |k: usize, rank: f64| *along[k].select_nth_unstable_by(rank as usize, f64::total_cmp).1;
+        let at = (ranked(0, last - s) + ranked(1, t)) / 2.0;
         let beyond = along[0].iter().filter(|x| **x > at).count() + along[1].iter().filter(|x| **x < at).count();
         (beyond, at, w)
     };
-    let best_of = |angles: &mut dyn Iterator<Item = f64>| {
+    let mut best_of = |angles: &mut dyn Iterator<Item = f64>| {
         angles.map(|t| (t, wall(t))).min_by(|p, q| p.1.0.cmp(&q.1.0).then(p.0.abs().total_cmp(&q.0.abs())))
     };
     let mut best = best_of(&mut (-TURNS..=TURNS).map(|i| f64::from(i) * TURN))?;

@@ -221,6 +221,8 @@ fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool]) {
         |t: u32, share: &[f64], mesh: &TriMesh| mesh.triangles[t as usize].iter().any(|&v| share[v as usize] > 0.0);
     let touched: Vec<u32> = (0..mesh.triangles.len() as u32).filter(|&t| moves(t, &share, mesh)).collect();
     let was: Vec<(DVec3, f64)> = touched.iter().map(|&t| (mesh.normal(t as usize), mesh.area(t as usize))).collect();
+    // Vertices whose triangles were not asked yet whether they meet others.
+    let mut fresh: Vec<bool> = share.iter().map(|s| *s > 0.0).collect();
     for round in 0..ROUNDS {
         for &(v, p) in &wishes.moves {
             mesh.points[v as usize] = before[v as usize].lerp(p, share[v as usize]);
@@ -232,7 +234,10 @@ fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool]) {
         let mut bad: Vec<u32> = touched.par_iter().zip(&was).filter(|x| is_bad(*x)).map(|(&t, _)| t).collect();
         let mut left = if round < HALVES { 0.5 } else { 0.0 };
         if bad.is_empty() {
-            bad = intersections_of(mesh, |t| moves(t, &share, mesh)).into_iter().flatten().collect();
+            let is_fresh = |t: u32| mesh.triangles[t as usize].iter().any(|&v| fresh[v as usize]);
+            let pairs = intersections_of(mesh, is_fresh).into_iter();
+            bad = pairs.filter(|pair| pair.iter().any(|&t| moves(t, &share, mesh))).flatten().collect();
+            fresh.fill(false);
             left = 0.0;
         }
         if bad.is_empty() {
@@ -242,7 +247,10 @@ fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool]) {
         let mut back: Vec<u32> = bad.iter().flat_map(|&t| mesh.triangles[t as usize]).collect();
         back.sort_unstable();
         back.dedup();
-        back.iter().for_each(|&v| share[v as usize] *= left);
+        for &v in &back {
+            fresh[v as usize] |= share[v as usize] > 0.0;
+            share[v as usize] *= left;
+        }
     }
     mesh.points = before;
 }

@@ -26,26 +26,33 @@ pub(super) fn intersections_of(mesh: &TriMesh, active: impl Fn(u32) -> bool + Sy
             [a.min(b).min(c), a.max(b).max(c)]
         })
         .collect();
-    let Some(size) = cell_size(&boxes) else { return Vec::new() };
+    let Some(usual) = cell_size(&boxes) else { return Vec::new() };
     let origin = boxes.iter().fold(DVec3::INFINITY, |m, b| m.min(b[0]));
-    let cell = |p: DVec3| ((p - origin) / size).floor().to_array().map(|x| x as i64);
+    let end = boxes.iter().fold(DVec3::NEG_INFINITY, |m, b| m.max(b[1]));
+    let size = usual.max((end - origin).max_element() / MOST_CELLS);
+    let cell = |p: DVec3| ((p - origin) / size).to_array().map(|x| x as u64);
     let cells = |b: &[DVec3; 2]| {
         let (low, high) = (cell(b[0]), cell(b[1]));
         let rows = (low[2]..=high[2]).flat_map(move |z| (low[1]..=high[1]).map(move |y| (y, z)));
-        rows.flat_map(move |(y, z)| (low[0]..=high[0]).map(move |x| [x, y, z]))
+        rows.flat_map(move |(y, z)| (low[0]..=high[0]).map(move |x| packed([x, y, z])))
     };
     let actives: Vec<usize> = (0..boxes.len()).filter(|&t| active[t]).collect();
-    let mut wanted: Vec<[i64; 3]> = actives.par_iter().flat_map_iter(|&t| cells(&boxes[t])).collect();
+    let mut wanted: Vec<u64> = actives.par_iter().flat_map_iter(|&t| cells(&boxes[t])).collect();
     wanted.par_sort_unstable();
     wanted.dedup();
-    let is_wanted = |c: &[i64; 3]| wanted.binary_search(c).is_ok();
-    let mut entries: Vec<([i64; 3], u32)> = boxes
+    // A table of hashes rules out nearly all cells that are not.
+    let slots = (4 * wanted.len()).next_power_of_two() as u64;
+    let mut table = vec![false; slots as usize];
+    let slot = |c: u64| (c.wrapping_mul(SPREAD) >> 32 & (slots - 1)) as usize;
+    wanted.iter().for_each(|&c| table[slot(c)] = true);
+    let is_wanted = |c: &u64| table[slot(*c)] && wanted.binary_search(c).is_ok();
+    let mut entries: Vec<(u64, u32)> = boxes
         .par_iter()
         .enumerate()
         .flat_map_iter(|(t, b)| cells(b).filter(is_wanted).map(move |c| (c, t as u32)))
         .collect();
     entries.par_sort_unstable();
-    let runs: Vec<&[([i64; 3], u32)]> = entries.chunk_by(|a, b| a.0 == b.0).filter(|r| r.len() > 1).collect();
+    let runs: Vec<&[(u64, u32)]> = entries.chunk_by(|a, b| a.0 == b.0).filter(|r| r.len() > 1).collect();
     let mut found: Vec<[u32; 2]> = runs
         .par_iter()
         .flat_map_iter(|run| {
@@ -55,7 +62,7 @@ pub(super) fn intersections_of(mesh: &TriMesh, active: impl Fn(u32) -> bool + Sy
                     let (a, b) = (&boxes[s as usize], &boxes[t as usize]);
                     let (low, high) = (a[0].max(b[0]), a[1].min(b[1]));
                     // Each pair once: in the cell that holds the least corner of what the boxes share.
-                    if !(active[s as usize] || active[t as usize]) || low.cmpgt(high).any() || cell(low) != at {
+                    if !(active[s as usize] || active[t as usize]) || low.cmpgt(high).any() || packed(cell(low)) != at {
                         return None;
                     }
                     let corners = |t: u32| mesh.corners(t as usize);
@@ -67,6 +74,17 @@ pub(super) fn intersections_of(mesh: &TriMesh, active: impl Fn(u32) -> bool + Sy
         .collect();
     found.par_sort_unstable();
     found
+}
+
+/// Bits of a cell's place along an axis, and most cells along one.
+const BITS: u32 = 21;
+const MOST_CELLS: f64 = 1e6;
+
+/// 2^64 over the golden ratio: Knuth's multiplicative hashing.
+const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
+
+fn packed([x, y, z]: [u64; 3]) -> u64 {
+    z << (2 * BITS) | y << BITS | x
 }
 
 /// Cells hold a few triangles each.
