@@ -1,8 +1,8 @@
 //! The sheets of a cell, fitted again to what each of them explains.
 //!
-//! Expectation and maximization (Dempster, Laird, Rubin 1977): every point tells of the sheets that it may be of
-//! ([`Chances`](super::chance::Chances)), as far as it may be of them. The wider the ball the less luck has a say, as long as the
-//! points around the site agree: Akaike's criterion, here with points of which some are not asked.
+//! Expectation and maximization (Dempster, Laird, Rubin 1977): every point tells of each sheet as far as it may be of it
+//! ([`Chances`]). The wider the ball the less luck has a say, as long as the points around the site agree: Akaike's
+//! criterion, here with points of which some are not asked.
 
 use super::cells::{Place, Sheet};
 use super::chance::Chances;
@@ -38,14 +38,14 @@ impl Nested {
     /// * `radius`, `ball` - the ball whose points are asked, and these
     /// * `wide` - points within [`WIDEST`] radii
     pub fn refine(&mut self, place: &Place, radius: f64, ball: &Points, mut wide: Points) {
-        let mut seen = seen(&self.sheets, place, ball);
+        let mut seen = look(&self.sheets, place, ball);
         let mut least = worth(&seen, self.concave);
         let mut widths = WIDTHS.to_vec();
         for _ in 0..ROUNDS {
             let own = own(&self.sheets, self.concave, place, &wide);
             let tried = widths.iter().map(|&width| {
                 let better = refined(&self.sheets, place, width * radius, &own);
-                let seen = self::seen(&better, place, ball);
+                let seen = look(&better, place, ball);
                 (worth(&seen, self.concave), width, better, seen)
             });
             let Some(best) = tried.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|b| b.0 < least) else { break };
@@ -76,7 +76,7 @@ impl Nested {
 
 /// What the points of a ball cost with a nesting.
 pub(super) fn explained(sheets: &[Sheet], concave: u8, place: &Place, ball: &Points) -> f64 {
-    cost(&seen(sheets, place, ball), concave)
+    cost(&look(sheets, place, ball), concave)
 }
 
 /// One sheet of a cell as its points see it.
@@ -89,7 +89,7 @@ struct Spread {
     luck: f64,
 }
 
-fn seen(sheets: &[Sheet], place: &Place, points: &Points) -> Vec<Spread> {
+fn look(sheets: &[Sheet], place: &Place, points: &Points) -> Vec<Spread> {
     let one = |s: &Sheet| Spread {
         residuals: points.levels(&s.0, place.noise),
         normal: s.0.distance(place.center).1,
@@ -131,7 +131,7 @@ fn without(concave: u8, k: usize) -> u8 {
 
 /// For each sheet the points that it has a share of, from the middle of the site, and that share.
 fn own(sheets: &[Sheet], concave: u8, place: &Place, points: &Points) -> Vec<Vec<(DVec3, f64)>> {
-    let shares = chances(&seen(sheets, place, points), concave).shares();
+    let shares = chances(&look(sheets, place, points), concave).shares();
     let of = |row: &Vec<f64>| {
         let felt = points.iter().zip(row).filter(|x| *x.1 > FELT);
         felt.map(|(p, &share)| (p - place.center, share)).collect()
