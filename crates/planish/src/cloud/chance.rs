@@ -101,22 +101,6 @@ impl<'a> Chances<'a> {
         }
         shares
     }
-
-    /// What the points cost: twice the negative logarithm of their densities, each at most the square of [`LIMIT`].
-    pub fn cost(&self) -> f64 {
-        let one = |q: usize| {
-            let (found, n) = self.of(q);
-            match found[..n] {
-                [] => LIMIT * LIMIT,
-                [c] if c.inside == 1.0 => c.square,
-                ref several => {
-                    let density: f64 = several.iter().map(|c| (-0.5 * c.square).exp() * c.inside).sum();
-                    (-2.0 * density.ln()).min(LIMIT * LIMIT)
-                }
-            }
-        };
-        (0..self.rows[0].len()).map(one).sum()
-    }
 }
 
 /// Share of normal noise below `x` levels; Abramowitz and Stegun 7.1.26, to 1e-7.
@@ -180,16 +164,12 @@ mod tests {
     }
 
     #[test]
-    fn a_point_on_an_edge_is_half_of_each_face_and_costs_nothing_and_one_far_from_it_its_square() {
+    fn a_point_on_an_edge_is_half_of_each_face_and_one_that_noise_does_not_reach_of_none() {
         let normals = [DVec3::Z, DVec3::X];
+        // On the edge, above the first face, above the second one where the first has ended, deep inside.
         let rows = [[0.0, 1.5, 0.0, -3.5], [0.0, -9.0, 9.0, -3.5]];
-        let chances = |count: usize| Chances::new(rows.iter().map(move |r| &r[..count]).zip(normals), 0);
-        assert_eq!(chances(1).shares(), [[0.5], [0.5]]);
-        assert!(chances(1).cost().abs() < 1e-6);
-        assert_eq!(chances(2).cost() - chances(1).cost(), 2.25);
-        // Above the other face there is none, and what is farther than the noise reaches is of none.
-        assert_eq!(chances(4).shares(), [[0.5, 1.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0]]);
-        assert!((chances(4).cost() - 2.25 - 2.0 * LIMIT * LIMIT).abs() < 1e-6);
+        let shares = Chances::new(rows.iter().map(|r| &r[..]).zip(normals), 0).shares();
+        assert_eq!(shares, [[0.5, 1.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0]]);
         assert!((below(1.0) - 0.841_344_746).abs() < 2e-7 && (below(-2.0) - 0.022_750_132).abs() < 2e-7);
     }
 }

@@ -103,13 +103,10 @@ fn cost(sheets: &[Spread], concave: u8) -> f64 {
     decided(sheets, concave).0 + folds(sheets, concave)
 }
 
-/// What the points cost by their chances, and what they owe to luck.
+/// What they cost, and what they owe to luck.
 fn worth(sheets: &[Spread], concave: u8) -> f64 {
-    chances(sheets, concave).cost() + decided(sheets, concave).1 + folds(sheets, concave)
-}
-
-fn chances(sheets: &[Spread], concave: u8) -> Chances<'_> {
-    Chances::new(sheets.iter().map(|s| (&s.residuals[..], s.normal)), concave)
+    let (cost, lucky) = decided(sheets, concave);
+    cost + lucky + folds(sheets, concave)
 }
 
 fn decided(sheets: &[Spread], concave: u8) -> (f64, f64) {
@@ -131,7 +128,8 @@ fn without(concave: u8, k: usize) -> u8 {
 
 /// For each sheet the points that it has a share of, from the middle of the site, and that share.
 fn own(sheets: &[Sheet], concave: u8, place: &Place, points: &Points) -> Vec<Vec<(DVec3, f64)>> {
-    let shares = chances(&look(sheets, place, points), concave).shares();
+    let seen = look(sheets, place, points);
+    let shares = Chances::new(seen.iter().map(|s| (&s.residuals[..], s.normal)), concave).shares();
     let of = |row: &Vec<f64>| {
         let felt = points.iter().zip(row).filter(|x| *x.1 > FELT);
         felt.map(|(p, &share)| (p - place.center, share)).collect()
