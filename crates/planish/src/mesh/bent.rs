@@ -18,8 +18,6 @@ use rayon::prelude::*;
 const BENT: f64 = 0.01;
 /// An edge that leaves a surface or line by more than this (sine of 40 degrees) has no bend but a kink.
 const KINK: f64 = 0.64;
-/// Edges are split within so many rings of triangles of a line.
-const RINGS: usize = 6;
 /// A piece turns from the face it is a part of by less than this cosine (60 degrees).
 const TURNED: f64 = 0.5;
 
@@ -78,7 +76,6 @@ fn lesser_first((a, b): (u32, u32)) -> (u32, u32) {
 /// The edges that pass `least` or more beside the surface, ascending by their ends.
 fn bends(mesh: &TriMesh, tags: &FeatureTags, least: f64) -> Vec<Split> {
     let lines = Lines::new(mesh, tags);
-    let near = beside(mesh, &lines.on_line);
     let sum = |corners: &mut dyn Iterator<Item = u32>| -> DVec3 {
         let all = corners.map(|h| corner_angle(mesh, h) * lines.areas[h as usize / 3].normalize_or_zero());
         all.sum::<DVec3>().normalize_or_zero()
@@ -112,7 +109,7 @@ fn bends(mesh: &TriMesh, tags: &FeatureTags, least: f64) -> Vec<Split> {
         let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
         let other = lines.adjacency.opposite[h as usize];
         // Each edge once; the boundary stays.
-        if other == super::NONE || a > b || !(near[a as usize] && near[b as usize]) {
+        if other == super::NONE || a > b {
             return None;
         }
         let [p, q] = [a, b].map(|v| mesh.points[v as usize]);
@@ -130,17 +127,6 @@ fn bends(mesh: &TriMesh, tags: &FeatureTags, least: f64) -> Vec<Split> {
     let mut found: Vec<Split> = (0..3 * mesh.triangles.len() as u32).into_par_iter().filter_map(bend).collect();
     found.sort_unstable_by_key(|s| s.ends);
     found
-}
-
-/// The vertices within some rings of triangles of those `on_line`.
-fn beside(mesh: &TriMesh, on_line: &[bool]) -> Vec<bool> {
-    let mut near = on_line.to_vec();
-    for _ in 0..RINGS {
-        let inner = near.clone();
-        let touched = mesh.triangles.iter().filter(|t| t.iter().any(|&v| inner[v as usize]));
-        touched.flatten().for_each(|&v| near[v as usize] = true);
-    }
-    near
 }
 
 /// Angle of a face at the origin of its half-edge `h`.
