@@ -13,7 +13,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Widths of the windows, in cells.
-const RADII: [f64; 6] = [2.0, 3.0, 4.5, 6.75, 10.0, 15.0];
+const RADII: [f64; 5] = [2.0, 3.0, 4.5, 6.75, 10.0];
 /// Terms of the polynomials among `1, x, y, y², x², xy` with `y` along the line: a plane, one that bends along the line, and a
 /// quadric.
 const MODELS: [usize; 3] = [3, 4, 6];
@@ -21,7 +21,7 @@ const MODELS: [usize; 3] = [3, 4, 6];
 const FEWEST: f64 = 8.0;
 /// Standard deviations within which estimates agree. Less follows the noise, more rounds off what bends: of 0.7 to 3 this kept
 /// most angles at noise of .1 and .25 % of the diagonal.
-const AGREE: f64 = 2.0;
+const AGREE: f64 = 1.4;
 /// Least share of an estimate's own variance that counts as that of its difference to a more precise one.
 const SHARED: f64 = 0.25;
 /// Where what is right beside a line does not count, the first so many windows must have so many of these.
