@@ -352,7 +352,8 @@ fn features_stay_sharp_while_the_smooth_seams_between_them_become_smooth() {
     let work = can();
     let (before, after) = stitched(&work, 8);
     let (mean, max) = angles(&work, &after);
-    assert!(mean < 1e-3 && max < 1e-3, "{mean} {max}");
+    // Beside the rims the slopes of the grids have a say.
+    assert!(mean < 0.03 && max < 0.1, "{mean} {max}");
     for (a, b) in
         surface::measure_seams(&work.network, &before).iter().zip(surface::measure_seams(&work.network, &after))
     {
@@ -361,13 +362,36 @@ fn features_stay_sharp_while_the_smooth_seams_between_them_become_smooth() {
             assert!(b.angle_mean_deg > 60.0 && (a.angle_mean_deg - b.angle_mean_deg).abs() < 2.0, "{a:?} {b:?}");
         }
     }
-    // A box has features only: nothing to do.
+    // A box has features only, and its faces are as its grids say.
     let sharp = cube(11, CurveKind::Feature, |p| p);
     let (before, after) = stitched(&sharp, 5);
-    assert_eq!(before, after);
+    let moved = before.iter().zip(&after).flat_map(|(a, b)| a.control.iter().zip(&b.control));
+    assert!(moved.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) < 1e-12);
     for seam in surface::measure_seams(&sharp.network, &after) {
         assert!((seam.angle_max_deg - 90.0).abs() < 1e-9 && (seam.length - 2.0).abs() < 1e-12);
     }
+}
+
+#[test]
+fn faces_that_are_flat_beside_an_edge_meet_at_their_angle_though_what_is_further_inside_makes_the_fit_swing() {
+    // A plateau on each face, its foot two knot spans inside.
+    let stepped = |p: DVec3| {
+        let out = DVec3::from_array([0, 1, 2].map(|k| {
+            let others = (0..3).filter(|&j| j != k).all(|j| p[j].abs() < 0.6);
+            if p[k].abs() == 1.0 && others { 0.2 * p[k] } else { 0.0 }
+        }));
+        p + out
+    };
+    let work = cube(41, CurveKind::Feature, stepped);
+    let (before, after) = stitched(&work, 13);
+    let off = |surfaces: &[Surface]| -> f64 {
+        let seams = surface::measure_seams(&work.network, surfaces);
+        seams.iter().map(|s| (s.angle_mean_deg - 90.0).abs()).sum::<f64>() / seams.len() as f64
+    };
+    let (was, is) = (off(&before), off(&after));
+    assert!(was > 20.0 && is < 0.5, "{was} to {is} degrees");
+    let (was, is) = (surface::deviation(&before, &work.grids), surface::deviation(&after, &work.grids));
+    assert!(is.rms < 1.1 * was.rms, "{was:?} {is:?}");
 }
 
 /// A square tube of 4 x 2 patches; its edges are wavy features, its sides rough away from them.

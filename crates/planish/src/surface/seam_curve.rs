@@ -193,16 +193,31 @@ pub(crate) fn normals(
         }
     }
     direction.fit_curve(mean.iter().copied(), &mut net, 2);
-    let knots = uniform_knots(n);
-    let (at, along) = (BasisRows::new(&knots, &parameters, 0), BasisRows::new(&knots, &parameters, 1));
-    let sum = |rows: &BasisRows, s: usize, net: &[DVec3]| -> DVec3 {
-        (0..4).map(|a| net[rows.first[s] + a] * rows.weights[s][a]).sum()
+    let at = BasisRows::new(&uniform_knots(n), &parameters, 0);
+    let field: Vec<DVec3> =
+        (0..parameters.len()).map(|s| (0..4).map(|a| net[at.first[s] + a] * at.weights[s][a]).sum()).collect();
+    Ok(upright(control, &field, &mean))
+}
+
+/// Unit normals along one side of a patch at [`sample_count`] uniform parameters in the direction of its curve,
+/// perpendicular to that: those of the patch's own grid within a knot span.
+pub(crate) fn own_normals(means: &MeanNormals, side: usize, reversed: bool, control: &[DVec3]) -> Vec<DVec3> {
+    let parameters = uniform_parameters(sample_count(control.len()));
+    let at = |&t: &f64| {
+        let (u, v) = place(side, reversed, t);
+        means.at(u, v)
     };
-    Ok((0..parameters.len())
-        .map(|s| {
-            let tangent = sum(&along, s, control).normalize_or_zero();
-            let n = sum(&at, s, &net);
-            (n - tangent * tangent.dot(n)).try_normalize().unwrap_or(mean[s])
-        })
-        .collect())
+    let field: Vec<DVec3> = parameters.iter().map(at).collect();
+    upright(control, &field, &field)
+}
+
+/// The part of `field` perpendicular to a curve, unit vectors; where there is none that of `other`, as it is.
+fn upright(control: &[DVec3], field: &[DVec3], other: &[DVec3]) -> Vec<DVec3> {
+    let along = BasisRows::new(&uniform_knots(control.len()), &uniform_parameters(field.len()), 1);
+    let one = |s: usize| {
+        let tangent: DVec3 = (0..4).map(|a| control[along.first[s] + a] * along.weights[s][a]).sum();
+        let tangent = tangent.normalize_or_zero();
+        (field[s] - tangent * tangent.dot(field[s])).try_normalize().unwrap_or(other[s])
+    };
+    (0..field.len()).map(one).collect()
 }

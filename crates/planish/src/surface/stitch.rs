@@ -1,9 +1,12 @@
-//! Makes smooth seams smooth: neighbours get one tangent plane along them.
+//! Makes smooth seams smooth, neighbours get one tangent plane along them, and gives those on sharp edges their angle.
 //!
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §8.1.3.
 //! 1. a plane for each corner - `corner`      2. curves that respect it, a normal along each - `seam_curve`
 //! 3. the ring of control points inside a patch's boundary turned into those normals
 //! 4. everything further inside fitted again for that
+//!
+//! On a sharp edge each patch has normals of its own, those of its grid within a knot span: the fit swings there, by what
+//! bends further inside and by the noise of the edge.
 //!
 //! Departs from [K98]: there the seam's control point is moved onto the line between its two neighbours at equal
 //! spacing, which asks every seam to leave a corner as the continuation of another; around corners of valence 3, 5 or
@@ -16,12 +19,12 @@ use super::corner::{Plane, planes};
 use super::fit::{Directions, project_net, solve_inside, surface_of};
 use super::fold::{MeanNormals, folds};
 use super::network_fit::{fill, patch_directions};
-use super::seam_curve::{SPAN_SAMPLES, constrain, normals};
+use super::seam_curve::{SPAN_SAMPLES, constrain, normals, own_normals};
 use super::sides::{along_curve, check, check_grids, is_smooth, node, side_len};
 use super::{FitError, Surface};
 use crate::grid::Grid;
 use crate::linalg::{Banded, BandedCholesky};
-use crate::network::{Network, Patch};
+use crate::network::{CurveKind, Network};
 use crate::observe::Observer;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -31,6 +34,13 @@ use serde::{Deserialize, Serialize};
 /// Diagonals of the ring's matrix: samples couple four neighbours of three numbers, and folding the ring into a
 /// line doubles the distance.
 const RING_BAND: usize = 23;
+
+/// Share of the way of a feature's curve that the rows of control points beside it go along, itself first: the slopes across it
+/// stay.
+const FOLLOW: [f64; 3] = [1.0, 1.0, 0.5];
+
+/// Share of the stiffness that features have: where they end at a smooth seam, that comes first.
+const ANGLES: f64 = 0.3;
 
 /// What the stiffness is multiplied by, one after the other, while a patch comes out folded.
 const EASING: [f64; 4] = [1.0, 0.3, 0.1, 0.0];
@@ -52,13 +62,14 @@ impl Default for StitchParams {
     }
 }
 
-/// Gives the patches on both sides of every smooth seam one tangent plane along it, as nearly as simple knots can.
+/// Gives the patches on both sides of every smooth seam one tangent plane along it, as nearly as simple knots can, and
+/// those on both sides of a feature seam the slopes of their grids.
 ///
 /// * `grids` - those that `surfaces` were fitted to
 /// * `surfaces` - as [`super::fit_network`] returns them
 ///
-/// Corners stay where they are and seams stay without gaps; control points near smooth seams move and all others
-/// are fitted again for that. A network without smooth seams comes back as it is.
+/// Corners stay where they are and seams stay without gaps; control points near seams move and all others are fitted again
+/// for that. A network without seams comes back as it is.
 ///
 /// # Errors
 /// Lists that do not fit the network or each other, knots that are not uniform, or the observer's wish.
@@ -83,8 +94,8 @@ pub fn stitch(
         return Err(FitError::Knots { patch });
     }
     let uses = network.uses();
-    let is_seam = |c: usize| is_smooth(&network.curves[c]) && uses[c].len() == 2;
-    if !(0..uses.len()).any(is_seam) {
+    let is_seam = |c: usize, kind: CurveKind| network.curves[c].kind == kind && uses[c].len() == 2;
+    if !uses.iter().any(|uses| uses.len() == 2) {
         return Ok(surfaces.to_vec());
     }
     let directions = Directions::new(nodes.iter().zip(&counts).filter(|(n, _)| **n > 0).map(|(&n, &c)| (n, c)))?;
@@ -126,7 +137,7 @@ pub fn stitch(
                 return None;
             }
             let [along_u, along_v] = patch_directions(patch, &grids[p], &directions, &counts);
-            let projection = project_net(&surfaces[p].control, along_u, along_v);
+            let projection = project_net(&follow(network, p, &surfaces[p], &curves), along_u, along_v);
             let net = fill(patch, &curves, &projection, along_u, along_v);
             Some((surface_of(net, along_u, along_v), projection))
         })
@@ -137,7 +148,9 @@ pub fn stitch(
     let fields: Vec<Result<Vec<DVec3>, FitError>> = (0..uses.len())
         .into_par_iter()
         .map(|c| match uses[c][..] {
-            [a, b] if is_seam(c) => normals(network, &filled, &means, c, [a, b], &curves[c], &planes),
+            [a, b] if is_seam(c, CurveKind::Smooth) => {
+                normals(network, &filled, &means, c, [a, b], &curves[c], &planes)
+            }
             _ => Ok(Vec::new()),
         })
         .collect();
@@ -149,11 +162,24 @@ pub fn stitch(
         .enumerate()
         .map(|(p, patch)| {
             let [along_u, along_v] = patch_directions(patch, &grids[p], &directions, &counts);
+            let targets = std::array::from_fn(|k| {
+                let side = patch.sides[k];
+                let c = side.curve as usize;
+                let (mut normals, stiffness) = if is_seam(c, CurveKind::Feature) {
+                    (own_normals(&means[p], k, side.reversed, &curves[c]), ANGLES * params.stiffness)
+                } else {
+                    (fields[c].clone(), params.stiffness)
+                };
+                if side.reversed {
+                    normals.reverse();
+                }
+                Target { normals, stiffness }
+            });
             let mut best = filled[p].clone();
             let mut fewest = usize::MAX;
             for easing in EASING {
                 let mut net = filled[p].control.clone();
-                turn_ring(&mut net, along_v.control(), along_u.control(), patch, &fields, params.stiffness * easing);
+                turn_ring(&mut net, along_v.control(), along_u.control(), &targets, easing);
                 solve_inside(&mut net, &projections[p], along_u, along_v, 2);
                 let surface = surface_of(net, along_u, along_v);
                 let count = folds(&surface, &grids[p]);
@@ -172,9 +198,40 @@ pub fn stitch(
     Ok(stitched)
 }
 
-/// Moves the ring of control points next to the boundary so that along every smooth side the derivative across it is
+/// The control net of a patch with what is on and beside its features moved along with their curves.
+fn follow(network: &Network, patch: usize, surface: &Surface, curves: &[Vec<DVec3>]) -> Vec<DVec3> {
+    let Surface { rows, cols, control, .. } = surface;
+    let mut net = control.clone();
+    for (k, side) in network.patches[patch].sides.iter().enumerate() {
+        if is_smooth(&network.curves[side.curve as usize]) {
+            continue;
+        }
+        let curve = &curves[side.curve as usize];
+        let n = side_len(*rows, *cols, k);
+        // Not beyond the middle: the other side moves as its own curve does.
+        let deepest = side_len(*rows, *cols, k + 1).div_ceil(2);
+        for i in 0..n {
+            let way = curve[if side.reversed { n - 1 - i } else { i }] - control[node(*rows, *cols, k, i, 0)];
+            for (depth, share) in FOLLOW.into_iter().enumerate().take(deepest) {
+                net[node(*rows, *cols, k, i, depth)] += way * share;
+            }
+        }
+    }
+    net
+}
+
+/// What a surface is to be like along a side.
+struct Target {
+    /// Normals at even parameters, in the direction of the side; none where it is free.
+    normals: Vec<DVec3>,
+    /// How much they count, as in [`StitchParams`].
+    stiffness: f64,
+}
+
+/// Moves the ring of control points next to the boundary so that along every side the derivative across it is
 /// perpendicular to the normals there, and as little as that allows.
-fn turn_ring(net: &mut [DVec3], rows: usize, cols: usize, patch: &Patch, fields: &[Vec<DVec3>], stiffness: f64) {
+/// * `easing` - share of the stiffness of the targets
+fn turn_ring(net: &mut [DVec3], rows: usize, cols: usize, targets: &[Target; 4], easing: f64) {
     let mut ring = Vec::new();
     let mut rank = vec![usize::MAX; net.len()];
     for k in 0..4 {
@@ -195,21 +252,19 @@ fn turn_ring(net: &mut [DVec3], rows: usize, cols: usize, patch: &Patch, fields:
     let mut matrix = Banded::zero(3 * length, RING_BAND.min(3 * length - 1));
     let mut rhs = vec![0.0; 3 * length];
     let mut any = false;
-    for (k, side) in patch.sides.iter().enumerate() {
+    for (k, target) in targets.iter().enumerate() {
         let n = side_len(rows, cols, k);
         for i in 1..n - 1 {
             let (rim, inner) = (node(rows, cols, k, i, 0), node(rows, cols, k, i, 1));
             let entry = &mut reach[rank[inner]];
             *entry = entry.min(net[rim].distance(net[inner]));
         }
-        let field = &fields[side.curve as usize];
-        if field.is_empty() {
+        if target.normals.is_empty() {
             continue;
         }
         any = true;
         let knots = uniform_knots(n);
-        for (s, t) in uniform_parameters(field.len()).into_iter().enumerate() {
-            let normal = field[if side.reversed { field.len() - 1 - s } else { s }];
+        for (t, &normal) in uniform_parameters(target.normals.len()).into_iter().zip(&target.normals) {
             let (first, [weights, ..]) = basis_at(&knots, t);
             let across: DVec3 = (0..4)
                 .map(|a| {
@@ -221,7 +276,7 @@ fn turn_ring(net: &mut [DVec3], rows: usize, cols: usize, patch: &Patch, fields:
             if size == 0.0 {
                 continue;
             }
-            let weight = stiffness * stiffness / (size * SPAN_SAMPLES as f64);
+            let weight = (target.stiffness * easing).powi(2) / (size * SPAN_SAMPLES as f64);
             for a in (0..4).filter(|a| (1..n - 1).contains(&(first + a))) {
                 let i = 3 * rank[node(rows, cols, k, first + a, 1)];
                 for x in 0..3 {
