@@ -1,4 +1,4 @@
-//! Sharp lines that noise broke: gaps are bridged, spikes are cut.
+//! Sharp lines that noise broke: gaps are bridged, spurs, spikes and jogs are cut.
 //!
 //! Noise hides a few edges of a line, or shifts it by an edge. A gap costs more than its length: a line with a loose end is
 //! taken for surface detail, or two patches run into one another there.
@@ -20,8 +20,17 @@ const LAST: f64 = 4.0;
 /// so many mean edges.
 const AHEAD: f64 = 0.64;
 const SHORTEST: f64 = 1.5;
+/// A loose end that leaves a line after less than so many mean edges is a spur.
+const SPUR: f64 = 1.5;
+/// A last edge of a loose end that is shorter than this share of a mean edge is no way on: noise turns it anywhere.
+const STUB: f64 = 0.2;
 /// A line that comes back within this angle around a single face is a spike.
 const SPIKE_ANGLE: f64 = 80.0 / 180.0 * std::f64::consts::PI;
+
+/// A line that leaves its way for up to so many edges on each side of a vertex, and comes back to within an edge, is cut short
+/// if that costs less than this share of the way: less than at a corner of a face of 45 degrees, whose own edges are bent.
+const JOG: usize = 3;
+const JOG_COST: f64 = 0.35;
 
 /// A spike of a tagged line is shorter around than so many mean edges.
 const SPIKE: f64 = 6.0;
@@ -50,20 +59,64 @@ struct Bridge {
     vertices: Vec<u32>,
 }
 
+/// The half-edges on sharp lines that leave each vertex, and the loose ends of these lines.
+fn loose_ends(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    sharp: &[bool],
+    edge: f64,
+) -> (BTreeMap<u32, Vec<u32>>, BTreeMap<u32, End>) {
+    let mut lines: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
+        lines.entry(mesh.origin(h)).or_default().push(h);
+    }
+    let loose = |v: &u32| lines[v].len() == 1 && !adjacency.is_boundary_vertex(*v);
+    let ends = lines.keys().copied().filter(loose).map(|v| (v, End::new(mesh, &lines, v, edge))).collect();
+    (lines, ends)
+}
+
+/// Clears or marks the edges between vertices of a chain.
+fn mark(mesh: &TriMesh, adjacency: &Adjacency, chain: &[u32], sharp: &mut [bool], is_sharp: bool) {
+    for pair in chain.windows(2) {
+        let between = path::neighbours(mesh, adjacency, pair[0]).find(|n| n.0 == pair[1]);
+        let (_, h) = between.expect("a chain runs along edges");
+        sharp[h as usize] = is_sharp;
+        sharp[adjacency.opposite[h as usize] as usize] = is_sharp;
+    }
+}
+
+/// Clears what leaves a line and ends at once, the shortest at each fork first: what it leaves is one line, whose end may be
+/// led on. So are last edges that are next to nothing.
+fn cut_spurs(mesh: &TriMesh, adjacency: &Adjacency, edge: f64, sharp: &mut [bool]) {
+    loop {
+        let (lines, ends) = loose_ends(mesh, adjacency, sharp, edge);
+        let mut spurs: BTreeMap<u32, &End> = BTreeMap::new();
+        for end in ends.values().filter(|end| end.length() < SPUR * edge) {
+            let fork = end.tail[end.tail.len() - 1].0;
+            if lines[&fork].len() > 2 && spurs.get(&fork).is_none_or(|known| end.length() < known.length()) {
+                spurs.insert(fork, end);
+            }
+        }
+        let stubs = ends.values().filter(|end| end.tail[1].1 < STUB * edge).map(|end| &end.tail[..2]);
+        let cut: Vec<&[(u32, f64)]> = spurs.values().map(|spur| &spur.tail[..]).chain(stubs).collect();
+        if cut.is_empty() {
+            return;
+        }
+        for tail in cut {
+            mark(mesh, adjacency, &tail.iter().map(|t| t.0).collect::<Vec<u32>>(), sharp, false);
+        }
+    }
+}
+
 /// Leads loose ends of sharp lines on to the loose ends that face them, to a line ahead, or to the boundary, where these are
-/// a few edges away. Returns how many gaps were bridged.
+/// a few edges away; spurs are cut first. Returns how many gaps were bridged.
 /// * `sharp` - for each half-edge whether it is on a sharp line; both halves of an edge alike
 pub fn bridge_gaps(mesh: &TriMesh, adjacency: &Adjacency, sharp: &mut [bool]) -> usize {
     let edge = mean_edge(mesh);
+    cut_spurs(mesh, adjacency, edge, sharp);
     let mut bridged = 0;
     loop {
-        let mut lines: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
-            lines.entry(mesh.origin(h)).or_default().push(h);
-        }
-        let loose = |v: &u32| lines[v].len() == 1 && !adjacency.is_boundary_vertex(*v);
-        let ends: BTreeMap<u32, End> =
-            lines.keys().copied().filter(loose).map(|v| (v, End::new(mesh, &lines, v, edge))).collect();
+        let (lines, ends) = loose_ends(mesh, adjacency, sharp, edge);
         let search = |v: &u32| bridge(mesh, adjacency, &lines, &ends, *v, edge);
         let mut bridges: Vec<Bridge> = ends.keys().filter_map(search).collect();
         bridges.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.vertices.cmp(&b.vertices)));
@@ -74,12 +127,7 @@ pub fn bridge_gaps(mesh: &TriMesh, adjacency: &Adjacency, sharp: &mut [bool]) ->
                 continue;
             }
             taken.extend(&bridge.vertices);
-            for pair in bridge.vertices.windows(2) {
-                let between = path::neighbours(mesh, adjacency, pair[0]).find(|n| n.0 == pair[1]);
-                let (_, h) = between.expect("a bridge runs along edges");
-                sharp[h as usize] = true;
-                sharp[adjacency.opposite[h as usize] as usize] = true;
-            }
+            mark(mesh, adjacency, &bridge.vertices, sharp, true);
             bridged += 1;
         }
         if taken.is_empty() {
@@ -199,8 +247,9 @@ fn bend(mesh: &TriMesh, adjacency: &Adjacency, h: u32) -> f64 {
 }
 
 /// Leads lines that turn back on themselves around a single face along its third edge instead, if the face is less
-/// than `longest` around: edges of noise zigzag.
+/// than `longest` around, and cuts jogs no longer than that around: edges of noise zigzag.
 pub fn cut_spikes(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bool]) {
+    cut_jogs(mesh, adjacency, longest, sharp);
     let mut degree = vec![0u32; mesh.points.len()];
     (0..sharp.len() as u32).filter(|&h| sharp[h as usize]).for_each(|h| degree[mesh.origin(h) as usize] += 1);
     let mut faces: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
@@ -235,6 +284,63 @@ pub fn cut_spikes(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &m
             }
         }
         faces = changed;
+    }
+}
+
+/// Leads lines that run beside themselves for a few edges straight on, the dearest detours first.
+fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bool]) {
+    let cost = |h: u32| length(mesh, h) * (2.0 - bend(mesh, adjacency, h));
+    loop {
+        let mut lines: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
+            lines.entry(mesh.origin(h)).or_default().push(h);
+        }
+        // Half-edges from a vertex on, until the line ends or forks.
+        let leg = |mut h: u32| {
+            let mut leg = vec![h];
+            while leg.len() < JOG {
+                let back = adjacency.opposite[h as usize];
+                match lines[&mesh.origin(next(h))][..] {
+                    [a, b] if a == back || b == back => h = if a == back { b } else { a },
+                    _ => break,
+                }
+                leg.push(h);
+            }
+            leg
+        };
+        let mut jogs: Vec<(f64, Vec<u32>, u32)> = Vec::new();
+        for (v, out) in lines.iter().filter(|l| l.1.len() == 2 && !adjacency.is_boundary_vertex(*l.0)) {
+            let legs = [leg(out[0]), leg(out[1])];
+            for (i, &a) in legs[0].iter().enumerate() {
+                let from = mesh.origin(next(a));
+                for (to, h) in path::neighbours(mesh, adjacency, from) {
+                    let Some(j) = legs[1].iter().position(|&b| mesh.origin(next(b)) == to) else { continue };
+                    let detour = [&legs[0][..=i], &legs[1][..=j]].concat();
+                    let way: f64 = detour.iter().map(|&h| length(mesh, h)).sum::<f64>() + length(mesh, h);
+                    let saved = JOG_COST * detour.iter().map(|&h| cost(h)).sum::<f64>() - cost(h);
+                    let is_free = !sharp[h as usize] && adjacency.opposite[h as usize] != NONE && to != *v;
+                    if is_free && way < longest && saved > 0.0 {
+                        jogs.push((saved, detour, h));
+                    }
+                }
+            }
+        }
+        jogs.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+        let mut taken: Vec<u32> = Vec::new();
+        for (_, detour, short) in &jogs {
+            let around: Vec<u32> = detour.iter().flat_map(|&h| [mesh.origin(h), mesh.origin(next(h))]).collect();
+            if around.iter().any(|v| taken.contains(v)) {
+                continue;
+            }
+            taken.extend(around);
+            for (&h, is_sharp) in detour.iter().map(|h| (h, false)).chain([(short, true)]) {
+                sharp[h as usize] = is_sharp;
+                sharp[adjacency.opposite[h as usize] as usize] = is_sharp;
+            }
+        }
+        if taken.is_empty() {
+            return;
+        }
     }
 }
 
@@ -294,6 +400,47 @@ mod tests {
         let column: Vec<(usize, usize)> = (5..=55).map(|j| (31, j)).collect();
         assert_eq!(bridged(&[&row(30, 5, 30), &column]), (1, 1));
         assert_eq!(bridged(&[&row(30, 5, 27), &column]), (0, 0));
+    }
+
+    #[test]
+    fn an_end_with_a_spur_beside_it_is_led_on_and_the_spur_goes() {
+        // The line ends two edges before a column, and an edge of noise leaves it two edges before its end.
+        let column: Vec<(usize, usize)> = (5..=55).map(|j| (31, j)).collect();
+        let (mesh, adjacency, mut sharp) = lines(&[&row(30, 5, 30), &[(28, 30), (28, 31)], &column]);
+        assert_eq!(bridge_gaps(&mesh, &adjacency, &mut sharp), 1);
+        let degree = |i: usize, j: usize| {
+            let p = mesh.bounds().min + DVec3::new(i as f64, j as f64, 0.0) / CELLS as f64;
+            (0..sharp.len() as u32)
+                .filter(|&h| sharp[h as usize] && mesh.points[mesh.origin(h) as usize].distance(p) < 1e-9)
+                .count()
+        };
+        assert_eq!([degree(28, 30), degree(28, 31), degree(30, 30), degree(31, 30)], [2, 0, 2, 3]);
+    }
+
+    #[test]
+    fn the_last_edge_of_an_end_goes_if_it_is_next_to_nothing() {
+        let (mut mesh, adjacency, mut sharp) = lines(&[&row(30, 5, 30)]);
+        let place = |i: usize| mesh.bounds().min + DVec3::new(i as f64, 30.0, 0.0) / CELLS as f64;
+        let (last, before) = (place(30), place(29));
+        let v = mesh.points.iter().position(|p| p.distance(last) < 1e-9).expect("a vertex there");
+        let count = |sharp: &[bool]| sharp.iter().filter(|&&s| s).count() / 2;
+        bridge_gaps(&mesh, &adjacency, &mut sharp);
+        assert_eq!(count(&sharp), 25);
+        mesh.points[v] = before.lerp(last, 0.1);
+        bridge_gaps(&mesh, &adjacency, &mut sharp);
+        assert_eq!(count(&sharp), 24);
+    }
+
+    #[test]
+    fn a_line_that_goes_back_beside_itself_is_led_straight_on() {
+        let back = [(31, 31), (30, 31), (29, 31)];
+        let (mesh, adjacency, mut sharp) = lines(&[&[row(30, 5, 31), back.to_vec(), row(32, 29, 55)].concat()]);
+        let count = |sharp: &[bool]| sharp.iter().filter(|&&s| s).count() / 2;
+        assert_eq!(count(&sharp), 26 + 1 + 2 + 1 + 26);
+        cut_spikes(&mesh, &adjacency, 0.05, &mut sharp);
+        assert_eq!(count(&sharp), 26 + 1 + 2 + 1 + 26, "what is longer than asked for stays");
+        cut_spikes(&mesh, &adjacency, 0.2, &mut sharp);
+        assert_eq!(count(&sharp), 24 + 2 + 26);
     }
 
     #[test]
