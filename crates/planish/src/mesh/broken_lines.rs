@@ -28,7 +28,7 @@ const STUB: f64 = 0.2;
 const SPIKE_ANGLE: f64 = 80.0 / 180.0 * std::f64::consts::PI;
 
 /// A line that leaves its way for up to so many edges on each side of a vertex, and comes back to within an edge, is cut short
-/// if that costs less than this share of the way: less than at a corner of a face of 45 degrees, whose own edges are bent.
+/// if that costs less than this share of the way: less than at the corner of a face of 20 degrees, whose own edges are bent.
 const JOG: usize = 3;
 const JOG_COST: f64 = 0.35;
 
