@@ -35,7 +35,7 @@ const JOG_COST: f64 = 0.35;
 /// A spike of a tagged line is shorter around than so many mean edges.
 const SPIKE: f64 = 6.0;
 
-/// Bridges the gaps of the tagged lines of a mesh, and cuts their spikes. Returns how many gaps were bridged.
+/// Bridges the gaps of the tagged lines of a mesh, and cuts their spurs, spikes and jogs. Returns how many gaps were bridged.
 pub fn mend_lines(mesh: &TriMesh, tags: &mut FeatureTags) -> usize {
     let adjacency = Adjacency::new(mesh);
     let mut sharp = tags.on(mesh);
