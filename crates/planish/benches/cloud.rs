@@ -18,11 +18,12 @@ mod record;
 
 use glam::DVec3;
 use planish::Silent;
-use planish::cloud::{self, CleanParams, Cloud, ScannerParams, virtual_scan};
+use planish::cloud::{self, CleanParams, Cloud};
 use planish::contour::ContourParams;
 use planish::geom::{Bvh, KdTree, random};
-use planish::mesh::{Adjacency, TriMesh, diagnose, shapes, sharp_edges};
+use planish::mesh::{Adjacency, TriMesh, diagnose, sharp_edges};
 use planish::pipeline::{self, ScanParams, mesh_scan};
+use planish::synthetic::{self, ScannerParams, shapes, virtual_scan};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -57,7 +58,7 @@ fn main() {
         }
     }
     if args.is_empty() {
-        let part = shapes::demo(0, 60_000);
+        let part = synthetic::demo(0, 60_000);
         for n in [25_000, 50_000, 100_000, 200_000] {
             let points = even(&part, n, 0.001 * part.bounds().diagonal(), 1);
             let start = Instant::now();
@@ -100,7 +101,7 @@ fn scan(kind: &str, mesh: &TriMesh, noise: f64) -> Option<Cloud> {
 
 fn shape(name: &str) -> Option<TriMesh> {
     match name {
-        "demo" => Some(shapes::demo(0, 60_000)),
+        "demo" => Some(synthetic::demo(0, 60_000)),
         "torus" => Some(shapes::torus(1.0, 0.4, 256, 128)),
         "sphere" => Some(shapes::sphere(1.0, 6)),
         _ => truth(&format!("{}/{name}.ply", std::env::var("PLANISH_DATA").ok()?)),

@@ -8,11 +8,12 @@ use planish::curve::{
 };
 use planish::geom::{Bvh, random};
 use planish::grid::{self, Grid, GridParams};
-use planish::mesh::{self, Adjacency, FacePoint, TriMesh, shapes};
+use planish::mesh::{self, Adjacency, FacePoint, TriMesh};
 use planish::network::{
     CurveKind, Editor, Holds, LayoutParams, PatchMesh, changed_patches, imprint, layout, reimprint,
 };
-use planish::{DVec3, Silent, surface};
+use planish::synthetic::shapes;
+use planish::{DVec3, Silent, mend, surface};
 use std::io::Write;
 use std::time::Instant;
 
@@ -447,7 +448,7 @@ fn main() {
     let mut inputs = vec![("sphere".to_string(), ball)];
     for file in ["armadillo", "dragon"] {
         if let Some(mesh) = common::data_mesh(&format!("{file}.ply")) {
-            inputs.push((file.to_string(), mesh::repair(&mesh).expect("a mesh").0));
+            inputs.push((file.to_string(), mend::repair(&mesh).expect("a mesh").0));
         }
     }
     one_patch(&wanted);

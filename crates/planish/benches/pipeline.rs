@@ -12,9 +12,9 @@
 mod record;
 
 use glam::DVec3;
-use planish::mesh::shapes;
 use planish::pipeline::{self, PipelineParams, StageRecord};
 use planish::surface::{self, Resolution};
+use planish::synthetic::{self};
 use planish::{Model, Silent};
 use std::collections::BTreeMap;
 use std::hint::black_box;
@@ -37,7 +37,7 @@ fn main() {
     let mut seconds = Seconds::new();
     let mut curves: BTreeMap<String, Vec<(f64, f64)>> = BTreeMap::new();
     for (name, wanted, rounds) in PARTS {
-        let part = shapes::demo(SEED, wanted);
+        let part = synthetic::demo(SEED, wanted);
         let mut least = Seconds::new();
         for round in 0..rounds {
             let fitted = pipeline::fit(&part, None, &PipelineParams::default(), &Silent).expect("the part is sound");

@@ -4,7 +4,7 @@
 //! nothing of those after it ([`pipeline`] alone knows their order).
 //!
 //! ```
-//! use planish::mesh::shapes;
+//! use planish::synthetic::shapes;
 //! use planish::network::LayoutParams;
 //! use planish::pipeline::{self, PipelineParams};
 //!
@@ -25,6 +25,7 @@ pub mod field;
 pub mod geom;
 pub mod grid;
 pub mod linalg;
+pub mod mend;
 pub mod mesh;
 pub mod model;
 pub mod network;
@@ -32,7 +33,9 @@ pub mod observe;
 pub mod pipeline;
 pub mod relief;
 pub mod render;
+pub mod sharp;
 pub mod surface;
+pub mod synthetic;
 
 pub use glam::{DVec2, DVec3};
 pub use model::{HistoryEntry, Model, Units, UnknownUnit};

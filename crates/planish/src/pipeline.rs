@@ -3,7 +3,6 @@
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, fig. 1.3: curves, grids, surfaces,
 //! displacement maps; before it the repair of the mesh and an automatic network, after it the measuring.
 
-mod finish;
 mod quality;
 mod record;
 mod scan;
@@ -15,14 +14,15 @@ pub use scan::{ScanError, ScanMeshed, ScanParams, mesh_scan, params_for, sample_
 pub use truth::{EdgesFound, edges_found, truth_figures};
 
 use crate::grid::{self, FeatureError, Grid, GridError, GridParams};
-use crate::mesh::{self, CompareError, FeatureTags, MeshError, Repairs, TriMesh};
+use crate::mend::{self, Repairs};
+use crate::mesh::{CompareError, FeatureTags, MeshError, TriMesh};
 use crate::model::{Model, Sketch};
 use crate::network::{self, ImprintError, LayoutError, LayoutParams, Network, PatchMesh};
 use crate::observe::Observer;
+use crate::pipeline::record::Clock;
 use crate::relief::{self, ReliefError};
 use crate::surface::{self, FitError, FitParams, SeamQuality, StitchParams};
 use rayon::prelude::*;
-use record::Clock;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -102,7 +102,7 @@ pub enum PipelineError {
 /// Fits a model to a mesh.
 ///
 /// * `input` - any triangle mesh; it is repaired first
-/// * `network` - on the mesh as [`mesh::repair`] leaves it; `None` for an automatic one
+/// * `network` - on the mesh as [`mend::repair`] leaves it; `None` for an automatic one
 ///
 /// # Errors
 /// The first stage that fails; a cancelled stage always as [`PipelineError::Cancelled`].
@@ -369,7 +369,7 @@ fn or_cancelled(error: PipelineError, observer: &dyn PipelineObserver) -> Pipeli
 }
 
 fn repair(input: &TriMesh, clock: &mut Clock) -> Result<(TriMesh, Repairs), PipelineError> {
-    Ok(clock.stage("repair", |_| mesh::repair(input), |(mesh, _)| [("triangles", mesh.triangles.len())])?)
+    Ok(clock.stage("repair", |_| mend::repair(input), |(mesh, _)| [("triangles", mesh.triangles.len())])?)
 }
 
 fn draw(

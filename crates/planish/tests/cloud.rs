@@ -6,8 +6,9 @@ use planish::cloud::{self, CleanParams, Cloud, CloudError, ProjectParams, Sample
 use planish::contour::ContourParams;
 use planish::field::{Field, SampleField};
 use planish::geom::{Aabb, random};
-use planish::mesh::{TriMesh, diagnose, shapes};
+use planish::mesh::{TriMesh, diagnose};
 use planish::pipeline::{ScanMeshed, ScanParams, mesh_scan};
+use planish::synthetic::shapes;
 
 /// A normally distributed number.
 fn normal(seed: u64, n: u64) -> f64 {

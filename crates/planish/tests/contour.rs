@@ -341,7 +341,7 @@ fn closed_meshes_come_back_certified_with_their_genus_and_volume() {
 #[test]
 fn lattices_through_the_vertices_of_a_cube_are_decided_without_a_gap() {
     // Every face, edge and corner of the cube lies on planes of nodes.
-    let mesh = planish::mesh::shapes::cuboid(DVec3::splat(8.0), 4);
+    let mesh = planish::synthetic::shapes::cuboid(DVec3::splat(8.0), 4);
     let lattice = planish::field::Lattice { origin: mesh.bounds().min - 2.0, step: DVec3::ONE, cells: [12; 3] };
     let field = planish::field::MeshField::new(&mesh).unwrap();
     let directed = field.sample(&lattice, &Silent).unwrap();
@@ -353,12 +353,12 @@ fn lattices_through_the_vertices_of_a_cube_are_decided_without_a_gap() {
 
 #[test]
 fn meshes_with_holes_and_intersections_are_closed() {
-    let mut open = planish::mesh::shapes::sphere(1.0, 4);
+    let mut open = planish::synthetic::shapes::sphere(1.0, 4);
     open.triangles.retain(|t| !t.iter().all(|&v| open.points[v as usize].z > 0.9));
     let d = certified("open sphere", &of_mesh(&open, 40).extracted.mesh);
     assert_eq!(d.genus, Some(0));
     assert!((d.volume.unwrap() / 4.18 - 1.0).abs() < 0.05, "{:?}", d.volume);
-    let mut two = planish::mesh::shapes::sphere(1.0, 4);
+    let mut two = planish::synthetic::shapes::sphere(1.0, 4);
     let n = two.points.len() as u32;
     two.points.extend_from_within(..);
     two.points[n as usize..].iter_mut().for_each(|p| p.x += 0.9);
@@ -431,7 +431,7 @@ fn five_hundred_random_trees_of_solids_are_certified() {
 #[test]
 fn meshes_are_bitwise_equal_on_1_2_and_5_threads() {
     let tree = Part::Solid(random_tree(7));
-    let mesh = planish::mesh::shapes::demo(1, 8_000);
+    let mesh = planish::synthetic::demo(1, 8_000);
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
@@ -533,14 +533,14 @@ fn a_milled_slot_has_the_volume_of_its_formula_and_its_sharp_rim() {
 #[test]
 fn walls_thinner_than_a_cell_are_counted_with_their_width() {
     // A plate of a tenth of a cell that lies between two planes of nodes.
-    let mut plate = planish::mesh::shapes::cuboid(DVec3::new(8.0, 8.0, 0.1), 4);
+    let mut plate = planish::synthetic::shapes::cuboid(DVec3::new(8.0, 8.0, 0.1), 4);
     plate.points.iter_mut().for_each(|p| *p += DVec3::splat(0.45));
     let lattice = planish::field::Lattice { origin: plate.bounds().min - 2.03, step: DVec3::ONE, cells: [12; 3] };
     let directed = planish::field::MeshField::new(&plate).unwrap().sample(&lattice, &Silent).unwrap();
     assert_eq!(directed.hit_count(), 0);
     assert_eq!(directed.thin.edges, 64, "one edge along z for each node above the plate");
     assert!((directed.thin.width - 0.1).abs() < 1e-9 && directed.thin.share == 1.0, "{:?}", directed.thin);
-    let thick = planish::mesh::shapes::cuboid(DVec3::splat(8.3), 4);
+    let thick = planish::synthetic::shapes::cuboid(DVec3::splat(8.3), 4);
     let directed = planish::field::MeshField::new(&thick).unwrap().sample(&lattice, &Silent).unwrap();
     assert_eq!(directed.thin.edges, 0);
 }
@@ -548,7 +548,7 @@ fn walls_thinner_than_a_cell_are_counted_with_their_width() {
 #[test]
 fn facets_larger_than_a_cell_keep_their_edges_without_being_features() {
     // A prism of 24 sides: 15 degrees from one to the next, below the threshold of 26.
-    let prism = planish::mesh::shapes::cylinder(1.0, 2.0, 24);
+    let prism = planish::synthetic::shapes::cylinder(1.0, 2.0, 24);
     let made = of_mesh(&prism, 40);
     certified("prism", &made.extracted.mesh);
     let bvh = planish::geom::Bvh::new(&prism);

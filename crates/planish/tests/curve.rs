@@ -8,7 +8,8 @@ use planish::curve::{
     SplineEdit, Stroke, SurfaceCurve, Sweep, carry, connect, section, snap, way,
 };
 use planish::geom::{Bvh, random};
-use planish::mesh::{Adjacency, FacePoint, TriMesh, shapes, sharp_edges};
+use planish::mesh::{Adjacency, FacePoint, TriMesh, sharp_edges};
+use planish::synthetic::{self, shapes};
 use planish::{DVec3, Silent};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -433,7 +434,7 @@ fn a_place_that_is_not_there_and_pieces_that_do_not_hang_together_are_told() {
 
 #[test]
 fn painting_and_relaxing_are_bitwise_equal_on_1_and_4_threads() {
-    let mesh = shapes::demo(3, 20_000);
+    let mesh = synthetic::demo(3, 20_000);
     let run = || {
         let canvas = Canvas::new(&mesh);
         let faces = mesh.triangles.len() as f64;

@@ -6,10 +6,11 @@ use planish::curve::{SnakeParams, SurfaceCurve, section};
 use planish::edit::{Edit, Ground, apply};
 use planish::geom::Bvh;
 use planish::grid::{self, Family, FeatureCurve, FeatureError, GridParams, Sections, relax_with_features};
-use planish::mesh::{Adjacency, FacePoint, TriMesh, shapes};
+use planish::mesh::{Adjacency, FacePoint, TriMesh};
 use planish::model::{Drawing, HistoryEntry, Model};
 use planish::network::{CurveKind, EditError, Editor, Fault, Holds, LayoutParams, Network, imprint, layout};
 use planish::pipeline::{self, PipelineParams};
+use planish::synthetic::shapes;
 use planish::{DVec3, Silent};
 
 fn near(bvh: &Bvh, p: DVec3) -> FacePoint {

@@ -6,7 +6,8 @@ use planish::contour::{ContourParams, extract};
 use planish::field::csg::{Operation, combine, complement};
 use planish::field::{Directed, Field, Lattice, MeshField, Part, Solid, Spacing, sample};
 use planish::geom::Aabb;
-use planish::mesh::{diagnose, self_intersections, shapes};
+use planish::mesh::{diagnose, self_intersections};
+use planish::synthetic::shapes;
 use planish::{DVec3, Silent};
 
 fn lattice(n: usize) -> Lattice {

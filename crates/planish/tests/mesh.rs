@@ -5,7 +5,10 @@
 mod common;
 
 use planish::geom::{Bvh, random};
+use planish::mend::*;
 use planish::mesh::*;
+use planish::sharp::*;
+use planish::synthetic::shapes;
 use planish::{DVec3, Silent};
 use proptest::prelude::*;
 
@@ -600,7 +603,7 @@ fn comparison_sees_flipped_faces_and_one_sided_differences() {
 
 #[test]
 fn comparison_is_bitwise_equal_on_1_and_4_threads() {
-    let (a, b) = (shapes::demo(1, 4_000), shapes::sphere(1.0, 3));
+    let (a, b) = (planish::synthetic::demo(1, 4_000), shapes::sphere(1.0, 3));
     let run = |n| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
         pool.install(|| compare(&a, &b, &CompareParams { samples: 30_000, seed: 1 }, &Silent).unwrap())

@@ -2,10 +2,12 @@
 
 mod common;
 
-use planish::mesh::{Adjacency, FacePoint, FeatureTags, TriMesh, close_holes, diagnose, shapes, sharp_edges};
+use planish::mend::close_holes;
+use planish::mesh::{Adjacency, FacePoint, FeatureTags, TriMesh, diagnose, sharp_edges};
 use planish::network::{
     Corner, Curve, CurveKind, ImprintError, LayoutError, LayoutParams, Network, Patch, Side, imprint, layout,
 };
+use planish::synthetic::{self, shapes};
 use planish::{DVec3, Silent};
 
 /// Shapes with the Euler number of each.
@@ -161,7 +163,7 @@ fn a_sheet_of_24_patches_with_36_pinholes_has_at_most_8_more_once_they_are_close
 
 #[test]
 fn layouts_are_equal_on_1_and_4_threads() {
-    let mesh = shapes::demo(7, 6000);
+    let mesh = synthetic::demo(7, 6000);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| layout(&mesh, &params(40), &Silent)).expect("the demo has a layout")

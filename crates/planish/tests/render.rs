@@ -1,8 +1,9 @@
 //! Pictures: what is seen, what hides it, the numbers on the scale bar, stripes, and the same bytes always.
 
 use planish::DVec3;
-use planish::mesh::{TriMesh, shapes};
+use planish::mesh::TriMesh;
 use planish::render::{Camera, Image, Line, Look, Paint, render};
+use planish::synthetic::shapes;
 
 const SIDE: usize = 240;
 const WHITE: [u8; 3] = [255, 255, 255];

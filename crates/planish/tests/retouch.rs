@@ -6,13 +6,14 @@ mod common;
 use planish::curve::SnakeParams;
 use planish::edit::{Ground, apply};
 use planish::grid::{self, Grid, GridParams};
-use planish::mesh::{Adjacency, TriMesh, shapes};
+use planish::mesh::{Adjacency, TriMesh};
 use planish::model::{Drawing, Model};
 use planish::network::{
     CurveKind, Editor, Holds, LayoutParams, Network, PatchMesh, changed_patches, imprint, layout, reimprint,
 };
 use planish::pipeline::{self, Earlier, PipelineParams};
 use planish::surface::{self, FitParams};
+use planish::synthetic::shapes;
 use planish::{DVec3, Silent};
 
 /// A wavy ball with a network of about 24 patches, and the same network with one curve dragged by a share of its

@@ -6,11 +6,12 @@ use planish::curve::Relaxed;
 use planish::edit::{ApplyError, Edit, Ground, Made, apply};
 use planish::geom::Bvh;
 use planish::grid::{self, Family};
-use planish::mesh::{Adjacency, Attribute, TriMesh, shapes};
+use planish::mesh::{Adjacency, Attribute, TriMesh};
 use planish::model::{Drawing, HistoryEntry, Model};
 use planish::network::{CurveKind, EditError, Fault, diagnose, imprint};
 use planish::observe::Silent;
 use planish::pipeline::{self, PipelineParams};
+use planish::synthetic::shapes;
 
 fn json(text: &str) -> Edit {
     serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"))

@@ -5,9 +5,8 @@ use super::run::{Job, Scanned, from_scan, produce};
 use crate::args::Demo;
 use crate::failure::{Failure, Status};
 use crate::products::Staged;
-use planish::cloud::{ScannerParams, virtual_scan};
-use planish::mesh::shapes;
 use planish::pipeline::Figure;
+use planish::synthetic::{self, ScannerParams, virtual_scan};
 use planish_io::{Up, WriteOptions};
 use std::path::Path;
 
@@ -20,7 +19,7 @@ const TRIANGLES: usize = 100_000;
 pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
     let staged = Staged::folder(&args.output)?;
     let seed = session.common.seed.unwrap_or(0);
-    let (truth, shape) = session.step("shape", || Ok(shapes::demo(seed, TRIANGLES)))?;
+    let (truth, shape) = session.step("shape", || Ok(synthetic::demo(seed, TRIANGLES)))?;
     let scanner = ScannerParams { points: args.points as usize, seed, ..ScannerParams::default() };
     let (made, shot) = session.bars.step("scan", |o| virtual_scan(&truth, &scanner, o));
     if crate::progress::interrupted() {

@@ -144,7 +144,7 @@ fn start(session: &Session, args: &EditArgs) -> Result<Model, Failure> {
         return Ok(model);
     }
     let input = files::mesh(&args.input)?;
-    let (mesh, _) = planish::mesh::repair(&input).map_err(|e| Failure::input(&args.input, e))?;
+    let (mesh, _) = planish::mend::repair(&input).map_err(|e| Failure::input(&args.input, e))?;
     Ok(Model { mesh, units: session.units(), ..Model::default() })
 }
 

@@ -29,7 +29,6 @@ mod project;
 mod quadric;
 mod refine;
 mod rim;
-mod scanner;
 mod segments;
 mod sites;
 mod step;
@@ -43,7 +42,6 @@ pub use cells::Cell;
 pub use dipoles::Dipoles;
 pub use project::{Cleaned, ProjectParams, project};
 pub use quadric::Quadric;
-pub use scanner::{ScannerParams, VirtualScan, virtual_scan};
 
 use crate::geom::{Aabb, KdTree};
 use crate::mesh::Attribute;

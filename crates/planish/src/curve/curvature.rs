@@ -108,7 +108,7 @@ fn of_triangle(mesh: &TriMesh, t: usize, normals: &[DVec3]) -> Option<[f64; 3]> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::synthetic::shapes;
 
     #[test]
     fn a_sphere_of_radius_2_has_both_curvatures_one_half_within_7_percent() {

@@ -185,7 +185,8 @@ pub fn lines(mesh: &TriMesh, adjacency: &Adjacency, marked: &[bool]) -> Vec<Surf
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{shapes, sharp_edges};
+    use crate::mesh::sharp_edges;
+    use crate::synthetic::shapes;
 
     #[test]
     fn a_plane_cuts_a_sphere_in_a_closed_curve_of_the_girth_within_half_a_percent() {

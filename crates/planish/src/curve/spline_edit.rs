@@ -195,7 +195,8 @@ fn basis(count: usize, closed: bool, t: f64) -> (usize, [f64; 4]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{FacePoint, shapes};
+    use crate::mesh::FacePoint;
+    use crate::synthetic::shapes;
 
     #[test]
     fn basis_functions_sum_to_1_and_a_clamped_spline_ends_at_its_end_vertices() {

@@ -586,7 +586,7 @@ fn local_path(mesh: &TriMesh, adjacency: &Adjacency, from: u32, to: u32) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::synthetic::shapes;
     use glam::DVec3;
 
     #[test]

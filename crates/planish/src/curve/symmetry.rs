@@ -203,8 +203,8 @@ fn eigen(m: DMat3) -> ([f64; 3], [DVec3; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
     use crate::observe::Silent;
+    use crate::synthetic::shapes;
 
     #[test]
     fn the_one_plane_of_symmetry_of_a_lopsided_body_is_found_within_a_thousandth() {

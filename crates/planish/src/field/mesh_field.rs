@@ -193,7 +193,7 @@ fn is_balanced(mesh: &TriMesh) -> bool {
     if is_balanced_by_names(mesh) {
         return true;
     }
-    let (welded, _) = crate::mesh::weld(mesh);
+    let (welded, _) = crate::mend::weld(mesh);
     let mut keyed: Vec<(u64, i32)> = welded
         .triangles
         .par_iter()

@@ -174,7 +174,7 @@ fn solid_angle([a, b, c]: &[DVec3; 3], p: DVec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::synthetic::shapes;
 
     #[test]
     fn closed_sphere_has_winding_number_one_inside_and_zero_outside_within_1_percent() {

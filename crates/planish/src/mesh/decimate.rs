@@ -220,7 +220,8 @@ fn lock(mesh: &TriMesh, result: &TriMesh, source: &[u32], meeting: &[[u32; 2]], 
 mod tests {
     use super::*;
     use crate::Silent;
-    use crate::mesh::{diagnose, shapes};
+    use crate::mesh::diagnose;
+    use crate::synthetic::shapes;
 
     fn to(target: DecimateTarget) -> DecimateParams {
         DecimateParams { target, ..Default::default() }

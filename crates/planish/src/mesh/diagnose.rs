@@ -175,7 +175,7 @@ pub fn diagnose(mesh: &TriMesh) -> Diagnosis {
 }
 
 /// A triangle's vertices in rising order.
-pub(super) fn sorted_triple(mut t: [u32; 3]) -> [u32; 3] {
+pub(crate) fn sorted_triple(mut t: [u32; 3]) -> [u32; 3] {
     t.sort_unstable();
     t
 }

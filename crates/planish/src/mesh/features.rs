@@ -76,7 +76,7 @@ pub fn components(adjacency: &Adjacency) -> (Vec<u32>, usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::synthetic::shapes;
 
     #[test]
     fn cylinder_has_its_two_rims_of_64_edges_sharp_at_40_degrees_and_nothing_else() {

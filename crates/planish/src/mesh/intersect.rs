@@ -17,7 +17,7 @@ pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
 }
 
 /// As [`self_intersections`], of pairs of which one is `active`.
-pub(super) fn intersections_of(mesh: &TriMesh, active: impl Fn(u32) -> bool + Sync) -> Vec<[u32; 2]> {
+pub(crate) fn intersections_of(mesh: &TriMesh, active: impl Fn(u32) -> bool + Sync) -> Vec<[u32; 2]> {
     let active: Vec<bool> = (0..mesh.triangles.len() as u32).into_par_iter().map(&active).collect();
     let boxes: Vec<[DVec3; 2]> = (0..mesh.triangles.len())
         .into_par_iter()
@@ -103,7 +103,7 @@ fn cell_size(boxes: &[[DVec3; 2]]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::synthetic::shapes;
 
     #[test]
     fn sound_shapes_have_none_and_two_crossing_spheres_have_a_ring_of_them() {

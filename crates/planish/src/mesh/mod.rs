@@ -1,53 +1,29 @@
 //! Triangle meshes: flat arrays, adjacency, places on the surface.
 
 mod adjacency;
-mod bent;
-mod broken_lines;
 pub mod compare;
 pub mod decimate;
-mod demo;
-mod diagnose;
+pub(crate) mod diagnose;
 mod face_point;
-mod fair_lines;
 mod features;
-mod flanks;
-mod handles;
-mod holes;
-mod intersect;
-mod lids;
-mod lines;
-mod merging;
+pub(crate) mod intersect;
 pub mod path;
-mod repair;
-mod rings;
-mod rounded;
 pub(crate) mod sets;
-pub mod shapes;
-mod slivers;
 pub mod smooth;
-mod soup;
+pub(crate) mod soup;
 mod tags;
-mod trim;
 mod walk;
 
 pub use adjacency::{Adjacency, Fan, NONE, next, previous};
-pub(crate) use bent::split_bent;
-pub use broken_lines::mend_lines;
-pub(crate) use broken_lines::{bridge_gaps, cut_spikes};
 pub use compare::{CompareError, CompareParams, Comparison, compare};
 pub use decimate::{DecimateError, DecimateParams, DecimateTarget, Decimated, decimate};
 pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
 pub use face_point::FacePoint;
-pub use fair_lines::fair_lines;
 pub use features::{boundary_loops, components, sharp_edges};
-pub use flanks::ScanScale;
-pub use holes::close_holes;
 pub use intersect::self_intersections;
-pub use repair::{Repairs, part_fans, repair, weld};
 pub use smooth::{SmoothError, SmoothParams, Smoothed, smooth};
 pub use soup::check;
 pub use tags::{FEATURE, FeatureKind, FeatureTags};
-pub use trim::trim;
 pub use walk::{CurvePlace, move_point_on_curve, move_point_on_surface};
 
 use crate::geom::Aabb;

@@ -375,7 +375,8 @@ mod tests {
     use super::*;
     use crate::Silent;
     use crate::geom::random;
-    use crate::mesh::{diagnose, shapes};
+    use crate::mesh::diagnose;
+    use crate::synthetic::shapes;
 
     fn noisy(mesh: &TriMesh, size: f64) -> TriMesh {
         let normals = mesh.vertex_normals();

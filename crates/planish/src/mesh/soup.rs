@@ -20,7 +20,7 @@ pub fn check(mesh: &TriMesh) -> Result<(), MeshError> {
 }
 
 /// All half-edges of triangles with three different vertices, sorted by undirected edge: `(edge, half-edge)`.
-pub(super) fn keyed_edges(triangles: &[[u32; 3]]) -> Vec<(u64, u32)> {
+pub(crate) fn keyed_edges(triangles: &[[u32; 3]]) -> Vec<(u64, u32)> {
     // What is no edge is sorted to the end. One array from the start: half-edges are many in large meshes.
     let key = |h: usize| {
         let (t, k) = (&triangles[h / 3], h % 3);
@@ -35,12 +35,12 @@ pub(super) fn keyed_edges(triangles: &[[u32; 3]]) -> Vec<(u64, u32)> {
 }
 
 /// True if a triangle names a vertex twice.
-pub(super) fn repeats(t: &[u32; 3]) -> bool {
+pub(crate) fn repeats(t: &[u32; 3]) -> bool {
     t[0] == t[1] || t[1] == t[2] || t[2] == t[0]
 }
 
 /// For each half-edge the other one of its edge where exactly two triangles meet, whatever their directions.
-pub(super) fn mates(keyed: &[(u64, u32)], half_edges: usize) -> Vec<u32> {
+pub(crate) fn mates(keyed: &[(u64, u32)], half_edges: usize) -> Vec<u32> {
     let mut mate = vec![NONE; half_edges];
     for run in keyed.chunk_by(|x, y| x.0 == y.0) {
         if let [(_, g), (_, h)] = *run {
@@ -52,12 +52,12 @@ pub(super) fn mates(keyed: &[(u64, u32)], half_edges: usize) -> Vec<u32> {
 }
 
 /// Vertex at the start of half-edge `h`.
-pub(super) fn origin(triangles: &[[u32; 3]], h: u32) -> u32 {
+pub(crate) fn origin(triangles: &[[u32; 3]], h: u32) -> u32 {
     triangles[h as usize / 3][h as usize % 3]
 }
 
 /// Orientation of the pieces that mates connect.
-pub(super) struct Orientation {
+pub(crate) struct Orientation {
     /// For each triangle its piece.
     pub piece: Vec<u32>,
     /// For each triangle whether it must be turned to agree with the first of its piece.
@@ -67,7 +67,7 @@ pub(super) struct Orientation {
 }
 
 /// Flood fill over mates. Half-edges of one edge should run against each other.
-pub(super) fn orient(triangles: &[[u32; 3]], mate: &[u32]) -> Orientation {
+pub(crate) fn orient(triangles: &[[u32; 3]], mate: &[u32]) -> Orientation {
     let mut piece = vec![NONE; triangles.len()];
     let mut turned = vec![false; triangles.len()];
     let mut pieces = 0;
@@ -95,7 +95,7 @@ pub(super) fn orient(triangles: &[[u32; 3]], mate: &[u32]) -> Orientation {
 
 /// For each corner `3 t + k` the least corner of the same fan: corners of neighbouring triangles at a shared
 /// vertex, connected over mates.
-pub(super) fn fans(triangles: &[[u32; 3]], mate: &[u32]) -> Vec<u32> {
+pub(crate) fn fans(triangles: &[[u32; 3]], mate: &[u32]) -> Vec<u32> {
     let mut sets = super::sets::Sets::new(mate.len());
     for h in 0..mate.len() as u32 {
         let g = mate[h as usize];

@@ -52,7 +52,7 @@ impl FeatureTags {
     }
 
     /// The tags of the same mesh with other `edges`. A corner of two edges stays one.
-    pub(super) fn with_edges(&self, edges: impl IntoIterator<Item = [u32; 2]>) -> FeatureTags {
+    pub(crate) fn with_edges(&self, edges: impl IntoIterator<Item = [u32; 2]>) -> FeatureTags {
         let count = self.vertices.len();
         let mut tags = FeatureTags::from_edges(count, edges);
         // What is a corner though two edges meet there.
@@ -67,7 +67,7 @@ impl FeatureTags {
     }
 
     /// Marks the half-edges of `mesh`, whose tags these are, on the tagged edges.
-    pub(super) fn on(&self, mesh: &TriMesh) -> Vec<bool> {
+    pub(crate) fn on(&self, mesh: &TriMesh) -> Vec<bool> {
         let ends = |h: u32| (mesh.origin(h), mesh.origin(super::next(h)));
         (0..3 * mesh.triangles.len() as u32)
             .into_par_iter()

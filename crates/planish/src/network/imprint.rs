@@ -707,7 +707,7 @@ pub(crate) fn half_edge(triangles: &[[u32; 3]], adjacency: &Adjacency, a: u32, b
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::synthetic::shapes;
 
     /// Half-edges without another face.
     fn free(mesh: &TriMesh) -> usize {

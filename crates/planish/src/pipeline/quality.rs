@@ -1,14 +1,14 @@
 //! Figures of quality of a model against its mesh, and what a user should know about them.
 
 use super::{Figure, PipelineError, Quality, Warning};
-use crate::grid;
-use crate::mesh::{self, CompareParams, Comparison, Repairs, TriMesh};
+use crate::mend::Repairs;
+use crate::mesh::{self, CompareParams, Comparison, TriMesh};
 use crate::model::Model;
 use crate::network::{CurveKind, Network, PatchMesh};
 use crate::observe::Observer;
-use crate::relief;
 use crate::surface::basis::uniform_parameters;
 use crate::surface::{self, SeamQuality, Surface};
+use crate::{grid, relief};
 use rayon::prelude::*;
 
 /// Quads per knot span and direction, at most, in the mesh that stands for a surface when distances are measured:

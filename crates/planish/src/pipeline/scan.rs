@@ -1,6 +1,5 @@
 //! From a scan to a mesh: samples, their field, its surface.
 
-use super::finish::finish;
 use super::record::Figure;
 use super::{PipelineParams, Quality, Warning};
 use crate::cloud::{self, CleanParams, Cloud, CloudError, Samples};
@@ -8,9 +7,11 @@ use crate::contour::{self, ContourParams, Meshed, MeshingError, Sampling};
 use crate::field::{SampleField, Spacing};
 use crate::geom::Bvh;
 use crate::grid::GridParams;
+use crate::mend::finish;
 use crate::mesh::sets::Sets;
-use crate::mesh::{self, FeatureTags, ScanScale, TriMesh};
+use crate::mesh::{FeatureTags, TriMesh};
 use crate::observe::Observer;
+use crate::sharp::{self, ScanScale};
 use crate::surface::{FitParams, Resolution};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -107,9 +108,9 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
     }
     let contour::Extracted { mesh, tags, .. } = &mut meshed.extracted;
     let cell = meshed.lattice.step.x;
-    mesh::mend_lines(mesh, tags);
-    mesh::fair_lines(mesh, tags, &ScanScale { noise: samples.noise, spacing: samples.spacing, cell });
-    mesh::split_bent(mesh, tags, BENT * fit_tolerance(&samples) * samples.diagonal);
+    sharp::mend_lines(mesh, tags);
+    sharp::fair_lines(mesh, tags, &ScanScale { noise: samples.noise, spacing: samples.spacing, cell });
+    sharp::split_bent(mesh, tags, BENT * fit_tolerance(&samples) * samples.diagonal);
     tags.mark(mesh);
     let mut reached = reach(scan, &meshed.extracted.mesh);
     let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags, &reached);

@@ -122,7 +122,7 @@ pub fn truth_figures(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::synthetic::shapes;
 
     #[test]
     fn edges_of_a_box_of_1_by_2_by_3_are_24_long_at_90_degrees() {

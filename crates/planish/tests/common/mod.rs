@@ -2,7 +2,8 @@
 #![allow(dead_code, clippy::print_stdout)]
 
 use planish::DVec3;
-use planish::mesh::{TriMesh, shapes};
+use planish::mesh::TriMesh;
+use planish::synthetic::{self, shapes};
 use std::path::PathBuf;
 
 /// A mesh of the developers' data set (`PLANISH_DATA`, or `../shared/data` beside the repository); `None`, with
@@ -56,7 +57,7 @@ pub fn closed_meshes() -> Vec<(&'static str, TriMesh, i64)> {
         ("cylinder", shapes::cylinder(1.0, 3.0, 48), 0),
         ("cuboid", shapes::cuboid(DVec3::new(1.0, 2.0, 3.0), 6), 0),
         ("double torus", shapes::double_torus(5), 2),
-        ("demo", shapes::demo(1, 8_000), 1),
+        ("demo", synthetic::demo(1, 8_000), 1),
     ]
 }
 

@@ -264,7 +264,7 @@ mod tests {
     use super::super::{LayoutParams, draft, improve, refine};
     use super::*;
     use crate::Silent;
-    use crate::mesh::shapes;
+    use crate::synthetic::shapes;
 
     #[test]
     fn arcs_hold_together_on_a_third_of_the_vertices_and_back_on_all() {

@@ -6,7 +6,8 @@
 
 use super::LayoutParams;
 use crate::mesh::sets::Sets;
-use crate::mesh::{Adjacency, NONE, TriMesh, bridge_gaps, cut_spikes, next, sharp_edges};
+use crate::mesh::{Adjacency, NONE, TriMesh, next, sharp_edges};
+use crate::sharp::{bridge_gaps, cut_spikes};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -209,7 +210,7 @@ fn drop_short(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut 
 #[cfg(test)]
 pub mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::synthetic::shapes;
 
     /// Marks the edges along a chain of places of a sheet.
     pub fn mark(mesh: &TriMesh, adjacency: &Adjacency, sharp: &mut [bool], places: &[(f64, f64)]) {

@@ -202,7 +202,8 @@ pub(super) fn outline(ground: &Ground, label: &[u32], count: usize, corner: &[bo
 mod tests {
     use super::super::lines::tests::mark;
     use super::*;
-    use crate::mesh::{Adjacency, shapes};
+    use crate::mesh::Adjacency;
+    use crate::synthetic::shapes;
 
     #[test]
     fn a_line_that_turns_back_by_135_degrees_beside_a_fork_has_a_corner_and_one_of_90_has_none() {

@@ -174,7 +174,8 @@ fn best(bench: &Bench, scale: &Scale, tip: u32) -> Option<Gain> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Adjacency, TriMesh, shapes};
+    use crate::mesh::{Adjacency, TriMesh};
+    use crate::synthetic::shapes;
 
     fn tips_of(mesh: &TriMesh, side: f64) -> Vec<u32> {
         let adjacency = Adjacency::new(mesh);

@@ -10,8 +10,8 @@
 //!    from the loop that is left. So all sharp edges are exact chains of mesh edges.
 
 use super::rings::{Ring, add_ring, grow, grow_disk};
-use super::{Adjacency, NONE, TriMesh, next};
 use crate::geom::random;
+use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -379,4 +379,53 @@ fn cut_out(mesh: &TriMesh, pocket: &Pocket) -> Option<(TriMesh, Vec<u32>)> {
     // The body lies on the left of its open edges; seen from outside that is clockwise.
     outline.reverse();
     (outline.len() == open.len()).then_some((cut, outline))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::diagnose;
+
+    #[test]
+    fn demo_is_closed_of_genus_1_near_the_wanted_size_with_even_triangles_for_20_seeds() {
+        for seed in 0..20 {
+            let mesh = demo(seed, 20_000);
+            let found = diagnose(&mesh);
+            assert!(found.manifold && found.watertight, "seed {seed}");
+            assert_eq!(found.euler, 0, "seed {seed}");
+            assert!((mesh.triangles.len() as f64 / 20_000.0 - 1.0).abs() < 0.03, "{}", mesh.triangles.len());
+            let volume: f64 =
+                (0..mesh.triangles.len()).map(|t| mesh.corners(t)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum();
+            assert!(volume > 2.0);
+            let mut edges: Vec<f64> = Vec::new();
+            for t in 0..mesh.triangles.len() {
+                let [a, b, c] = mesh.corners(t);
+                edges.extend([a.distance(b), b.distance(c), c.distance(a)]);
+            }
+            edges.sort_by(f64::total_cmp);
+            let (low, middle, high) = (edges[0], edges[edges.len() / 2], edges[edges.len() - 1]);
+            assert!(low > 0.15 * middle && high < 3.0 * middle, "seed {seed}: {low} {middle} {high}");
+        }
+    }
+
+    #[test]
+    fn demo_has_12_closed_sharp_lines_over_40_degrees_for_20_seeds() {
+        for seed in 0..20 {
+            let mesh = demo(seed, 20_000);
+            let adjacency = Adjacency::new(&mesh);
+            let sharp = crate::mesh::sharp_edges(&mesh, &adjacency, 40.0);
+            // Every vertex of a sharp line has two sharp edges: the lines are closed, without gap or branch.
+            let mut degree = vec![0; mesh.points.len()];
+            let mut lines = crate::mesh::sets::Sets::new(mesh.points.len());
+            for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
+                degree[mesh.origin(h) as usize] += 1;
+                lines.join(mesh.origin(h), mesh.origin(crate::mesh::next(h)));
+            }
+            assert!(degree.iter().all(|&d| d == 0 || d == 2), "seed {seed}");
+            let roots = (0..mesh.points.len() as u32).filter(|&v| degree[v as usize] > 0 && lines.root(v) == v);
+            // Two outlines, two circles each of counterbore and bore, of two pockets their rim and floor, of the
+            // hole its mouth and floor; the mouth of the bore lies in the counterbore's floor.
+            assert_eq!(roots.count(), 2 + 4 + 4 + 2, "seed {seed}");
+        }
+    }
 }

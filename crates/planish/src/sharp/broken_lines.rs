@@ -3,7 +3,7 @@
 //! Noise hides a few edges of a line, or shifts it by an edge. A gap costs more than its length: a line with a loose end is
 //! taken for surface detail, or two patches run into one another there.
 
-use super::{Adjacency, FeatureTags, NONE, TriMesh, next, path, previous};
+use crate::mesh::{Adjacency, FeatureTags, NONE, TriMesh, next, path, previous};
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -347,7 +347,8 @@ fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{FeatureKind, shapes};
+    use crate::mesh::FeatureKind;
+    use crate::synthetic::shapes;
 
     const CELLS: usize = 60;
 

@@ -1,6 +1,6 @@
 //! Cuts a mesh along a line where a function on its vertices is zero.
 
-use super::{Attribute, FeatureKind, FeatureTags, NONE, TriMesh};
+use crate::mesh::{Attribute, FeatureKind, FeatureTags, NONE, TriMesh};
 use std::collections::BTreeMap;
 
 /// A cut this close to an end of an edge, as a share of it, goes through that end: triangles keep a height.
@@ -119,7 +119,8 @@ fn snapped(mesh: &TriMesh, level: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{diagnose, shapes};
+    use crate::mesh::diagnose;
+    use crate::synthetic::shapes;
 
     #[test]
     fn a_sheet_cut_along_a_slanted_line_loses_exactly_its_other_side_and_keeps_half_of_a_tagged_line() {

@@ -9,11 +9,11 @@
 //! 4. vertices in the way are merged into their neighbours ([`merging`](super::merging)), and who went back tries again.
 
 use super::flanks::{Flank, Plane, ScanScale};
-use super::intersect::intersections_of;
 use super::lines::{Lines, Seen};
 use super::merging::{Fault, Merging};
 use super::rounded::{self, meet};
-use super::{FeatureTags, TriMesh};
+use crate::mesh::intersect::intersections_of;
+use crate::mesh::{FeatureTags, TriMesh};
 use glam::DVec3;
 use rayon::prelude::*;
 

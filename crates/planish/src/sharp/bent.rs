@@ -8,9 +8,9 @@
 //! Triangles*, 2001, has cubics of the same normals. On a line what is across its tangent takes the place of what is across
 //! the surface.
 
-use super::intersect::intersections_of;
 use super::lines::Lines;
-use super::{FeatureKind, FeatureTags, TriMesh, next, previous};
+use crate::mesh::intersect::intersections_of;
+use crate::mesh::{FeatureKind, FeatureTags, TriMesh, next, previous};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -109,7 +109,7 @@ fn bends(mesh: &TriMesh, tags: &FeatureTags, least: f64) -> Vec<Split> {
         let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
         let other = lines.adjacency.opposite[h as usize];
         // Each edge once; the boundary stays.
-        if other == super::NONE || a > b {
+        if other == crate::mesh::NONE || a > b {
             return None;
         }
         let [p, q] = [a, b].map(|v| mesh.points[v as usize]);
@@ -211,7 +211,8 @@ fn thirds(points: &[DVec3], [a, b, c]: [u32; 3], [m, n]: [u32; 2]) -> Vec<[u32; 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Adjacency, NONE, self_intersections, shapes};
+    use crate::mesh::{Adjacency, NONE, self_intersections};
+    use crate::synthetic::shapes;
 
     #[test]
     fn the_edges_of_a_coarse_tube_and_its_rims_are_split_onto_it() {

@@ -1,8 +1,8 @@
 //! Triangles without height: removed by collapsing or flipping edges, so that the surface stays whole.
 
 use super::repair::Repairs;
-use super::{Adjacency, NONE, TriMesh, next, previous};
 use crate::geom::{Aabb, tolerance};
+use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
 use glam::DVec3;
 
 /// Each pass can free only triangles that do not touch each other; clusters of them are short in practice.

@@ -4,10 +4,10 @@
 //! an edge. But its flanks meet elsewhere: at an edge the surface reaches the place where they meet, at a rounding it stays
 //! short of it.
 
-use super::TriMesh;
 use super::flanks::{Flank, Moments, Plane, ScanScale};
 use super::lines::{Lines, Seen};
-use super::sets::Sets;
+use crate::mesh::TriMesh;
+use crate::mesh::sets::Sets;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};

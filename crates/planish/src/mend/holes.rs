@@ -4,7 +4,7 @@
 //! looks the way a lid would. The end of a pipe is no hole, for its sides look away from its axis.
 
 use super::lids::{Lid, least_area, lid};
-use super::{Adjacency, FeatureKind, FeatureTags, TriMesh, boundary_loops, components, next};
+use crate::mesh::{Adjacency, FeatureKind, FeatureTags, TriMesh, boundary_loops, components, next};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -114,14 +114,15 @@ fn cross(points: &[DVec3], t: &[usize; 3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{diagnose, shapes};
+    use crate::mesh::diagnose;
+    use crate::synthetic::shapes;
 
     /// The sphere of radius 1 without the triangles that have a corner within `radius` of the north pole.
     fn holed_sphere(radius: f64) -> TriMesh {
         let mut mesh = shapes::sphere(1.0, 5);
         let points = &mesh.points;
         mesh.triangles.retain(|t| t.iter().all(|&v| points[v as usize].distance(DVec3::Z) > radius));
-        crate::mesh::repair(&mesh).unwrap().0
+        crate::mend::repair(&mesh).unwrap().0
     }
 
     #[test]
@@ -159,7 +160,7 @@ mod tests {
             let z = t.map(|v| caps.points[v as usize].z);
             z.iter().any(|&a| (a - z[0]).abs() > 1e-9)
         });
-        let (mut pipe, _) = crate::mesh::repair(&pipe).unwrap();
+        let (mut pipe, _) = crate::mend::repair(&pipe).unwrap();
         let mut tags = FeatureTags::from_edges(pipe.points.len(), []);
         assert_eq!(diagnose(&pipe).boundary_loops, 2);
         assert_eq!(close_holes(&mut pipe, &mut tags, 100.0), 0);

@@ -1,7 +1,7 @@
 //! Triangles that are not as they should be: vertices merged into neighbours and edges flipped, one disk at a time.
 
-use super::intersect::intersections_of;
-use super::{FeatureKind, TriMesh};
+use crate::mesh::intersect::intersections_of;
+use crate::mesh::{FeatureKind, TriMesh};
 use glam::DVec3;
 use std::collections::BTreeSet;
 
@@ -276,7 +276,8 @@ fn shape([a, b, c]: [DVec3; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{FeatureTags, diagnose, self_intersections, shapes};
+    use crate::mesh::{FeatureTags, diagnose, self_intersections};
+    use crate::synthetic::shapes;
 
     /// A sheet of 8 x 8 cells of size 1, whose middle vertex lies at `middle`.
     fn sheet(middle: DVec3) -> (TriMesh, u32) {

@@ -4,11 +4,13 @@
 //! A field is known as far as the widest support reaches, so the mesh of an open scan hangs over its data by several
 //! spacings and ends in the steps of cells.
 //! 1. cold comes in from the rim and from where no raw point is near, along the surface and for a while; what gets cold is cut
-//!    off along a line of one temperature ([`mesh::trim`]): the steps of the rim, its tongues and spikes
-//! 2. small holes are closed before, so that they do not grow, and after ([`mesh::close_holes`])
+//!    off along a line of one temperature ([`mend::trim`]): the steps of the rim, its tongues and spikes
+//! 2. small holes are closed before, so that they do not grow, and after ([`mend::close_holes`])
 
+use super::part_fans;
 use crate::geom::KdTree;
-use crate::mesh::{self, FeatureTags, TriMesh, part_fans};
+use crate::mend;
+use crate::mesh::{self, FeatureTags, TriMesh};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -28,16 +30,16 @@ const ROUNDS: usize = 32;
 const COLD: f64 = 0.3;
 
 /// Trims the mesh of an open scan; with `lids` closes its small holes. Returns how many were closed.
-pub(super) fn finish(mesh: &mut TriMesh, tags: &mut FeatureTags, points: &[DVec3], voxel: f64, lids: bool) -> usize {
+pub(crate) fn finish(mesh: &mut TriMesh, tags: &mut FeatureTags, points: &[DVec3], voxel: f64, lids: bool) -> usize {
     let longest = SMALL_HOLE * mesh.bounds().diagonal();
     part(mesh, tags);
     let seen = mesh.points.len();
-    let mut closed = if lids { mesh::close_holes(mesh, tags, longest) } else { 0 };
+    let mut closed = if lids { mend::close_holes(mesh, tags, longest) } else { 0 };
     let warmth = warmth(mesh, seen, points, voxel);
-    mesh::trim(mesh, tags, &warmth.iter().map(|w| w - COLD).collect::<Vec<f64>>());
+    mend::trim(mesh, tags, &warmth.iter().map(|w| w - COLD).collect::<Vec<f64>>());
     part(mesh, tags);
     if lids {
-        closed += mesh::close_holes(mesh, tags, longest);
+        closed += mend::close_holes(mesh, tags, longest);
     }
     closed
 }

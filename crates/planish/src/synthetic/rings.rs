@@ -3,7 +3,7 @@
 //! Rings may have different numbers of points, so triangles stay even where the girth changes, and a ring that
 //! lies on a rim makes that rim an exact chain of edges.
 
-use super::TriMesh;
+use crate::mesh::TriMesh;
 use glam::DVec3;
 use std::f64::consts::TAU;
 

@@ -1,6 +1,6 @@
 //! A mesh of a scan with its sharp lines: what is around them, and between them.
 
-use super::{Adjacency, FeatureTags, NONE, TriMesh, next};
+use crate::mesh::{Adjacency, FeatureTags, NONE, TriMesh, next};
 use glam::DVec3;
 use rayon::prelude::*;
 

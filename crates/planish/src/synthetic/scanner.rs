@@ -6,7 +6,7 @@
 //!    thinned, as programs do that merge scans
 //! 3. noise runs along the rays, some ranges are wrong altogether, and every station is a little misplaced
 
-use super::{Cloud, CloudError};
+use crate::cloud::{Cloud, CloudError};
 use crate::geom::{Bvh, KdTree, random};
 use crate::mesh::TriMesh;
 use crate::observe::Observer;
@@ -88,7 +88,7 @@ pub fn virtual_scan(
     params: &ScannerParams,
     observer: &dyn Observer,
 ) -> Result<VirtualScan, CloudError> {
-    let nothing = CloudError::TooFew { given: 0, distinct: 0, needed: super::FEWEST };
+    let nothing = CloudError::TooFew { given: 0, distinct: 0, needed: crate::cloud::FEWEST };
     if truth.triangles.is_empty() || params.stations == 0 {
         return Err(nothing);
     }
@@ -300,8 +300,8 @@ impl Station {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
     use crate::observe::Silent;
+    use crate::synthetic::shapes;
 
     #[test]
     fn a_perfect_scan_lies_on_the_surface_within_1e_12_and_has_the_wanted_number_of_points_within_3_percent() {

@@ -9,10 +9,11 @@
 //!
 //! Gueziec, Taubin, Lazarus, Horn, *Cutting and Stitching* (2001) is the source of step 5.
 
-use super::diagnose::sorted_triple;
 use super::handles::TINY_LOOP;
-use super::soup::{check, fans, keyed_edges, mates, orient, origin, repeats};
-use super::{Attribute, FeatureTags, MeshError, NONE, TriMesh, next, sets::Sets};
+use crate::mesh::diagnose::sorted_triple;
+use crate::mesh::sets::Sets;
+use crate::mesh::soup::{check, fans, keyed_edges, mates, orient, origin, repeats};
+use crate::mesh::{Attribute, FeatureTags, MeshError, NONE, TriMesh, next};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -195,7 +196,7 @@ fn is_folded(mesh: &TriMesh, triangles: &[[u32; 3]], g: u32, h: u32) -> bool {
     let edge = at(origin(triangles, next(g))) - p;
     let axis = edge.normalize_or_zero();
     let aside = |h: u32| {
-        let c = at(origin(triangles, super::previous(h))) - p;
+        let c = at(origin(triangles, crate::mesh::previous(h))) - p;
         c - axis * c.dot(axis)
     };
     let [a, b] = [aside(g), aside(h)];
@@ -421,7 +422,7 @@ fn gather(mesh: &TriMesh, triangles: &[[u32; 3]], source: &[u32]) -> TriMesh {
             .iter()
             // One that does not match the vertices belongs to no vertex.
             .filter(|a| a.values.len() == a.width * mesh.points.len())
-            .map(|a| super::Attribute {
+            .map(|a| crate::mesh::Attribute {
                 name: a.name.clone(),
                 width: a.width,
                 values: from.iter().flat_map(|&v| a.values[v * a.width..(v + 1) * a.width].iter().copied()).collect(),

@@ -9,8 +9,8 @@
 //! Departs from Liepa: edges are split in their middles, which needs no test of triangles; neighbours weigh by the inverse
 //! of their distance, as rims of scans have short and long edges.
 
-use super::{Adjacency, NONE, next, previous};
 use crate::linalg::SparseCholesky;
+use crate::mesh::{Adjacency, NONE, next, previous};
 use glam::DVec3;
 use std::collections::BTreeMap;
 

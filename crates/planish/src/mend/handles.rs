@@ -8,9 +8,9 @@
 //!    and Whittlesey 2005, *Greedy Optimal Homotopy and Homology Generators*)
 //! 3. the surface is cut along it, and both rims are filled with the triangles of least area (`lids`)
 
-use super::sets::Sets;
-use super::{Adjacency, NONE, TriMesh, next, previous};
 use crate::geom::Aabb;
+use crate::mesh::sets::Sets;
+use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -95,7 +95,7 @@ impl Search<'_> {
     }
 
     fn origin(&self, h: u32) -> u32 {
-        super::soup::origin(self.triangles, h)
+        crate::mesh::soup::origin(self.triangles, h)
     }
 
     /// The triangles around `seed` that lie within a ball and hang together.
@@ -345,7 +345,7 @@ fn cut(
 ) {
     let n = around.len();
     let fresh: Vec<u32> = (0..n as u32).map(|k| source.len() as u32 + k).collect();
-    let at_end = |t: &[[u32; 3]], h: u32| super::soup::origin(t, next(h));
+    let at_end = |t: &[[u32; 3]], h: u32| crate::mesh::soup::origin(t, next(h));
     // Before any triangle is changed: those on the right of the loop at each of its vertices.
     let right: Vec<Vec<u32>> = (0..n)
         .map(|k| {
@@ -370,7 +370,9 @@ fn cut(
 
 #[cfg(test)]
 mod tests {
-    use crate::mesh::{TriMesh, diagnose, repair, shapes};
+    use crate::mend::repair;
+    use crate::mesh::{TriMesh, diagnose};
+    use crate::synthetic::shapes;
     use glam::DVec3;
 
     /// Two spheres of radius 1 and distance 40, one with a tube of six triangles from one of its faces to another.

@@ -1,0 +1,14 @@
+//! Meshes made fit for use: one manifold surface without slivers, tiny handles, holes or ragged rims.
+
+mod handles;
+mod holes;
+mod lids;
+mod repair;
+pub(crate) mod rims;
+mod slivers;
+mod trim;
+
+pub use holes::close_holes;
+pub use repair::{Repairs, part_fans, repair, weld};
+pub(crate) use rims::finish;
+pub use trim::trim;
