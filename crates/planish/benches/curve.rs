@@ -6,12 +6,12 @@ mod common;
 use planish::curve::{
     Canvas, Magnet, PaintMode, PaintParams, ScalarField, Section, Snake, SnakeParams, SurfaceCurve, Sweep, way,
 };
+use planish::edit::network::{Editor, Holds};
 use planish::geom::{Bvh, random};
 use planish::grid::{self, Grid, GridParams};
+use planish::layout::{LayoutParams, layout};
 use planish::mesh::{self, Adjacency, FacePoint, TriMesh};
-use planish::network::{
-    CurveKind, Editor, Holds, LayoutParams, PatchMesh, changed_patches, imprint, layout, reimprint,
-};
+use planish::network::{CurveKind, PatchMesh, changed_patches, imprint, reimprint};
 use planish::synthetic::shapes;
 use planish::{DVec3, Silent, mend, surface};
 use std::io::Write;

@@ -24,6 +24,7 @@ pub mod edit;
 pub mod field;
 pub mod geom;
 pub mod grid;
+pub mod layout;
 pub mod linalg;
 pub mod mend;
 pub mod mesh;

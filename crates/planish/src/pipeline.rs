@@ -14,10 +14,11 @@ pub use scan::{ScanError, ScanMeshed, ScanParams, mesh_scan, params_for, sample_
 pub use truth::{EdgesFound, edges_found, truth_figures};
 
 use crate::grid::{self, FeatureError, Grid, GridError, GridParams};
+use crate::layout::{self, LayoutError, LayoutParams};
 use crate::mend::{self, Repairs};
 use crate::mesh::{CompareError, FeatureTags, MeshError, TriMesh};
 use crate::model::{Model, Sketch};
-use crate::network::{self, ImprintError, LayoutError, LayoutParams, Network, PatchMesh};
+use crate::network::{self, ImprintError, Network, PatchMesh};
 use crate::observe::Observer;
 use crate::pipeline::record::Clock;
 use crate::relief::{self, ReliefError};
@@ -381,7 +382,7 @@ fn draw(
 ) -> Result<Network, PipelineError> {
     let tagged = tags.map(|tags| tags.half_edges(input, mesh)).unwrap_or_default();
     let counts = |n: &Network| [("patches", n.patches.len())];
-    Ok(clock.stage("layout", |o| network::layout_tagged(mesh, &tagged, params, o), counts)?)
+    Ok(clock.stage("layout", |o| layout::layout_tagged(mesh, &tagged, params, o), counts)?)
 }
 
 /// The stages from the grids to the reliefs.

@@ -3,12 +3,14 @@
 mod common;
 
 use planish::curve::{SnakeParams, SurfaceCurve, section};
+use planish::edit::network::{EditError, Editor, Holds};
 use planish::edit::{Edit, Ground, apply};
 use planish::geom::Bvh;
 use planish::grid::{self, Family, FeatureCurve, FeatureError, GridParams, Sections, relax_with_features};
+use planish::layout::{LayoutParams, layout};
 use planish::mesh::{Adjacency, FacePoint, TriMesh};
 use planish::model::{Drawing, HistoryEntry, Model};
-use planish::network::{CurveKind, EditError, Editor, Fault, Holds, LayoutParams, Network, imprint, layout};
+use planish::network::{CurveKind, Fault, Network, imprint};
 use planish::pipeline::{self, PipelineParams};
 use planish::synthetic::shapes;
 use planish::{DVec3, Silent};

@@ -2,11 +2,10 @@
 
 mod common;
 
+use planish::layout::{LayoutError, LayoutParams, layout};
 use planish::mend::close_holes;
 use planish::mesh::{Adjacency, FacePoint, FeatureTags, TriMesh, diagnose, sharp_edges};
-use planish::network::{
-    Corner, Curve, CurveKind, ImprintError, LayoutError, LayoutParams, Network, Patch, Side, imprint, layout,
-};
+use planish::network::{Corner, Curve, CurveKind, ImprintError, Network, Patch, Side, imprint};
 use planish::synthetic::{self, shapes};
 use planish::{DVec3, Silent};
 

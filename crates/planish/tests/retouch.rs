@@ -4,13 +4,13 @@
 mod common;
 
 use planish::curve::SnakeParams;
+use planish::edit::network::{Editor, Holds};
 use planish::edit::{Ground, apply};
 use planish::grid::{self, Grid, GridParams};
+use planish::layout::{LayoutParams, layout};
 use planish::mesh::{Adjacency, TriMesh};
 use planish::model::{Drawing, Model};
-use planish::network::{
-    CurveKind, Editor, Holds, LayoutParams, Network, PatchMesh, changed_patches, imprint, layout, reimprint,
-};
+use planish::network::{CurveKind, Network, PatchMesh, changed_patches, imprint, reimprint};
 use planish::pipeline::{self, Earlier, PipelineParams};
 use planish::surface::{self, FitParams};
 use planish::synthetic::shapes;

@@ -3,12 +3,13 @@
 
 use glam::DVec3;
 use planish::curve::Relaxed;
+use planish::edit::network::EditError;
 use planish::edit::{ApplyError, Edit, Ground, Made, apply};
 use planish::geom::Bvh;
 use planish::grid::{self, Family};
 use planish::mesh::{Adjacency, Attribute, TriMesh};
 use planish::model::{Drawing, HistoryEntry, Model};
-use planish::network::{CurveKind, EditError, Fault, diagnose, imprint};
+use planish::network::{CurveKind, Fault, diagnose, imprint};
 use planish::observe::Silent;
 use planish::pipeline::{self, PipelineParams};
 use planish::synthetic::shapes;

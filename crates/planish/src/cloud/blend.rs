@@ -49,7 +49,7 @@ pub struct Blended {
 
 /// How far a cell reaches.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reach {
+pub(crate) struct Reach {
     center: DVec3,
     /// One over the squared support.
     inverse: f64,
@@ -57,7 +57,7 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    pub(super) fn of(cell: &Cell) -> Reach {
+    pub(crate) fn of(cell: &Cell) -> Reach {
         Reach { center: cell.center, inverse: 1.0 / (cell.support * cell.support), trust: cell.trust }
     }
 
@@ -68,7 +68,7 @@ impl Reach {
     }
 
     /// Weight in the blend at `p`.
-    pub(super) fn weight(&self, p: DVec3) -> f64 {
+    pub(crate) fn weight(&self, p: DVec3) -> f64 {
         self.bell(self.share(p))
     }
 

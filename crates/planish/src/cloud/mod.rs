@@ -12,45 +12,29 @@
 
 mod blend;
 mod cells;
-mod chance;
-mod dense;
-mod dipoles;
-mod fit;
-mod front;
-mod guides;
-mod joints;
-mod layers;
-mod link;
-mod moments;
-mod nest;
+mod local;
 mod orient;
-mod points;
 mod project;
-mod quadric;
-mod refine;
-mod rim;
-mod segments;
 mod sites;
-mod step;
-mod strays;
-mod survey;
-mod views;
-mod wind;
 
 pub use blend::{Blend, Blended};
 pub use cells::Cell;
-pub use dipoles::Dipoles;
+pub use local::Quadric;
+pub use orient::Dipoles;
 pub use project::{Cleaned, ProjectParams, project};
-pub use quadric::Quadric;
 
 use crate::geom::{Aabb, KdTree};
+use crate::linalg::eigen3;
 use crate::mesh::Attribute;
 use crate::observe::Observer;
 use glam::DVec3;
+use local::moments;
 use orient::Hints;
+use orient::{link, views};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use sites::{front, strays};
 
 /// A scan: points and whatever else the file told of them. Flat arrays, one entry per point.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -360,7 +344,7 @@ fn distinct(cloud: &Cloud) -> Result<(Vec<DVec3>, Vec<u32>), CloudError> {
     let mut m = moments::Moments::ZERO;
     let size = Aabb::of(&points).diagonal();
     points.iter().for_each(|&p| m.add((p - center) / size, 1.0));
-    let (values, _) = dense::eigen3(m.covariance());
+    let (values, _) = eigen3(m.covariance());
     // Rounding of the covariance, relative to the longest direction.
     if values[1] < 1e-14 * values[2] {
         return Err(CloudError::Collinear { points: points.len() });

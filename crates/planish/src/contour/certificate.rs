@@ -1,7 +1,7 @@
 //! The certificate on random trilinear grids: closed, manifold, free of self-intersections, with the Euler number of the
 //! interpolant.
 
-use super::topology::Trilinear;
+use super::cell::topology::Trilinear;
 use super::{ContourParams, Extracted, extract};
 use crate::Silent;
 use crate::field::{GridParams, ScalarGrid, sample_grid};

@@ -12,37 +12,30 @@
 //! belong elsewhere (an edge that pokes through a cell without changing a corner) are moved there afterwards, each only
 //! if exact signs allow it ([`polish`](self)).
 
-mod caps;
 mod cell;
 #[cfg(test)]
 mod certificate;
-mod face;
-mod feature;
-mod lines;
-mod local;
 mod octree;
-mod patch;
 mod polish;
-mod refine;
 mod sources;
 mod survey;
-mod topology;
 mod walk;
 
+use crate::contour::cell::face::FacePoints;
+use crate::contour::cell::patch::{INNER, Patcher, Scratch, Sheet};
+use crate::contour::octree::Octree;
+use crate::contour::survey::Survey;
 use crate::field::{Creases, Directed};
 use crate::mesh::{FeatureKind, FeatureTags, TriMesh};
 use crate::observe::Observer;
-pub use refine::FieldCreases;
+use cell::face;
+pub use polish::FieldCreases;
 pub use sources::{Meshed, MeshingError, Sampling, from_field, from_grid, from_mesh, from_part};
 
-use face::FacePoints;
 use glam::DVec3;
-use octree::Octree;
-use patch::{INNER, Patcher, Scratch, Sheet};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use survey::Survey;
 
 /// How to extract.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -6,9 +6,9 @@
 //! the same polyline and no crack can open ([K01] §6 leaves these gaps to be filled); and as the larger cell is convex,
 //! too, its fan is embedded like any other.
 
-use super::caps::Corner;
+use super::cell::caps::Corner;
+use super::cell::patch::{self, Inner, Sheet};
 use super::cell::{AMBIGUOUS, CROSSED, links};
-use super::patch::{self, Inner, Sheet};
 use super::walk::Cell;
 use crate::field::Directed;
 use crate::mesh::FeatureKind;

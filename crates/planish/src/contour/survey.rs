@@ -1,13 +1,13 @@
 //! Smooth cells: one loop whose normals are alike, which is nearly all of them.
 //!
 //! Of the cells that the surface passes these need no more than a table and the flattest fan over their hits; they are
-//! done in one walk. The others are kept for face points and patches ([`super::patch`]): cells with several loops, with an
+//! done in one walk. The others are kept for face points and patches ([`super::cell::patch`]): cells with several loops, with an
 //! ambiguous face, or with normals that may make a feature ([K01] §4.2).
 
 use super::Thresholds;
 use super::cell::RING;
-use super::local::CellRange;
-use super::patch::{Sheet, best_fan};
+use super::cell::patch::{Sheet, best_fan};
+use super::polish::local::CellRange;
 use super::walk::{Cell, walk};
 use crate::field::Directed;
 use glam::DVec3;

@@ -1,18 +1,20 @@
 //! What each edit does to a drawing.
 
-use super::keep;
 use super::mirror::{Images, ON_PLANE};
+use super::network::{EditError, Editor, Holds};
 use super::stroke::Brush;
-use super::{ApplyError, Edit, Forces, LINE_KIND, Made, Name, Others, Pull, RelaxedCurve, Scalar, SplineMove, Spot};
-use super::{carry_network, mirror_network};
-use crate::curve::{
-    Canvas, CurveError, ScalarField, SnakeParams, SplineEdit, SurfaceCurve, carry::LandmarkMap, section, symmetry,
+use super::{
+    ApplyError, Edit, Forces, LINE_KIND, Made, Name, Others, Pull, RelaxedCurve, Scalar, SplineMove, Spot,
+    carry_network, keep, mirror_network,
 };
+use crate::curve::carry::LandmarkMap;
+use crate::curve::{Canvas, CurveError, ScalarField, SnakeParams, SplineEdit, SurfaceCurve, section, symmetry};
 use crate::geom::Bvh;
 use crate::grid::{Family, FeatureCurve, Sections, check_features, family_of};
+use crate::layout::LayoutParams;
 use crate::mesh::{FacePoint, TriMesh, sharp_edges};
 use crate::model::Drawing;
-use crate::network::{CurveKind, EditError, Editor, Holds, LayoutParams, Network, PatchMesh, imprint};
+use crate::network::{CurveKind, Network, PatchMesh, imprint};
 use crate::observe::Observer;
 use glam::DVec3;
 use std::collections::BTreeSet;

@@ -1,8 +1,8 @@
 //! Numbers of an edit that are none, or out of their range.
 
+use super::network::Stretch;
 use super::{ApplyError, Edit, Forces, Magnetism, Name, Pull, SplineMove, Spot};
 use crate::curve::PaintMode;
-use crate::network::Stretch;
 
 /// Cells of a section at most: a grid as fine as the finest displacement maps.
 const MOST_CELLS: usize = 2048;

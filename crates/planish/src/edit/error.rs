@@ -1,8 +1,8 @@
 //! Why an edit was not made.
 
+use super::network::EditError;
 use crate::curve::CurveError;
 use crate::grid::FeatureError;
-use crate::network::EditError;
 
 /// Why an edit was not made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

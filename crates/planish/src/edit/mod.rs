@@ -9,6 +9,7 @@ mod check;
 mod error;
 mod keep;
 mod mirror;
+pub mod network;
 mod outcome;
 mod place;
 mod pull;
@@ -23,9 +24,10 @@ pub use pull::{Forces, Magnetism, Pull, Scalar, SplineMove};
 
 use crate::curve::PaintMode;
 use crate::curve::symmetry::Plane;
+use crate::edit::network::Stretch;
 use crate::grid::Family;
 use crate::model::Drawing;
-use crate::network::{CurveKind, Stretch};
+use crate::network::CurveKind;
 use serde::{Deserialize, Serialize};
 
 /// One edit.

@@ -9,12 +9,12 @@
 //!
 //! Goes beyond [K98], §5.10: there sections of a grid are relaxed again from where they are.
 
-use super::catch::catch;
+use super::chart::locate::Spot;
 use super::chart::{Chart, flatten};
-use super::fold::{folded_cells, open_folds};
-use super::locate::Spot;
+use super::net::catch::catch;
+use super::net::fold::{folded_cells, open_folds};
+use super::net::settle::settle;
 use super::net::{Net, smooth_turned, turns_over};
-use super::settle::settle;
 use super::{CAUGHT, Fault, Grid, GridError, GridParams, SideStops, laid, relax_patch, rim_node, side};
 use crate::mesh::{NONE, TriMesh};
 use crate::network::PatchMesh;

@@ -13,38 +13,28 @@
 //! along a side on curved patches and fold the grid), and points move in that chart, where every step can be
 //! checked exactly for folds, instead of walking over the triangles.
 
-mod catch;
 mod chart;
-mod even;
-mod feature_curve;
-mod feature_network;
-mod feature_slide;
-mod feature_strand;
-mod fold;
+mod feature;
 mod follow;
-mod locate;
-mod loosen;
 mod net;
 mod quality;
 mod resample;
-mod settle;
 mod side;
 mod sizes;
-mod springs;
-mod walk;
 
-pub use feature_curve::{Family, FeatureCurve, FeatureError, FeatureGrid, Sections, relax_with_features};
-pub use feature_network::{check_features, family_of, relax_network};
+pub use feature::curve::{Family, FeatureCurve, FeatureError, FeatureGrid, Sections, relax_with_features};
+pub use feature::network::{check_features, family_of, relax_network};
 pub use follow::follow;
 pub use quality::{GridQuality, measure};
 pub use resample::{resample, resample_with_features};
 pub use sizes::choose_sizes;
 
+use crate::grid::chart::locate::Spot;
 use crate::mesh::{FacePoint, TriMesh};
 use crate::network::PatchMesh;
 use crate::observe::Observer;
 use glam::DVec3;
-use locate::Spot;
+use net::springs;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! How good a grid is.
 
 use super::Grid;
-use super::fold::Sheet;
+use super::net::fold::Sheet;
 use crate::geom::{Aabb, Bvh};
 use crate::mesh::TriMesh;
 use crate::network::PatchMesh;

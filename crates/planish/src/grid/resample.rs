@@ -1,7 +1,7 @@
 //! Grids of a whole network: sizes chosen, patches relaxed, and grids that miss detail made finer.
 
-use super::feature_curve::FeatureError;
-use super::feature_network::{Drawn, give_sums, relax_some};
+use super::feature::curve::FeatureError;
+use super::feature::network::{Drawn, give_sums, relax_some};
 use super::quality::{folds, miss};
 use super::sizes::{bounds, total};
 use super::{Grid, GridError, GridParams, Job, choose_sizes, relax_jobs};

@@ -128,7 +128,7 @@ impl Diagnosis {
 }
 
 /// Curves imprinted, with the half-edges to their left.
-pub(super) struct Drawn {
+pub(crate) struct Drawn {
     pub cut: Cut,
     pub adjacency: Adjacency,
     /// For each half-curve `2 curve + reversed` its half-edges in its direction; [`NONE`] where the mesh ends.
@@ -137,7 +137,7 @@ pub(super) struct Drawn {
     pub barrier: Vec<bool>,
 }
 
-pub(super) fn draw(mesh: &TriMesh, adjacency: &Adjacency, chains: &[Vec<Place>]) -> Result<Drawn, ImprintError> {
+pub(crate) fn draw(mesh: &TriMesh, adjacency: &Adjacency, chains: &[Vec<Place>]) -> Result<Drawn, ImprintError> {
     let borrowed: Vec<&[Place]> = chains.iter().map(|c| &c[..]).collect();
     let cut = imprint::cut(mesh, adjacency, &borrowed)?;
     let own = Adjacency::new(&cut.mesh);
@@ -193,7 +193,7 @@ pub(super) fn draw(mesh: &TriMesh, adjacency: &Adjacency, chains: &[Vec<Place>])
 /// The places of all curves.
 /// # Errors
 /// `NoSuchFace`.
-pub(super) fn chains(
+pub(crate) fn chains(
     mesh: &TriMesh,
     adjacency: &Adjacency,
     network: &Network,
@@ -211,7 +211,7 @@ pub(super) fn chains(
 }
 
 /// The loops of half-curves around the regions, and for each whether it runs along an open boundary without curve.
-pub(super) fn loops(drawn: &Drawn) -> Vec<(Vec<u32>, bool)> {
+pub(crate) fn loops(drawn: &Drawn) -> Vec<(Vec<u32>, bool)> {
     let Drawn { cut, adjacency, halves, .. } = drawn;
     let triangles = &cut.mesh.triangles;
     let from = |h: u32| triangles[h as usize / 3][h as usize % 3];
@@ -365,14 +365,14 @@ fn part(mesh: &TriMesh, adjacency: &Adjacency, chains: &[Vec<Place>]) -> (TriMes
 }
 
 /// The regions of a network with their triangles, for splitting.
-pub(super) struct Regions {
+pub(crate) struct Regions {
     pub drawn: Drawn,
     /// For each region its loops of half-curves and its triangles of the cut mesh.
     pub parts: Vec<(Vec<Vec<u32>>, Vec<u32>)>,
     pub open: Vec<bool>,
 }
 
-pub(super) fn regions(mesh: &TriMesh, adjacency: &Adjacency, network: &Network) -> Result<Regions, ImprintError> {
+pub(crate) fn regions(mesh: &TriMesh, adjacency: &Adjacency, network: &Network) -> Result<Regions, ImprintError> {
     let chains = chains(mesh, adjacency, network)?;
     let drawn = draw(mesh, adjacency, &chains)?;
     let triangles = drawn.cut.mesh.triangles.len();

@@ -255,7 +255,7 @@ pub fn imprint(mesh: &TriMesh, network: &Network) -> Result<Vec<PatchMesh>, Impr
 }
 
 /// Places in a row along a curve.
-pub(super) struct Chain {
+pub(crate) struct Chain {
     /// The curve that it is (a part of).
     pub curve: usize,
     /// Its places.
@@ -269,7 +269,7 @@ type CutOut = (Vec<PatchMesh>, Option<(usize, DVec3)>);
 /// * `whole` - for each curve the chain that is all of it; only those of the sides of `which` are asked for
 /// # Errors
 /// As [`imprint`], but for parts that belong to no patch.
-pub(super) fn cut_out(
+pub(crate) fn cut_out(
     mesh: &TriMesh,
     adjacency: &Adjacency,
     network: &Network,

@@ -1,21 +1,12 @@
 //! Networks: corners, curves and four-sided patches on a mesh.
 
-mod diagnose;
+pub(crate) mod diagnose;
 pub(crate) mod disk;
-mod edit;
-mod edit_cross;
-mod edit_relax;
-mod edit_slide;
-mod edit_split;
 pub(crate) mod imprint;
-mod layout;
 mod reimprint;
 
 pub use diagnose::{Diagnosis, Fault, Region, diagnose, glance};
-pub use edit::{EditError, Editor};
-pub use edit_relax::{Holds, Stretch};
 pub use imprint::{ImprintError, imprint};
-pub use layout::{LayoutError, LayoutParams, layout, layout_tagged};
 pub use reimprint::{changed_patches, reimprint};
 
 use crate::mesh::{FacePoint, TriMesh};

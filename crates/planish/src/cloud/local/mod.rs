@@ -1,0 +1,11 @@
+//! Local fits: quadrics to the points of a ball, and what two or more of them say together about a place.
+
+pub(crate) mod fit;
+pub(crate) mod guides;
+pub(crate) mod joints;
+pub(crate) mod moments;
+pub(crate) mod nest;
+pub(crate) mod points;
+mod quadric;
+
+pub use quadric::Quadric;

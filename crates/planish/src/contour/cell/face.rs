@@ -1,0 +1,276 @@
+//! Face points: where a feature passes a face between two cells.
+//!
+//! METHODS 2.3: a face whose segment joins two hits of different surfaces carries one point, where the tangents of the
+//! two meet in the plane of the face. It is made from the face's own hits alone and shared by both cells, so feature
+//! lines run from cell to cell without the flips of [K01] §4 (fig. 9).
+
+use super::caps::FACE_POINT;
+use super::patch::{Wish, edge_point, joined};
+use super::{AMBIGUOUS, FACE_EDGES, links};
+use crate::contour::Thresholds;
+use crate::contour::walk::Cell;
+use crate::field::{Creases, Directed};
+use crate::geom::predicates::segments_meet;
+use crate::mesh::FeatureKind;
+use glam::{DVec2, DVec3};
+
+/// A face point and the hits that it joins.
+#[derive(Clone, Copy, Debug)]
+struct FacePoint {
+    /// Node of the row at which the face lies.
+    at: u32,
+    /// Names of the two hits, the lesser first.
+    hits: [u32; 2],
+    p: DVec3,
+    /// False for a bend that is no feature.
+    tagged: bool,
+}
+
+/// All face points, by the axis of their face's normal and the row of its least node.
+#[derive(Default)]
+pub struct FacePoints {
+    start: [Vec<u32>; 3],
+    points: [Vec<FacePoint>; 3],
+    /// First name of each axis.
+    base: [u32; 3],
+}
+
+/// What a few layers give.
+#[derive(Default)]
+pub struct Part {
+    points: [Vec<(u32, FacePoint)>; 3],
+    wishes: Vec<(usize, u32, u32, [u32; 2], DVec3)>,
+}
+
+/// Face points keep this distance from the sides of their face, as a fraction of it.
+const CLEAR: f64 = 0.004;
+/// The tangents must cross at an angle with at least this sine.
+const CROSSING: f64 = 0.02;
+/// A meeting farther outside the face than this, in cells, is no feature of it.
+const FAR: f64 = 0.75;
+
+/// Face points of the three faces at the least node of each cell.
+pub fn face_points<'a>(
+    field: &Directed,
+    limits: &Thresholds,
+    refine: Option<&dyn Creases>,
+    base: [u32; 3],
+    cells: impl Iterator<Item = &'a Cell>,
+) -> Part {
+    let mut part = Part::default();
+    for cell in cells {
+        // The three faces at the least node; every face between two cells is one of these.
+        let ambiguous = AMBIGUOUS[cell.config as usize];
+        let low = ambiguous & 0b010101;
+        let links = links(cell.config, if low == 0 { 0 } else { joined(field, cell, low) });
+        for axis in 0..3 {
+            let face = 2 * axis;
+            let mut found: [Option<(FacePoint, Option<DVec3>)>; 2] = [None, None];
+            let mut segments = 0;
+            for &e in &FACE_EDGES[face] {
+                if links.next[e] == FACE_POINT || links.face[e] as usize != face {
+                    continue;
+                }
+                segments += 1;
+                let next = links.next[e] as usize;
+                let [a, b] = [e, next].map(|e| {
+                    let hit = &field.axes[e / 4].hits[cell.hit[e] as usize];
+                    (base[e / 4] + cell.hit[e], edge_point(field, cell, e, hit.t), hit.normal)
+                });
+                let cosine = a.2.dot(b.2);
+                let found_at = if cosine < limits.sharp {
+                    place(field, cell, axis, refine, (a.1, a.2), (b.1, b.2)).map(|(p, wish)| (p, wish, true))
+                } else if cosine < limits.faint {
+                    faint(field, cell, axis, refine, (a.1, a.2), (b.1, b.2)).map(|(p, tagged)| (p, None, tagged))
+                } else {
+                    None
+                };
+                if let Some((p, wish, tagged)) = found_at {
+                    let hits = [a.0.min(b.0), a.0.max(b.0)];
+                    let point = FacePoint { at: cell.at[0] as u32, hits, p, tagged };
+                    found[segments - 1] = Some((point, wish));
+                }
+            }
+            if segments == 2 && !apart(field, cell, axis, &links.next, &found) {
+                found = [None, None];
+            }
+            let row = field.lattice.row(cell.at[1], cell.at[2]) as u32;
+            for (point, wish) in found.into_iter().flatten() {
+                part.points[axis].push((row, point));
+                if let Some(wish) = wish {
+                    part.wishes.push((axis, row, point.at, point.hits, wish));
+                }
+            }
+        }
+    }
+    part
+}
+
+/// Where a bend that only the source knows passes the face, and whether it is a feature.
+fn faint(
+    field: &Directed,
+    cell: &Cell,
+    axis: usize,
+    refine: Option<&dyn Creases>,
+    a: (DVec3, DVec3),
+    b: (DVec3, DVec3),
+) -> Option<(DVec3, bool)> {
+    let [i, j, k] = cell.at;
+    let (low, mut high) = (field.lattice.node(i, j, k), field.lattice.node(i + 1, j + 1, k + 1));
+    high[axis] = low[axis];
+    let (mut p, tagged) = refine?.faint_point(axis, low, high, a, b)?;
+    p[axis] = low[axis];
+    let clear = (0..3).filter(|&u| u != axis).all(|u| {
+        let margin = CLEAR * (high[u] - low[u]);
+        p[u] > low[u] + margin && p[u] < high[u] - margin
+    });
+    clear.then_some((p, tagged))
+}
+
+/// Where the tangents of two hits meet in the plane of the face, kept in the face; and where they meet indeed, if that is
+/// elsewhere.
+fn place(
+    field: &Directed,
+    cell: &Cell,
+    axis: usize,
+    refine: Option<&dyn Creases>,
+    a: (DVec3, DVec3),
+    b: (DVec3, DVec3),
+) -> Option<(DVec3, Option<DVec3>)> {
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let flat = |p: DVec3| DVec2::new(p[u], p[v]);
+    let (pa, pb, na, nb) = (flat(a.0), flat(b.0), flat(a.1), flat(b.1));
+    let det = na.perp_dot(nb);
+    let level = field.lattice.coordinate(axis, cell.at[axis]);
+    let lift = |q: DVec2| {
+        let mut p = DVec3::ZERO;
+        p[axis] = level;
+        p[u] = q.x;
+        p[v] = q.y;
+        p
+    };
+    let low = DVec2::new(field.lattice.coordinate(u, cell.at[u]), field.lattice.coordinate(v, cell.at[v]));
+    let high = DVec2::new(field.lattice.coordinate(u, cell.at[u] + 1), field.lattice.coordinate(v, cell.at[v] + 1));
+    let size = high - low;
+    let mut meeting = None;
+    if det.abs() > CROSSING * na.length() * nb.length() {
+        // <na, x> = <na, pa>, <nb, x> = <nb, pb>, from the middle of both.
+        let m = (pa + pb) / 2.0;
+        let (da, db) = (na.dot(pa - m), nb.dot(pb - m));
+        meeting = Some(m + DVec2::new(da * nb.y - db * na.y, na.x * db - nb.x * da) / det);
+    }
+    if let Some(refine) = refine {
+        let guess = lift(meeting.unwrap_or((pa + pb) / 2.0));
+        if let Some(p) = refine.face_point(axis, guess, a, b, size.max_element()) {
+            meeting = Some(flat(p));
+        }
+    }
+    let q = meeting.filter(|q| q.is_finite())?;
+    let far = size * FAR;
+    if q.cmplt(low - far).any() || q.cmpgt(high + far).any() {
+        return None;
+    }
+    let margin = size * CLEAR;
+    let near = margin * 1e-3;
+    if q.cmpgt(low + near).all() && q.cmplt(high - near).all() {
+        return Some((lift(q), None));
+    }
+    // Along the feature, so that its vertices keep their order, not across it.
+    let kept = lift(q.clamp(low + margin, high - margin));
+    let wish = refine.and_then(|r| r.nearest(kept, size.max_element(), &[a, b])).unwrap_or(lift(q));
+    Some((kept, Some(wish)))
+}
+
+/// True if the two polylines of a face do not meet.
+fn apart(
+    field: &Directed,
+    cell: &Cell,
+    axis: usize,
+    next: &[u8; 12],
+    found: &[Option<(FacePoint, Option<DVec3>)>; 2],
+) -> bool {
+    let face = 2 * axis;
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let flat = |p: DVec3| DVec2::new(p[u], p[v]);
+    let mut lines: Vec<Vec<DVec2>> = Vec::new();
+    for &e in &FACE_EDGES[face] {
+        let to = next[e] as usize;
+        if to >= 12 || !FACE_EDGES[face].contains(&to) || lines.len() == 2 {
+            continue;
+        }
+        let at = |e: usize| flat(edge_point(field, cell, e, field.axes[e / 4].hits[cell.hit[e] as usize].t));
+        let mut line = vec![at(e)];
+        line.extend(found[lines.len()].map(|f| flat(f.0.p)));
+        line.push(at(to));
+        lines.push(line);
+    }
+    let [a, b] = &lines[..] else { return true };
+    a.windows(2).all(|s| b.windows(2).all(|t| !segments_meet(s[0], s[1], t[0], t[1])))
+}
+
+impl FacePoints {
+    /// Puts the parts of consecutive layers together; names begin at `first`.
+    pub fn join(field: &Directed, parts: Vec<Part>, first: u32) -> (FacePoints, Vec<Wish>) {
+        let mut all = FacePoints::default();
+        let rows = field.lattice.rows();
+        let mut name = first;
+        for axis in 0..3 {
+            all.base[axis] = name;
+            let mut start = vec![0u32; rows + 1];
+            for (row, point) in parts.iter().flat_map(|p| &p.points[axis]) {
+                start[*row as usize + 1] += 1;
+                all.points[axis].push(*point);
+            }
+            for r in 0..rows {
+                start[r + 1] += start[r];
+            }
+            all.start[axis] = start;
+            name += all.points[axis].len() as u32;
+        }
+        let wishes = parts
+            .iter()
+            .flat_map(|p| &p.wishes)
+            .filter_map(|&(axis, row, at, hits, p)| Some((all.lookup(axis, row as usize, at, hits)?.0, p)))
+            .collect();
+        (all, wishes)
+    }
+
+    /// Number of face points.
+    pub fn len(&self) -> usize {
+        self.points.iter().map(Vec::len).sum()
+    }
+
+    /// For all, in the order of their names, what they mark.
+    pub fn kinds(&self) -> impl Iterator<Item = FeatureKind> + '_ {
+        self.points.iter().flatten().map(|p| if p.tagged { FeatureKind::Edge } else { FeatureKind::None })
+    }
+
+    /// All positions in the order of their names.
+    pub fn positions(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.points.iter().flatten().map(|p| p.p)
+    }
+
+    /// Position of the face point `id`.
+    pub fn position(&self, id: u32) -> DVec3 {
+        let axis = (0..3).rev().find(|&a| id >= self.base[a] && !self.points[a].is_empty()).unwrap_or(0);
+        self.points[axis].get((id - self.base[axis]) as usize).map_or(DVec3::NAN, |p| p.p)
+    }
+
+    /// Name, position and whether it is a feature of the face point in face `face` of a cell between two hits.
+    pub fn find(&self, field: &Directed, cell: &Cell, face: usize, a: u32, b: u32) -> Option<(u32, DVec3, bool)> {
+        let axis = face / 2;
+        let mut at = cell.at;
+        at[axis] += face & 1;
+        self.lookup(axis, field.lattice.row(at[1], at[2]), at[0] as u32, [a.min(b), a.max(b)])
+    }
+
+    fn lookup(&self, axis: usize, row: usize, at: u32, hits: [u32; 2]) -> Option<(u32, DVec3, bool)> {
+        let start = self.start[axis].get(row)?;
+        let end = self.start[axis].get(row + 1)?;
+        let points = &self.points[axis][*start as usize..*end as usize];
+        let first = points.partition_point(|p| p.at < at);
+        let n = points[first..].iter().take_while(|p| p.at == at).position(|p| p.hits == hits)?;
+        let point = &points[first + n];
+        Some((self.base[axis] + *start + (first + n) as u32, point.p, point.tagged))
+    }
+}

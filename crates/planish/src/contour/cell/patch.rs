@@ -1,0 +1,511 @@
+//! The patches of one cell, accepted only if they are embedded.
+//!
+//! A fan from a point strictly inside a cell over a simple loop on its boundary is always embedded: the boundary is
+//! convex, so every ray from that point meets it once. Flat triangulations without an inner vertex are accepted if
+//! they are one-to-one seen along their normal and no diagonal lies in a face. Different patches of one cell must be
+//! disjoint by exact signs; else they are made anew without features, and as [`super::caps`] in the last resort. As
+//! cells are convex and meet in shared polylines, the whole mesh is then manifold and free of self-intersections.
+
+use super::caps::{self, Corner, FACE_POINT};
+use super::face::FacePoints;
+use super::feature::{Shape, classify, solve};
+use super::topology::Trilinear;
+use super::{AMBIGUOUS, CROSSED, EDGE_FACES, EDGES, joined_by_hits, joined_by_values, links};
+use crate::contour::Thresholds;
+use crate::contour::polish::local::CellRange;
+use crate::contour::walk::Cell;
+use crate::field::{Creases, Directed};
+use crate::geom::predicates::triangles_meet;
+use crate::mesh::FeatureKind;
+use glam::DVec3;
+
+/// A vertex inside a cell.
+#[derive(Clone, Copy, Debug)]
+pub struct Inner {
+    /// Position, strictly inside its cell.
+    pub p: DVec3,
+    /// What it marks.
+    pub kind: FeatureKind,
+}
+
+/// Vertices that would rather lie elsewhere: name and place. They were kept in their cell or face.
+pub type Wish = (u32, DVec3);
+
+/// Inner vertices are named from here until their number in the mesh is known.
+pub const INNER: u32 = 1 << 31;
+
+/// What the cells of a few layers give.
+#[derive(Default)]
+pub struct Sheet {
+    /// Triangles; names of inner vertices begin at [`INNER`].
+    pub triangles: Vec<[u32; 3]>,
+    /// Inner vertices.
+    pub inner: Vec<Inner>,
+    /// Feature edges.
+    pub edges: Vec<[u32; 2]>,
+    /// Inner vertices that were clamped.
+    pub wishes: Vec<Wish>,
+    /// Cells with triangles, and the numbers of their first triangle and of that after the last.
+    pub cells: Vec<CellRange>,
+    /// For each cell the triangles of smooth cells before it.
+    pub before: Vec<u32>,
+    /// Cells whose feature had to be given up.
+    pub fallbacks: usize,
+    /// Cells whose patches were pushed in from the boundary.
+    pub pushed: usize,
+}
+
+/// Everything that is the same for all cells.
+pub struct Patcher<'a> {
+    pub field: &'a Directed,
+    /// Positions of the hits, by their names.
+    pub points: &'a [DVec3],
+    pub limits: &'a Thresholds,
+    pub faces: &'a FacePoints,
+    pub refine: Option<&'a dyn Creases>,
+    /// First name of the hits of each axis.
+    pub base: [u32; 3],
+}
+
+/// Buffers that are used again for every cell.
+#[derive(Default)]
+pub struct Scratch {
+    corners: Vec<Corner>,
+    /// Ends of the loops in `corners`.
+    ends: Vec<usize>,
+    normals: Vec<DVec3>,
+    planes: Vec<(DVec3, DVec3)>,
+    local: Vec<[u32; 3]>,
+    /// Ends of the patches in `local`.
+    parts: Vec<usize>,
+}
+
+/// Inner vertices keep this distance from the faces of their cell, as a fraction of its size.
+const CLEAR: f64 = 0.004;
+/// Vertices farther from their cell than this are no feature of it, in cells.
+const FAR: f64 = 1.0;
+
+impl Patcher<'_> {
+    /// Appends the patches of `cell` to `sheet`.
+    pub fn patch(&self, cell: &Cell, scratch: &mut Scratch, sheet: &mut Sheet) {
+        let first = sheet.triangles.len() as u32;
+        self.patches(cell, scratch, sheet);
+        sheet.cells.push((cell.at.map(|x| x as u32), first, sheet.triangles.len() as u32));
+    }
+
+    fn patches(&self, cell: &Cell, scratch: &mut Scratch, sheet: &mut Sheet) {
+        self.loops(cell, scratch);
+        let count = scratch.ends.len();
+        let low = self.field.lattice.node(cell.at[0], cell.at[1], cell.at[2]);
+        let high = self.field.lattice.node(cell.at[0] + 1, cell.at[1] + 1, cell.at[2] + 1);
+        if count == 1 {
+            let mut corners = std::mem::take(&mut scratch.corners);
+            self.one(cell, &mut corners, scratch, sheet, [low, high], true);
+            scratch.corners = corners;
+            sheet.triangles.append(&mut scratch.local);
+            return;
+        }
+        let tunnel = self.tunnel(cell, scratch, [low, high]);
+        let inner = sheet.inner.len();
+        let (edges, wishes) = (sheet.edges.len(), sheet.wishes.len());
+        let all = std::mem::take(&mut scratch.corners);
+        if tunnel.is_none() {
+            for features in [true, false] {
+                scratch.parts.clear();
+                let mut first = 0;
+                for l in 0..count {
+                    let mut own = all[first..scratch.ends[l]].to_vec();
+                    first = scratch.ends[l];
+                    self.one(cell, &mut own, scratch, sheet, [low, high], features);
+                    scratch.parts.push(scratch.local.len());
+                }
+                if self.disjoint(&all, scratch, sheet) {
+                    sheet.triangles.append(&mut scratch.local);
+                    sheet.fallbacks += !features as usize;
+                    scratch.corners = all;
+                    return;
+                }
+                scratch.local.clear();
+                sheet.inner.truncate(inner);
+                sheet.edges.truncate(edges);
+                sheet.wishes.truncate(wishes);
+            }
+        }
+        // Face points belong to the loops of both neighbours: they stay.
+        let mut loops: Vec<Vec<Corner>> = Vec::new();
+        let mut first = 0;
+        for &end in &scratch.ends {
+            loops.push(self.with_face_points(cell, &all[first..end]));
+            first = end;
+        }
+        let loops: Vec<&[Corner]> = loops.iter().map(Vec::as_slice).collect();
+        let positions = cell_corners(low, high);
+        let tunnel = tunnel.and_then(|[a, b]| caps::loops_between(&positions, cell.config, &loops, a, b));
+        let (inner, triangles) = (&mut sheet.inner, &mut sheet.triangles);
+        let mut vertex = |p: DVec3| {
+            inner.push(Inner { p, kind: FeatureKind::None });
+            INNER + inner.len() as u32 - 1
+        };
+        caps::caps(&positions, cell.config, &loops, tunnel, &mut vertex, &mut |t| triangles.push(t));
+        sheet.pushed += 1;
+        scratch.corners = all;
+    }
+
+    /// Fills the loops of a cell, without face points.
+    fn loops(&self, cell: &Cell, scratch: &mut Scratch) {
+        scratch.corners.clear();
+        scratch.ends.clear();
+        let ambiguous = AMBIGUOUS[cell.config as usize];
+        let joined = if ambiguous == 0 { 0 } else { joined(self.field, cell, ambiguous) };
+        let chain = links(cell.config, joined);
+        let mut rest = CROSSED[cell.config as usize];
+        while rest != 0 {
+            let first = rest.trailing_zeros() as usize;
+            let mut e = first;
+            loop {
+                rest &= !(1 << e);
+                let (id, p, n) = self.hit(cell, e);
+                let face = chain.face[e];
+                scratch.corners.push(Corner { id, p, n, faces: EDGE_FACES[e], edge: e as u8, face, tagged: false });
+                e = chain.next[e] as usize;
+                if e == first {
+                    break;
+                }
+            }
+            scratch.ends.push(scratch.corners.len());
+        }
+    }
+
+    /// Name, position and normal of the hit on edge `e`.
+    fn hit(&self, cell: &Cell, e: usize) -> (u32, DVec3, DVec3) {
+        let axis = e / 4;
+        let n = cell.hit[e];
+        let hit = &self.field.axes[axis].hits[n as usize];
+        let id = self.base[axis] + n;
+        (id, self.points[id as usize], hit.normal)
+    }
+
+    fn with_face_points(&self, cell: &Cell, l: &[Corner]) -> Vec<Corner> {
+        let mut out = Vec::with_capacity(l.len() + 4);
+        for (k, c) in l.iter().enumerate() {
+            out.push(*c);
+            let next = &l[(k + 1) % l.len()];
+            if c.n.dot(next.n) < self.limits.faint
+                && let Some((id, p, tagged)) = self.faces.find(self.field, cell, c.face as usize, c.id, next.id)
+            {
+                let n = DVec3::ZERO;
+                out.push(Corner { id, p, n, faces: 1 << c.face, edge: FACE_POINT, face: c.face, tagged });
+            }
+        }
+        out
+    }
+
+    /// The patch of one loop, into `scratch.local`.
+    fn one(
+        &self,
+        cell: &Cell,
+        l: &mut Vec<Corner>,
+        scratch: &mut Scratch,
+        sheet: &mut Sheet,
+        [low, high]: [DVec3; 2],
+        features: bool,
+    ) {
+        scratch.normals.clear();
+        scratch.normals.extend(l.iter().map(|c| c.n));
+        let mut shape = classify(&scratch.normals, self.limits.sharp, self.limits.corner);
+        if shape == Shape::Smooth {
+            // A bend that only the source knows.
+            if self.limits.faint > self.limits.sharp
+                && (0..l.len()).any(|k| l[k].n.dot(l[(k + 1) % l.len()].n) < self.limits.faint)
+            {
+                let with = self.with_face_points(cell, l);
+                if with.len() > l.len() {
+                    *l = with;
+                    self.bend(l, scratch, sheet, [low, high]);
+                    return;
+                }
+            }
+            if !flat(l, &mut scratch.local) {
+                let p = inside(center(l), low, high).0;
+                fan(l, self.inner(sheet, p, FeatureKind::None), &mut scratch.local);
+            }
+            return;
+        }
+        scratch.planes.clear();
+        scratch.planes.extend(l.iter().map(|c| (c.p, c.n)));
+        *l = self.with_face_points(cell, l);
+        let points: Vec<DVec3> = l.iter().filter(|c| c.tagged).map(|c| c.p).collect();
+        let hits = scratch.planes.iter().map(|p| p.0).sum::<DVec3>() / scratch.planes.len() as f64;
+        let middle = if points.len() >= 2 { points.iter().sum::<DVec3>() / points.len() as f64 } else { hits };
+        let near = if shape == Shape::Edge { middle } else { hits };
+        let mut p = solve(&scratch.planes, near, shape);
+        if shape == Shape::Corner && points.len() == 2 {
+            // A bent edge looks like a corner; it is one only if that explains the hits much better.
+            let rms = |p: DVec3| scratch.planes.iter().map(|(s, n)| n.dot(p - s).powi(2)).sum::<f64>();
+            let edge = solve(&scratch.planes, middle, Shape::Edge);
+            if rms(edge) < CORNER_GAIN * rms(p) || !within(p, low, high, POKE) {
+                (shape, p) = (Shape::Edge, edge);
+            }
+        } else if shape == Shape::Edge && points.len() > 2 {
+            shape = Shape::Corner;
+            let corner = solve(&scratch.planes, middle, shape);
+            if within(corner, low, high, 0.5) {
+                p = corner;
+            }
+        }
+        if let Some(refine) = self.refine {
+            p = refine.inner_point(p, &points, shape == Shape::Corner, low, high, &scratch.planes).unwrap_or(p);
+        }
+        let kind = if shape == Shape::Corner { FeatureKind::Corner } else { FeatureKind::Edge };
+        let (clamped, moved) = inside(p, low, high);
+        let mut apex = clamped;
+        let along = |r: &dyn Creases| r.nearest(clamped, (high - low).max_element(), &scratch.planes);
+        let mut wish = moved.then(|| self.refine.filter(|_| shape == Shape::Edge).and_then(along).unwrap_or(p));
+        let mut given_up = !features || !p.is_finite() || !within(p, low, high, FAR);
+        if !given_up && turned(l, apex) {
+            // A clamped apex may see its fan from the wrong side, the free one not.
+            apex = inside(middle, low, high).0;
+            given_up = turned(l, apex) && !moved;
+        }
+        if given_up {
+            apex = inside(if features { middle } else { center(l) }, low, high).0;
+            wish = None;
+            sheet.fallbacks += features as usize;
+        }
+        let kind = if given_up && points.is_empty() { FeatureKind::None } else { kind };
+        let id = self.inner(sheet, apex, kind);
+        if let Some(wish) = wish {
+            sheet.wishes.push((id, wish));
+        }
+        for c in l.iter().filter(|c| c.tagged) {
+            sheet.edges.push([id, c.id]);
+        }
+        fan(l, id, &mut scratch.local);
+    }
+
+    /// The patch of a loop that is smooth by its hits, but that bends or feature lines pass of which the source knows.
+    fn bend(&self, l: &[Corner], scratch: &mut Scratch, sheet: &mut Sheet, [low, high]: [DVec3; 2]) {
+        let points: Vec<DVec3> = l.iter().filter(|c| c.edge == FACE_POINT).map(|c| c.p).collect();
+        let middle = points.iter().sum::<DVec3>() / points.len() as f64;
+        let found = self.refine.and_then(|r| r.bend(middle, low, high)).unwrap_or(middle);
+        let mut apex = inside(found, low, high).0;
+        if turned(l, apex) {
+            apex = inside(center(l), low, high).0;
+        }
+        let tagged = l.iter().any(|c| c.tagged);
+        let id = self.inner(sheet, apex, if tagged { FeatureKind::Edge } else { FeatureKind::None });
+        for c in l.iter().filter(|c| c.tagged) {
+            sheet.edges.push([id, c.id]);
+        }
+        fan(l, id, &mut scratch.local);
+    }
+
+    fn inner(&self, sheet: &mut Sheet, p: DVec3, kind: FeatureKind) -> u32 {
+        sheet.inner.push(Inner { p, kind });
+        INNER + sheet.inner.len() as u32 - 1
+    }
+
+    /// Position of a vertex by its name.
+    fn position(&self, id: u32, all: &[Corner], sheet: &Sheet) -> DVec3 {
+        if id >= INNER {
+            return sheet.inner[(id - INNER) as usize].p;
+        }
+        match all.iter().find(|c| c.id == id) {
+            Some(c) => c.p,
+            None => self.faces.position(id),
+        }
+    }
+
+    /// True if no triangle of one patch meets one of another.
+    fn disjoint(&self, all: &[Corner], scratch: &Scratch, sheet: &Sheet) -> bool {
+        let mut first = 0;
+        let mut own: Vec<(usize, [u32; 3], [DVec3; 3])> = Vec::with_capacity(scratch.local.len());
+        for (part, &end) in scratch.parts.iter().enumerate() {
+            for t in &scratch.local[first..end] {
+                own.push((part, *t, t.map(|id| self.position(id, all, sheet))));
+            }
+            first = end;
+        }
+        own.iter().enumerate().all(|(n, (part, t, p))| {
+            own[..n].iter().filter(|(other, ..)| other != part).all(|(_, u, q)| {
+                let low = |p: &[DVec3; 3]| p[0].min(p[1]).min(p[2]);
+                let high = |p: &[DVec3; 3]| p[0].max(p[1]).max(p[2]);
+                let apart = low(p).cmpgt(high(q)).any() || low(q).cmpgt(high(p)).any();
+                apart || !triangles_meet(*p, *t, *q, *u)
+            })
+        })
+    }
+
+    /// Two corners of the cell that a tunnel joins, where the source is a scalar grid and says so.
+    fn tunnel(&self, cell: &Cell, scratch: &Scratch, [low, high]: [DVec3; 2]) -> Option<[usize; 2]> {
+        let f = values(self.field, cell)?;
+        let trilinear = Trilinear::new(f);
+        let mut loops: Vec<&[Corner]> = Vec::new();
+        let mut first = 0;
+        for &end in &scratch.ends {
+            loops.push(&scratch.corners[first..end]);
+            first = end;
+        }
+        let region = caps::regions_of(&cell_corners(low, high), &loops);
+        // Euler number of the part of the boundary below: each region is a sphere with a hole per loop on its rim.
+        let below = boundary_euler(cell.config, &region, loops.len());
+        if 2 * trilinear.euler_below() - below >= loops.len() as i32 {
+            return None;
+        }
+        trilinear.joined_corners(&region)
+    }
+}
+
+/// A corner may poke out of its cell by so much, in cells.
+const POKE: f64 = 0.5;
+/// A corner must explain the hits so many times better than an edge (squared distances).
+const CORNER_GAIN: f64 = 16.0;
+
+/// Euler number of the inside part of the cell's boundary between `loops` loops.
+fn boundary_euler(config: u8, region: &[usize; 8], loops: usize) -> i32 {
+    // Regions and loops form a tree; each loop borders one inside region, so the sum over inside regions of
+    // 2 - (loops around it) is twice their number less the number of loops.
+    let inside = (0..8).filter(|&c| region[c] == c && config >> c & 1 != 0).count();
+    2 * inside as i32 - loops as i32
+}
+
+/// Values of a scalar grid at the corners of a cell.
+pub fn values(field: &Directed, cell: &Cell) -> Option<[f64; 8]> {
+    let levels = field.values.as_ref()?;
+    let corner = |c: usize| [cell.at[0] + (c & 1), cell.at[1] + (c >> 1 & 1), cell.at[2] + (c >> 2 & 1)];
+    Some(std::array::from_fn(|c| levels.at(corner(c))))
+}
+
+/// Bits of the ambiguous faces in which the inside corners are joined.
+pub fn joined(field: &Directed, cell: &Cell, ambiguous: u8) -> u8 {
+    let values = values(field, cell);
+    let mut joined = 0;
+    for f in (0..6).filter(|f| ambiguous >> f & 1 != 0) {
+        let axis = f / 2;
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let corner = |a: usize, b: usize| (f & 1) << axis | a << u | b << v;
+        let yes = match &values {
+            Some(values) => {
+                joined_by_values([corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)].map(|c| values[c]))
+            }
+            None => {
+                let t = |from: usize, to: usize| {
+                    let e = EDGES.iter().position(|e| e == &[from, to]).unwrap_or(0);
+                    field.axes[e / 4].hits[cell.hit[e] as usize].t
+                };
+                let t = [
+                    t(corner(0, 0), corner(1, 0)),
+                    t(corner(0, 1), corner(1, 1)),
+                    t(corner(0, 0), corner(0, 1)),
+                    t(corner(1, 0), corner(1, 1)),
+                ];
+                joined_by_hits(t, cell.config >> corner(0, 0) & 1 != 0)
+            }
+        };
+        joined |= (yes as u8) << f;
+    }
+    joined
+}
+
+/// The point at `t` on edge `e` of a cell.
+pub fn edge_point(field: &Directed, cell: &Cell, e: usize, t: f64) -> DVec3 {
+    let c = EDGES[e][0];
+    let mut p = field.lattice.node(cell.at[0] + (c & 1), cell.at[1] + (c >> 1 & 1), cell.at[2] + (c >> 2 & 1));
+    p[e / 4] += t * field.lattice.step[e / 4];
+    p
+}
+
+/// The eight corners of a cell.
+pub fn cell_corners(low: DVec3, high: DVec3) -> [DVec3; 8] {
+    std::array::from_fn(|c| {
+        let pick = |axis: usize| if c >> axis & 1 == 0 { low[axis] } else { high[axis] };
+        DVec3::new(pick(0), pick(1), pick(2))
+    })
+}
+
+/// `p` kept clear of the faces of the cell, and whether it had to be moved.
+pub fn inside(p: DVec3, low: DVec3, high: DVec3) -> (DVec3, bool) {
+    let margin = (high - low) * CLEAR;
+    if p.is_nan() {
+        return ((low + high) / 2.0, true);
+    }
+    let q = p.clamp(low + margin, high - margin);
+    // A vertex that is inside already stays where it is, however near to a face.
+    if p.cmpgt(low + margin * NEAR).all() && p.cmplt(high - margin * NEAR).all() { (p, false) } else { (q, q != p) }
+}
+
+/// Fraction of [`CLEAR`] from which on a vertex is left alone.
+const NEAR: f64 = 1e-3;
+
+fn within(p: DVec3, low: DVec3, high: DVec3, reach: f64) -> bool {
+    let slack = (high - low) * reach;
+    p.cmpge(low - slack).all() && p.cmple(high + slack).all()
+}
+
+pub fn center(l: &[Corner]) -> DVec3 {
+    l.iter().map(|c| c.p).sum::<DVec3>() / l.len() as f64
+}
+
+pub fn fan(l: &[Corner], apex: u32, out: &mut Vec<[u32; 3]>) {
+    for k in 0..l.len() {
+        out.push([apex, l[k].id, l[(k + 1) % l.len()].id]);
+    }
+}
+
+/// True if the fan from `apex` has a triangle against the normals of its hits.
+fn turned(l: &[Corner], apex: DVec3) -> bool {
+    (0..l.len()).any(|k| {
+        let (a, b) = (&l[k], &l[(k + 1) % l.len()]);
+        let n = (a.p - apex).cross(b.p - apex);
+        let against = |c: &Corner| c.edge == FACE_POINT || c.n.dot(n) < 0.0;
+        (a.edge != FACE_POINT || b.edge != FACE_POINT) && against(a) && against(b)
+    })
+}
+
+/// Triangulates a loop without an inner vertex; false if there is no safe way.
+pub fn flat(l: &[Corner], out: &mut Vec<[u32; 3]>) -> bool {
+    let n = l.len();
+    if n == 3 {
+        out.push([l[0].id, l[1].id, l[2].id]);
+        return true;
+    }
+    let points: Vec<DVec3> = l.iter().map(|c| c.p).collect();
+    let free = |s: usize, k: usize| l[s].faces & l[k].faces == 0;
+    let Some(s) = best_fan(&points, free) else { return false };
+    for k in 1..n - 1 {
+        out.push([l[s].id, l[(s + k) % n].id, l[(s + k + 1) % n].id]);
+    }
+    true
+}
+
+/// The vertex of a loop whose fan to all others is the flattest, if there is a safe one.
+/// * `free` - no face holds both of two vertices
+#[inline(always)]
+pub fn best_fan(points: &[DVec3], free: impl Fn(usize, usize) -> bool) -> Option<usize> {
+    let n = points.len();
+    let mut normal = DVec3::ZERO;
+    for k in 1..n - 1 {
+        normal += (points[k] - points[0]).cross(points[k + 1] - points[0]);
+    }
+    let mut best: Option<(f64, usize)> = None;
+    for s in 0..if n == 4 { 2 } else { n } {
+        let at = |k: usize| points[(s + k) % n];
+        if !(2..n - 1).all(|k| free(s, (s + k) % n)) {
+            continue;
+        }
+        let o = at(0);
+        let cross = |a: DVec3, b: DVec3| (a - o).cross(b - o).dot(normal);
+        // Seen along the normal: a fan within half a turn, every triangle the right way round.
+        let safe =
+            n == 4 || (2..n).all(|k| cross(at(1), at(k)) > 0.0) && (2..n - 1).all(|k| cross(at(k), at(k + 1)) > 0.0);
+        if !safe {
+            continue;
+        }
+        // The least area is the flattest.
+        let area: f64 = (1..n - 1).map(|k| (at(k) - o).cross(at(k + 1) - o).length()).sum();
+        if best.is_none_or(|b| area < b.0) {
+            best = Some((area, s));
+        }
+    }
+    best.map(|b| b.1)
+}

@@ -1,0 +1,235 @@
+//! Making a layout good: quads, relaxed nodes and arcs, regular nodes, even sizes.
+//!
+//! The connectivity changes where that lowers an energy: squareness and size of every cell, and the number of
+//! cells in every sector. A change refills the union of two cells or of the cells around a node; drawn lines
+//! stay inside it.
+
+use super::complex::{Complex, Node};
+use super::fill::{Gain, Scale};
+use super::recut::{Bench, Change, outline};
+use super::{LayoutError, polygon, slide};
+use crate::network::CurveKind;
+use crate::observe::Observer;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A change must lower the energy by this, so that none is made for rounding; and by this factor more in every
+/// round, for what relaxing undoes would otherwise go back and forth.
+const LEAST_GAIN: f64 = 0.2;
+const GAIN_GROWTH: f64 = 1.25;
+
+/// The same for drawing anew, where nothing undoes it.
+const LEAST_SETTLING: f64 = 0.02;
+
+/// Rounds of changing the connectivity; most meshes settle earlier.
+const CHANGE_ROUNDS: usize = 20;
+
+/// Rounds of drawing anew around changes before the next ones.
+const SETTLING: usize = 3;
+
+/// Parts every cell into quads. False if some cell could not be parted.
+pub(super) fn quads(bench: &mut Bench) -> bool {
+    let changes = polygon::quadrangulate(bench.mesh, bench.adjacency, &bench.complex);
+    bench.apply(&changes);
+    bench.complex.live_cells().all(|c| bench.complex.loop_of(c).len() == 4)
+}
+
+/// Relaxes all nodes and arcs once.
+pub(super) fn relax(bench: &mut Bench, observer: &dyn Observer) -> Result<(), LayoutError> {
+    let cancelled = || if observer.cancelled() { Err(LayoutError::Cancelled) } else { Ok(()) };
+    let nodes: Vec<u32> = (0..bench.complex.nodes.len() as u32).collect();
+    cancelled()?;
+    bench.sweep(&nodes, |complex, stars, n| star_change(complex, &stars[n as usize]));
+    straighten(bench, observer)?;
+    cancelled()?;
+    slide::slide(bench, &nodes);
+    Ok(())
+}
+
+/// Draws all smooth arcs anew, straight in the map of their two cells.
+pub(super) fn straighten(bench: &mut Bench, observer: &dyn Observer) -> Result<(), LayoutError> {
+    if observer.cancelled() {
+        return Err(LayoutError::Cancelled);
+    }
+    let arcs: Vec<u32> = bench.complex.live_arcs().collect();
+    bench.sweep(&arcs, |complex, _, a| arc_change(complex, a));
+    Ok(())
+}
+
+/// Changes the connectivity until nothing gets better, towards `patches` patches.
+pub(super) fn improve(bench: &mut Bench, patches: usize, observer: &dyn Observer) -> Result<(), LayoutError> {
+    let (mut known, mut drawn) = (Known::new(), Known::new());
+    let mut fresh = vec![true; bench.complex.nodes.len()];
+    for round in 0..CHANGE_ROUNDS {
+        observer.progress(0.3 + 0.5 * round as f64 / CHANGE_ROUNDS as f64);
+        let least = LEAST_GAIN * GAIN_GROWTH.powi(round as i32);
+        let scale = Scale::new(bench, patches);
+        let chosen = choose(
+            bench,
+            unions(&bench.complex),
+            least,
+            &fresh,
+            &mut known,
+            |union| scale.best(union),
+            |change| nodes_of_one(&bench.complex, change),
+        );
+        if chosen.is_empty() {
+            break;
+        }
+        let mut touched = nodes_of(&bench.complex, &chosen);
+        bench.apply(&chosen);
+        touched.resize(bench.complex.nodes.len(), true);
+        fresh = settle_some(bench, patches, SETTLING, touched.clone(), &mut drawn, observer)?;
+        fresh.iter_mut().zip(touched).for_each(|(fresh, touched)| *fresh |= touched);
+    }
+    Ok(())
+}
+
+/// Draws nodes and arcs anew where that makes cells better, as measured, in up to `rounds` rounds. Their connectivity
+/// stays, and no round makes anything worse.
+pub(super) fn settle(
+    bench: &mut Bench,
+    patches: usize,
+    rounds: usize,
+    observer: &dyn Observer,
+) -> Result<(), LayoutError> {
+    let fresh = vec![true; bench.complex.nodes.len()];
+    settle_some(bench, patches, rounds, fresh, &mut Known::new(), observer).map(|_| ())
+}
+
+/// The same around the nodes in `fresh`. Returns the nodes of cells that were drawn anew.
+fn settle_some(
+    bench: &mut Bench,
+    patches: usize,
+    rounds: usize,
+    mut fresh: Vec<bool>,
+    known: &mut Known,
+    observer: &dyn Observer,
+) -> Result<Vec<bool>, LayoutError> {
+    let mut all = vec![false; fresh.len()];
+    for _ in 0..rounds {
+        if observer.cancelled() {
+            return Err(LayoutError::Cancelled);
+        }
+        let complex = &bench.complex;
+        let arcs = complex.live_arcs().filter_map(|a| arc_change(complex, a));
+        let stars = complex.stars().into_iter().filter_map(|s| star_change(complex, &s));
+        let unions: Vec<Change> = arcs.chain(stars).collect();
+        let scale = Scale::new(bench, patches);
+        let cells = |change: &Change| change.cells.clone();
+        let chosen = choose(bench, unions, LEAST_SETTLING, &fresh, known, |union| scale.redrawn(union), cells);
+        if chosen.is_empty() {
+            break;
+        }
+        fresh = nodes_of(&bench.complex, &chosen);
+        all.iter_mut().zip(&fresh).for_each(|(all, fresh)| *all |= fresh);
+        bench.apply(&chosen);
+    }
+    Ok(all)
+}
+
+/// The nodes of the cells of a change.
+fn nodes_of_one(complex: &Complex, change: &Change) -> Vec<u32> {
+    change.cells.iter().flat_map(|&c| complex.loop_of(c)).map(|&h| complex.from(h)).collect()
+}
+
+/// Marks the nodes of the cells of `changes`.
+fn nodes_of(complex: &Complex, changes: &[Change]) -> Vec<bool> {
+    let mut nodes = vec![false; complex.nodes.len()];
+    changes.iter().flat_map(|change| nodes_of_one(complex, change)).for_each(|n| nodes[n as usize] = true);
+    nodes
+}
+
+/// The best filling of each union, by the arcs that it removes.
+type Known = BTreeMap<Vec<u32>, Option<Gain>>;
+
+/// The unions worth filling anew: pairs of cells, and the cells around a node.
+fn unions(complex: &Complex) -> Vec<Change> {
+    let pairs = complex.live_arcs().filter(|&a| {
+        let arc = complex.arc(2 * a);
+        arc.kind == CurveKind::Smooth && arc.cells[0] != arc.cells[1]
+    });
+    let pairs =
+        pairs.map(|a| Change { cells: complex.arc(2 * a).cells.to_vec(), removed: vec![a], ..Change::default() });
+    let stars = complex.stars().into_iter().filter(|s| s.len() >= 2).filter_map(|s| star_change(complex, &s));
+    pairs.chain(stars).collect()
+}
+
+/// The changes of `unions` that gain most by `best`, and more than `least`, such that no two touch the same (`touches`).
+/// What is known of unions without a node in `fresh` is taken from `known`.
+fn choose(
+    bench: &Bench,
+    unions: Vec<Change>,
+    least: f64,
+    fresh: &[bool],
+    known: &mut Known,
+    best: impl Fn(&Change) -> Option<Gain> + Sync,
+    touches: impl Fn(&Change) -> Vec<u32>,
+) -> Vec<Change> {
+    let complex = &bench.complex;
+    let nodes = |change: &Change| nodes_of_one(complex, change);
+    let gains: Vec<Option<Gain>> = unions
+        .par_iter()
+        .map(|union| match known.get(&union.removed) {
+            gain if !nodes(union).iter().any(|&n| fresh[n as usize]) => gain.cloned().flatten(),
+            _ => best(union).filter(|g| g.0 > least),
+        })
+        .collect();
+    *known = unions.into_iter().map(|u| u.removed).zip(gains.iter().cloned()).collect();
+    let mut found: Vec<Gain> = gains.into_iter().flatten().filter(|g| g.0 > least).collect();
+    // Ties by the cells, so that the order does not depend on how candidates were found.
+    found.sort_by(|x, y| y.0.total_cmp(&x.0).then_with(|| x.1.cells.cmp(&y.1.cells)));
+    let mut taken = BTreeSet::new();
+    let mut chosen = Vec::new();
+    for (_, change) in found {
+        let touched = touches(&change);
+        if !touched.iter().any(|t| taken.contains(t)) {
+            taken.extend(touched);
+            chosen.push(change);
+        }
+    }
+    chosen
+}
+
+/// The change that places the node of `star` anew and redraws its arcs; `None` for a fixed node.
+pub(super) fn star_change(complex: &Complex, star: &[u32]) -> Option<Change> {
+    let node = complex.from(*star.first()?);
+    if star.iter().any(|&h| complex.arc(h).kind != CurveKind::Smooth) {
+        return None;
+    }
+    let mut cells: Vec<u32> = star.iter().map(|&h| complex.cell(h)).collect();
+    cells.sort_unstable();
+    let count = cells.len();
+    cells.dedup();
+    if cells.len() != count {
+        return None;
+    }
+    let Node { vertex, stays } = complex.nodes[node as usize];
+    let mut change = Change {
+        cells,
+        removed: star.iter().map(|h| h / 2).collect(),
+        center: Some(node),
+        pin: stays.then_some(vertex),
+        stays,
+        ..Change::default()
+    };
+    let around = outline(complex, &change)?;
+    for &h in star {
+        change.spokes.push(around.iter().position(|&g| g == complex.following(h))?);
+    }
+    change.spokes.sort_unstable();
+    Some(change)
+}
+
+/// The change that redraws arc `a`.
+fn arc_change(complex: &Complex, a: u32) -> Option<Change> {
+    let arc = complex.arc(2 * a);
+    if arc.kind != CurveKind::Smooth || arc.cells[0] == arc.cells[1] {
+        return None;
+    }
+    let mut change = Change { cells: arc.cells.to_vec(), removed: vec![a], ..Change::default() };
+    let around = outline(complex, &change)?;
+    let at = |h: u32| around.iter().position(|&g| g == h);
+    change.lines.push((at(complex.following(2 * a + 1))?, at(complex.following(2 * a))?));
+    Some(change)
+}

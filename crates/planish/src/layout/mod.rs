@@ -1,0 +1,378 @@
+//! Automatic layout: a network of four-sided patches on any manifold mesh.
+//!
+//! 1. feature lines and boundaries are fixed; long edges are split ([`refine`]);
+//! 2. a centroidal partition into disks between the fixed lines ([`partition`], [`outline`]);
+//! 3. all cells are made even and parted into quads ([`polygon`]);
+//! 4. nodes, arcs and connectivity are improved by changes inside the union of a few cells, each drawn in a one-to-one
+//!    map of that union ([`recut`]), so that nothing ever crosses or gets lost; this happens on a coarser mesh of the
+//!    same surface, and the arcs are carried back ([`coarse`]);
+//! 5. near every node its arcs are spread to even angles ([`fan`]).
+
+mod coarse;
+mod complex;
+mod fan;
+mod fill;
+mod improve;
+mod lines;
+mod outline;
+mod partition;
+mod polygon;
+mod recut;
+mod refine;
+mod shape;
+mod slide;
+mod strands;
+mod tips;
+
+use crate::layout::complex::Complex;
+use crate::layout::recut::Bench;
+use crate::layout::refine::Refined;
+use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
+use crate::network::imprint::{self, Shared};
+use crate::network::{Corner, Curve, Network, Patch, Side};
+use crate::observe::Observer;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
+
+/// Edges of the working mesh against the side of a patch: short enough for a curve to find its way.
+const EDGE_TO_SIDE: f64 = 0.12;
+
+/// Attempts with edges of half the length each, where the working mesh proves too coarse.
+const ATTEMPTS: usize = 5;
+
+/// Attempts at the number of patches asked for: the features decide how many patches a partition gives.
+const COUNT_ATTEMPTS: usize = 3;
+
+/// No part of the surface lies further from the middle of its first cell than this, in sides of a patch, even if
+/// features use up the number of patches elsewhere.
+const COVER: f64 = 2.4;
+
+/// Patches smaller than this part of the mean stand on specks and slivers and do not count as forced.
+const CROWDED: f64 = 0.05;
+
+/// Part of the patches of the first draft that counts as forced by the features.
+const FORCED: f64 = 0.85;
+
+/// Rounds of settling for each round of smoothing asked for: a round redraws disjoint unions only.
+const SETTLING: usize = 8;
+
+/// Parameters of [`layout`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LayoutParams {
+    /// Number of patches to aim at. Feature lines may force more.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub patches: usize,
+    /// Edges whose faces meet at more than this angle are sharp and become patch boundaries.
+    #[schemars(range(min = 1.0, max = 180.0), extend("unit" = "deg"))]
+    pub sharp_angle_deg: f64,
+    /// Sharp lines with a loose end that are shorter than this fraction of the diagonal are surface detail, and so
+    /// are closed ones half as long.
+    #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "diagonal"))]
+    pub feature_length: f64,
+    /// Rounds of making corners and curves even at the end.
+    #[schemars(range(min = 0, max = 50))]
+    pub smoothing: usize,
+}
+
+impl Default for LayoutParams {
+    fn default() -> LayoutParams {
+        LayoutParams { patches: 120, sharp_angle_deg: 40.0, feature_length: 0.1, smoothing: 3 }
+    }
+}
+
+/// Why no layout was made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LayoutError {
+    /// The mesh has no faces.
+    #[error("the mesh has no faces")]
+    Empty,
+    /// The mesh is not an oriented manifold.
+    #[error("{edges} edges of the mesh have more than two faces or faces that disagree - hint: repair the mesh first")]
+    NotManifold {
+        /// Number of such edges.
+        edges: usize,
+    },
+    /// The faces do not allow a network, even when split.
+    #[error("no four-sided network was found on {faces} faces - hint: look for degenerate faces with `planish info`")]
+    Stuck {
+        /// Faces of the mesh.
+        faces: usize,
+    },
+    /// Stopped by the observer.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// Lays a conforming network of four-sided patches on `mesh`, an oriented manifold with or without boundary.
+///
+/// Sharp lines and boundaries lie on patch boundaries; every patch is an exact disk ([`crate::network::imprint`]).
+/// # Errors
+/// `NotManifold` for a mesh that needs repair, `Stuck` if its faces are degenerate beyond use.
+pub fn layout(mesh: &TriMesh, params: &LayoutParams, observer: &dyn Observer) -> Result<Network, LayoutError> {
+    layout_around(mesh, &[], &[], &[], params, observer)
+}
+
+/// As [`layout`], where the sharp edges are known: the half-edges `tagged` are the sharp ones, whatever the angles say;
+/// short and loose lines of them are left out as with any. Empty if nothing is known.
+/// # Errors
+/// As [`layout`].
+pub fn layout_tagged(
+    mesh: &TriMesh,
+    tagged: &[bool],
+    params: &LayoutParams,
+    observer: &dyn Observer,
+) -> Result<Network, LayoutError> {
+    layout_around(mesh, &[], &[], tagged, params, observer)
+}
+
+/// As [`layout`], around lines that are given: the half-edges `lines` become patch boundaries like feature lines,
+/// the vertices `corners` of them corners; `tagged` as in [`layout_tagged`]. All may be empty.
+/// # Errors
+/// As [`layout`].
+pub(crate) fn layout_around(
+    mesh: &TriMesh,
+    lines: &[bool],
+    corners: &[bool],
+    tagged: &[bool],
+    params: &LayoutParams,
+    observer: &dyn Observer,
+) -> Result<Network, LayoutError> {
+    check(mesh)?;
+    let adjacency = Adjacency::new(mesh);
+    let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
+    let side = (area / params.patches.max(1) as f64).sqrt();
+    let mut edge = EDGE_TO_SIDE * side;
+    let mut sharp = lines::feature_lines(mesh, &adjacency, tagged, params);
+    sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
+    let mut fixed = vec![false; mesh.points.len()];
+    for h in 0..sharp.len() as u32 {
+        if sharp[h as usize] || adjacency.opposite[h as usize] == NONE {
+            fixed[mesh.origin(h) as usize] = true;
+            fixed[mesh.origin(next(h)) as usize] = true;
+        }
+    }
+    for _ in 0..ATTEMPTS {
+        let work = refine::refine(mesh, edge, &fixed);
+        if let Some((work, complex)) = draft(work, (&sharp, corners), side, params, observer)? {
+            let work_adjacency = Adjacency::new(&work.mesh);
+            if let Some(mut bench) = Bench::new(&work.mesh, &work_adjacency, complex)
+                && improve::quads(&mut bench)
+            {
+                // Features may force more patches than asked for; shape is not given up for the number.
+                let forced = bench.shapes().iter().flatten().filter(|s| s.area > CROWDED * side * side).count();
+                let patches = params.patches.max((FORCED * forced as f64) as usize);
+                if let Some(improved) = improve_coarsely(&bench, side, patches, params, observer)? {
+                    bench = improved;
+                    improve::straighten(&mut bench, observer)?;
+                } else {
+                    make_good(&mut bench, side, patches, params, observer)?;
+                }
+                fan::spread(&mut bench);
+                observer.progress(1.0);
+                return Ok(network(&work, &work_adjacency, &bench.complex));
+            }
+        }
+        edge /= 2.0;
+    }
+    Err(LayoutError::Stuck { faces: mesh.triangles.len() })
+}
+
+/// Improves the complex of `bench` on a coarser mesh, where a change costs less. `None` if that mesh would not be much
+/// smaller or the way back fails.
+fn improve_coarsely<'a>(
+    bench: &Bench<'a>,
+    side: f64,
+    patches: usize,
+    params: &LayoutParams,
+    observer: &dyn Observer,
+) -> Result<Option<Bench<'a>>, LayoutError> {
+    let Some(mut coarse) = coarse::coarsen(bench.mesh, bench.adjacency, &bench.complex, side, observer) else {
+        return Ok(None);
+    };
+    let adjacency = Adjacency::new(&coarse.mesh);
+    let complex = std::mem::take(&mut coarse.complex);
+    let Some(mut on_coarse) = Bench::new(&coarse.mesh, &adjacency, complex) else { return Ok(None) };
+    make_good(&mut on_coarse, side, patches, params, observer)?;
+    let complex = coarse.refined(bench.mesh, bench.adjacency, &on_coarse.complex);
+    Ok(complex.and_then(|complex| Bench::new(bench.mesh, bench.adjacency, complex)))
+}
+
+/// Relaxes the cells and improves their connectivity, towards `patches` of them with sides of about `side`.
+fn make_good(
+    bench: &mut Bench,
+    side: f64,
+    patches: usize,
+    params: &LayoutParams,
+    observer: &dyn Observer,
+) -> Result<(), LayoutError> {
+    improve::relax(bench, observer)?;
+    let lines = bench.lines();
+    let tips = tips::tips(&partition::Ground::new(bench.mesh, bench.adjacency, &lines), side);
+    tips::plant(bench, &tips, patches);
+    improve::settle(bench, patches, SETTLING, observer)?;
+    improve::improve(bench, patches, observer)?;
+    improve::relax(bench, observer)?;
+    improve::settle(bench, patches, SETTLING * params.smoothing, observer)
+}
+
+fn check(mesh: &TriMesh) -> Result<(), LayoutError> {
+    if mesh.triangles.is_empty() {
+        return Err(LayoutError::Empty);
+    }
+    let adjacency = Adjacency::new(mesh);
+    let mut edges: std::collections::HashMap<[u32; 2], u32> = std::collections::HashMap::new();
+    for (h, &o) in adjacency.opposite.iter().enumerate() {
+        if o == NONE {
+            let t = mesh.triangles[h / 3];
+            let (a, b) = (t[h % 3], t[(h + 1) % 3]);
+            *edges.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+    }
+    match edges.values().filter(|&&n| n > 1).count() {
+        0 => Ok(()),
+        edges => Err(LayoutError::NotManifold { edges }),
+    }
+}
+
+/// The complex of even cells, with about as many quads to come as asked for, and the working mesh that it lies on.
+/// `None` if the cells cannot be made even.
+fn draft(
+    work: Refined,
+    (sharp, given): (&[bool], &[bool]),
+    side: f64,
+    params: &LayoutParams,
+    observer: &dyn Observer,
+) -> Result<Option<(Refined, Complex)>, LayoutError> {
+    let adjacency = Adjacency::new(&work.mesh);
+    let work_sharp = carry(&work, &adjacency, sharp);
+    let ground = partition::Ground::new(&work.mesh, &adjacency, &work_sharp);
+    let mut cells = (params.patches as f64 / 2.0).max(1.0);
+    let mut best: Option<(usize, Refined, Complex)> = None;
+    for attempt in 0..COUNT_ATTEMPTS {
+        observer.progress(0.1 * attempt as f64);
+        let (label, count) = partition::partition(&ground, cells.round() as usize, COVER * side, observer)?;
+        let (finer, mut complex) = draw(&work, &ground, (sharp, given), &label, count, side / 4.0);
+        if !polygon::make_even(&finer.mesh, &mut complex) {
+            break;
+        }
+        let quads: usize = complex.live_cells().map(|c| complex.loop_of(c).len() / 2 - 1).sum();
+        let miss = quads.abs_diff(params.patches);
+        if best.as_ref().is_none_or(|b| miss < b.0) {
+            best = Some((miss, finer, complex));
+        }
+        let ratio = params.patches as f64 / quads.max(1) as f64;
+        let fewest = cells.round() < 2.0 || count as f64 > 1.5 * cells;
+        if (0.9..1.1).contains(&ratio) || (ratio < 1.0 && fewest) {
+            break;
+        }
+        cells = (cells * ratio).max(1.0);
+    }
+    Ok(best.map(|b| (b.1, b.2)))
+}
+
+/// The complex of labelled cells. Arcs of a single edge get an inner vertex: the working mesh is split there.
+fn draw(
+    work: &Refined,
+    ground: &partition::Ground,
+    (sharp, given): (&[bool], &[bool]),
+    label: &[u32],
+    count: usize,
+    reach: f64,
+) -> (Refined, Complex) {
+    let complex = outline::outline(ground, label, count, &corners(ground, given, reach));
+    let short: HashSet<[u32; 2]> = complex
+        .live_arcs()
+        .filter_map(|a| match complex.arc(2 * a).chain[..] {
+            [imprint::Place::Vertex(a), imprint::Place::Vertex(b)] => Some([a.min(b), a.max(b)]),
+            _ => None,
+        })
+        .collect();
+    let (finer, from) = refine::split(work, |a, b| short.contains(&[a, b]));
+    let label: Vec<u32> = from.iter().map(|&f| label[f as usize]).collect();
+    let adjacency = Adjacency::new(&finer.mesh);
+    let finer_sharp = carry(&finer, &adjacency, sharp);
+    let ground = partition::Ground::new(&finer.mesh, &adjacency, &finer_sharp);
+    let complex = outline::outline(&ground, &label, count, &corners(&ground, given, reach));
+    (finer, complex)
+}
+
+/// Corners of the fixed lines, those given among them (the working mesh keeps the numbers of the vertices).
+fn corners(ground: &partition::Ground, given: &[bool], reach: f64) -> Vec<bool> {
+    let mut corner = outline::corners(ground, reach);
+    corner.iter_mut().zip(given).for_each(|(c, &g)| *c |= g);
+    corner
+}
+
+/// The sharp half-edges of the working mesh: the pieces of those of the input.
+fn carry(work: &Refined, adjacency: &Adjacency, sharp: &[bool]) -> Vec<bool> {
+    let mut carried = vec![false; adjacency.opposite.len()];
+    for (f, (face, corners)) in work.parent.iter().enumerate() {
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            // On the input edge opposite corner i both ends have weight zero there (exactly: halves of zeros).
+            for i in 0..3 {
+                if a[i] == 0.0 && b[i] == 0.0 && sharp[3 * *face as usize + (i + 1) % 3] {
+                    carried[3 * f + k] = true;
+                }
+            }
+        }
+    }
+    carried
+}
+
+/// The complex as a network on the input mesh.
+fn network(work: &Refined, adjacency: &Adjacency, complex: &Complex) -> Network {
+    let triangles = &work.mesh.triangles;
+    let mut corner_of = vec![NONE; complex.nodes.len()];
+    let mut curve_of = vec![NONE; complex.arcs.len()];
+    let mut out = Network::default();
+    for a in complex.live_arcs() {
+        let arc = complex.arc(2 * a);
+        let corners = arc.nodes.map(|n| {
+            if corner_of[n as usize] == NONE {
+                corner_of[n as usize] = out.corners.len() as u32;
+                let f = adjacency.outgoing[complex.nodes[n as usize].vertex as usize] / 3;
+                let k = triangles[f as usize].iter().position(|&v| v == complex.nodes[n as usize].vertex);
+                let at = FacePoint::corner(f, k.expect("a corner of its face"));
+                out.corners.push(Corner { place: work.to_input(f, at.bary) });
+            }
+            corner_of[n as usize]
+        });
+        let mut points: Vec<FacePoint> = Vec::with_capacity(arc.chain.len());
+        for pair in arc.chain.windows(2) {
+            let face = match imprint::shared_face(adjacency, triangles, &pair[0], &pair[1]) {
+                Some(Shared::Face(f)) => f,
+                _ => common_face(adjacency, triangles, pair),
+            };
+            for (place, wanted) in [(pair[0], points.is_empty()), (pair[1], true)] {
+                if wanted {
+                    let at = place.on_face(adjacency, triangles, face).expect("both places lie on the shared face");
+                    points.push(work.to_input(face, at.bary));
+                }
+            }
+        }
+        curve_of[a as usize] = out.curves.len() as u32;
+        out.curves.push(Curve { corners, kind: arc.kind, points });
+    }
+    for c in complex.live_cells() {
+        let sides = complex.loop_of(c);
+        let sides =
+            std::array::from_fn(|k| Side { curve: curve_of[sides[k] as usize / 2], reversed: sides[k] % 2 == 1 });
+        out.patches.push(Patch { sides });
+    }
+    out
+}
+
+/// A face with both places, which lie on one edge.
+fn common_face(adjacency: &Adjacency, triangles: &[[u32; 3]], pair: &[imprint::Place]) -> u32 {
+    let around: Vec<u32> = match pair[0] {
+        imprint::Place::Vertex(v) => adjacency.fan(v).map(|h| h / 3).collect(),
+        place => vec![place.some_face(adjacency)],
+    };
+    around
+        .into_iter()
+        .find(|&f| pair.iter().all(|p| p.on_face(adjacency, triangles, f).is_some()))
+        .expect("neighbouring places share a face")
+}
