@@ -2,6 +2,7 @@
 
 use super::ProjectError;
 use planish::DVec3;
+use planish::mesh::FacePoint;
 use rayon::prelude::*;
 use rusqlite::{Connection, Transaction, params};
 use std::io::Read;
@@ -149,6 +150,29 @@ impl Loaded {
         }
         Ok(x.chunks_exact(3).map(DVec3::from_slice).collect())
     }
+}
+
+pub(super) fn add_places<'a>(arrays: &mut Arrays, places: impl Iterator<Item = &'a FacePoint>) -> (i64, i64) {
+    let (mut faces, mut weights) = (Vec::new(), Vec::new());
+    for place in places {
+        faces.push(place.face);
+        weights.extend(place.bary);
+    }
+    (arrays.add(Array::U32(faces)), arrays.add(Array::F64(weights)))
+}
+
+/// Places on the mesh out of their arrays.
+pub(super) fn places(
+    arrays: &mut Loaded,
+    faces: i64,
+    weights: i64,
+    count: usize,
+) -> Result<Vec<FacePoint>, ProjectError> {
+    let (f, w) = (arrays.u32(faces)?, arrays.f64(weights)?);
+    if w.len() != 3 * f.len() || f.iter().any(|&f| f as usize >= count) || !w.iter().all(|w| w.is_finite()) {
+        return Err(damaged("the places are not on the mesh".into(), "array", faces));
+    }
+    Ok(f.iter().zip(w.chunks_exact(3)).map(|(&face, w)| FacePoint { face, bary: [w[0], w[1], w[2]] }).collect())
 }
 
 pub(super) fn damaged(what: String, table: &str, row: i64) -> ProjectError {

@@ -1,10 +1,10 @@
 //! Schema version 2: tables of a project, and a model to and from them. Version 1 had no sketch and no steps.
 
 use super::ProjectError;
-use super::array::{Array, Arrays, Loaded, damaged};
+use super::array::{Array, Arrays, Loaded, add_places, damaged, places};
 use super::steps;
 use planish::grid::Grid;
-use planish::mesh::{Attribute, FacePoint, TriMesh};
+use planish::mesh::{Attribute, TriMesh};
 use planish::network::{Corner, Curve, CurveKind, Network, Patch};
 use planish::relief::Relief;
 use planish::surface::Surface;
@@ -112,15 +112,6 @@ fn write_network(transaction: &Transaction, network: &Network, arrays: &mut Arra
     let (faces, weights) = add_places(arrays, corners.chain(network.curves.iter().flat_map(|c| &c.points)));
     transaction.execute("INSERT INTO network VALUES (1, ?1, ?2, ?3)", params![json, faces, weights])?;
     Ok(())
-}
-
-pub(super) fn add_places<'a>(arrays: &mut Arrays, places: impl Iterator<Item = &'a FacePoint>) -> (i64, i64) {
-    let (mut faces, mut weights) = (Vec::new(), Vec::new());
-    for place in places {
-        faces.push(place.face);
-        weights.extend(place.bary);
-    }
-    (arrays.add(Array::U32(faces)), arrays.add(Array::F64(weights)))
 }
 
 /// Reads a model and checks that its parts fit together.
@@ -242,18 +233,4 @@ fn read_network(connection: &Connection, arrays: &mut Loaded, face_count: usize)
         return Err(damaged(format!("patch {p} names a curve that is not there"), "network", 1));
     }
     Ok(Network { corners, curves, patches: layout.patches })
-}
-
-/// Places on the mesh out of their arrays.
-pub(super) fn places(
-    arrays: &mut Loaded,
-    faces: i64,
-    weights: i64,
-    count: usize,
-) -> Result<Vec<FacePoint>, ProjectError> {
-    let (f, w) = (arrays.u32(faces)?, arrays.f64(weights)?);
-    if w.len() != 3 * f.len() || f.iter().any(|&f| f as usize >= count) || !w.iter().all(|w| w.is_finite()) {
-        return Err(damaged("the places are not on the mesh".into(), "array", faces));
-    }
-    Ok(f.iter().zip(w.chunks_exact(3)).map(|(&face, w)| FacePoint { face, bary: [w[0], w[1], w[2]] }).collect())
 }

@@ -4,8 +4,7 @@
 //! by number.
 
 use super::ProjectError;
-use super::array::{Array, Arrays, Loaded, damaged};
-use super::schema;
+use super::array::{Array, Arrays, Loaded, add_places, damaged, places};
 use planish::grid::FeatureCurve;
 use planish::mesh::FacePoint;
 use planish::model::{Drawing, HistoryEntry, Model, Sketch, Step};
@@ -77,7 +76,7 @@ pub(super) fn write(transaction: &Transaction, model: &Model, arrays: &mut Array
     }
     if !pool.chains.is_empty() {
         let lengths = arrays.add(Array::U32(pool.chains.iter().map(|c| c.len() as u32).collect()));
-        let (faces, weights) = schema::add_places(arrays, pool.chains.iter().flatten());
+        let (faces, weights) = add_places(arrays, pool.chains.iter().flatten());
         transaction.execute("INSERT INTO pool VALUES (1, ?1, ?2, ?3)", params![lengths, faces, weights])?;
     }
     Ok(())
@@ -91,7 +90,7 @@ pub(super) fn read(connection: &Connection, arrays: &mut Loaded, model: &mut Mod
     for row in rows {
         let (lengths, f, w): (i64, i64, i64) = row?;
         let lengths = arrays.u32(lengths)?;
-        let mut places = schema::places(arrays, f, w, faces)?.into_iter();
+        let mut places = places(arrays, f, w, faces)?.into_iter();
         if lengths.iter().map(|&l| l as usize).fold(0, usize::saturating_add) != places.len() {
             return Err(damaged("the chains are not as long as they should be".into(), "pool", 1));
         }

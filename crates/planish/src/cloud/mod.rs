@@ -28,6 +28,7 @@ use crate::linalg::eigen3;
 use crate::mesh::Attribute;
 use crate::observe::Observer;
 use glam::DVec3;
+use local::fitted::Fit;
 use local::moments;
 use orient::Hints;
 use orient::{link, views};
@@ -241,7 +242,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
         sites.join(&tree, &twice);
         open = twice.iter().map(|t| t.0).collect();
         open.sort_unstable();
-        grown.retain(|f: &front::Fit| open.binary_search(&f.site).is_err());
+        grown.retain(|f: &Fit| open.binary_search(&f.site).is_err());
     };
     let mut samples: Vec<Sample> = fits
         .iter()
@@ -296,7 +297,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
 }
 
 /// The twentieth part of the gaps between sheets side by side, if more than a hundredth of the fits have one.
-fn least_gap(fits: &[front::Fit]) -> f64 {
+fn least_gap(fits: &[Fit]) -> f64 {
     let mut gaps: Vec<f64> = fits.iter().map(|f| f.gap).filter(|g| g.is_finite()).collect();
     gaps.sort_unstable_by(f64::total_cmp);
     if gaps.len() * 100 > fits.len() { gaps[gaps.len() / 20] } else { f64::INFINITY }
@@ -376,7 +377,7 @@ fn toward_scanner(cloud: &Cloud) -> Option<Box<Direction<'_>>> {
 const TOLD: usize = 16;
 
 /// What the file tells of the outside at every fit: the mean over its points, and not over those of another sheet there.
-fn of_fits(fits: &[front::Fit], points: &[DVec3], tree: &KdTree, of: impl Fn(u32) -> DVec3 + Sync) -> Vec<DVec3> {
+fn of_fits(fits: &[Fit], points: &[DVec3], tree: &KdTree, of: impl Fn(u32) -> DVec3 + Sync) -> Vec<DVec3> {
     (0..fits.len())
         .into_par_iter()
         .map_init(Vec::new, |near, i| {
@@ -384,7 +385,7 @@ fn of_fits(fits: &[front::Fit], points: &[DVec3], tree: &KdTree, of: impl Fn(u32
             let other = front::other_sheet(fits, i);
             tree.nearest(f.center, TOLD, near);
             let own = near.iter().map(|n| n.1).filter(|&p| {
-                let off = |g: &front::Fit| g.quadric.distance(points[p as usize]).0.abs();
+                let off = |g: &Fit| g.quadric.distance(points[p as usize]).0.abs();
                 other.is_none_or(|j| off(f) <= off(&fits[j]))
             });
             own.map(&of).sum::<DVec3>().normalize_or_zero()

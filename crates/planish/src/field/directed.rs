@@ -5,7 +5,7 @@
 //! row is the line of nodes `(., j, k)` along x and owns the edges that leave its nodes along +x, +y and +z. Sides
 //! are kept as the nodes where they change. Memory grows with the surface (plus one word per row and table).
 
-use super::grid_field::Levels;
+use super::levels::Levels;
 use super::{Lattice, Side};
 use glam::DVec3;
 use rayon::prelude::*;

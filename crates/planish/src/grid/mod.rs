@@ -22,8 +22,9 @@ mod resample;
 mod side;
 mod sizes;
 
-pub use feature::curve::{Family, FeatureCurve, FeatureError, FeatureGrid, Sections, relax_with_features};
+pub use feature::curve::{FeatureGrid, Sections, relax_with_features};
 pub use feature::network::{check_features, family_of, relax_network};
+pub use feature::{Family, FeatureCurve, FeatureError};
 pub use follow::follow;
 pub use quality::{GridQuality, measure};
 pub use resample::{resample, resample_with_features};

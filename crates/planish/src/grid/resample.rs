@@ -1,6 +1,6 @@
 //! Grids of a whole network: sizes chosen, patches relaxed, and grids that miss detail made finer.
 
-use super::feature::curve::FeatureError;
+use super::feature::FeatureError;
 use super::feature::network::{Drawn, give_sums, relax_some};
 use super::quality::{folds, miss};
 use super::sizes::{bounds, total};

@@ -30,7 +30,7 @@ const GREATEST_TURN: f64 = 0.9;
 const STOPS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 
 /// New chains of the half-arcs at a node, from the node.
-pub(super) type Fan = Vec<(u32, Vec<Place>)>;
+type Fan = Vec<(u32, Vec<Place>)>;
 
 /// Spreads the arcs of every node away from lines and boundaries. Where that cannot be drawn they stay as they are.
 pub(super) fn spread(bench: &mut Bench) {
@@ -45,13 +45,13 @@ pub(super) fn spread(bench: &mut Bench) {
             if free { now.push(star) } else { later.push(star) }
         }
         let fans: Vec<Fan> = now.par_iter().filter_map(|star| fan(bench, star)).collect();
-        bench.apply_fans(fans);
+        bench.commit(fans, put);
         waiting = later;
     }
 }
 
 /// Puts the chains of a fan into the complex; returns the arcs.
-pub(super) fn put(complex: &mut Complex, fan: &Fan) -> Vec<u32> {
+fn put(complex: &mut Complex, fan: &Fan) -> Vec<u32> {
     for (h, chain) in fan {
         let mut chain = chain.clone();
         if h % 2 == 1 {

@@ -2,9 +2,7 @@
 //! straight lines of the map. New arcs can therefore neither cross nor leave the union.
 
 use super::complex::{Arc, Complex, Node};
-use super::fan::{self, Fan};
 use super::shape::{Shape, Trace};
-use super::slide::Slide;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::CurveKind;
 use crate::network::disk::{Disk, Met};
@@ -138,7 +136,7 @@ impl Embedding {
 
     /// The union of a change as a disk, its outline and the position of each outline corner in the disk's
     /// boundary.
-    fn union(&self, complex: &Complex, change: &Change) -> Option<(Disk, Vec<u32>, Vec<usize>)> {
+    pub fn union(&self, complex: &Complex, change: &Change) -> Option<(Disk, Vec<u32>, Vec<usize>)> {
         let outline = outline(complex, change)?;
         let mut faces: Vec<u32> = change.cells.iter().flat_map(|&c| self.members[c as usize].iter().copied()).collect();
         faces.sort_unstable();
@@ -176,7 +174,7 @@ impl Embedding {
 
     /// Angles of the boundary vertices on the circle; `corners` are positions in the boundary, rising from the
     /// first by at most one turn.
-    fn angles(&self, disk: &Disk, corners: &[usize]) -> Vec<f64> {
+    pub fn angles(&self, disk: &Disk, corners: &[usize]) -> Vec<f64> {
         let at = |v: u32| self.cut.mesh.points[disk.vertices[v as usize] as usize];
         let n = disk.boundary.len();
         // Half of the circle shared evenly among the sides, half by their length.
@@ -202,7 +200,7 @@ impl Embedding {
     }
 
     /// The straight line of the map `uv` between two vertices of the disk, as places of the working mesh.
-    fn line(
+    pub fn line(
         &self,
         mesh: &TriMesh,
         adjacency: &Adjacency,
@@ -226,44 +224,6 @@ impl Embedding {
         let places = met.iter().filter_map(|m| self.on_ground(mesh, adjacency, disk, m));
         let name = |v: u32| self.cut.origin[disk.vertices[v as usize] as usize];
         Some(tighten(mesh, adjacency, [name(a)].into_iter().chain(places).chain([name(b)]).collect()))
-    }
-
-    /// Draws a slide: the new chain of each smooth half-arc at the node, from the node.
-    fn draw_slide(
-        &self,
-        mesh: &TriMesh,
-        adjacency: &Adjacency,
-        complex: &Complex,
-        slide: &Slide,
-    ) -> Option<Vec<(u32, Vec<Place>)>> {
-        let mut chains = Vec::new();
-        for (change, ends) in &slide.sides {
-            let (disk, outline, mut corners) = self.union(complex, change)?;
-            let n = disk.boundary.len();
-            let moved = slide.along.iter().find_map(|&h| outline.iter().position(|&g| g == h))?;
-            let k = corners.len();
-            // The new place lies between the corners before and after, cyclically.
-            let (before, after) = (corners[(moved + k - 1) % k], corners[(moved + 1) % k]);
-            let span = (after + n - before - 1) % n + 1;
-            let place = (1..span)
-                .map(|i| before + i)
-                .find(|&i| disk.vertices[disk.boundary[i % n] as usize] == slide.vertex)?;
-            corners[moved] = place % n;
-            let targets: Vec<usize> = ends.iter().map(|&(_, i)| corners[i]).collect();
-            let mut turned = corners.clone();
-            turned.rotate_left(moved);
-            for i in 1..k {
-                while turned[i] < turned[i - 1] {
-                    turned[i] += n;
-                }
-            }
-            let uv = disk.circle_map(&self.cut.mesh.points, &self.angles(&disk, &turned))?;
-            for (&(h, _), &target) in ends.iter().zip(&targets) {
-                let line = self.line(mesh, adjacency, &disk, &uv, disk.boundary[place % n], disk.boundary[target])?;
-                chains.push((h, line));
-            }
-        }
-        Some(chains)
     }
 
     /// The cells around a vertex of the working mesh, ascending.
@@ -482,7 +442,7 @@ impl<'a> Bench<'a> {
 
     /// Puts `edits` into the complex; `put` makes one and returns the arcs it touched. Edits that would break
     /// the embedding are left out. Returns how many were made.
-    fn commit<E>(&mut self, mut edits: Vec<E>, put: impl Fn(&mut Complex, &E) -> Vec<u32>) -> usize {
+    pub fn commit<E>(&mut self, mut edits: Vec<E>, put: impl Fn(&mut Complex, &E) -> Vec<u32>) -> usize {
         let before = self.complex.clone();
         while !edits.is_empty() {
             let touched: Vec<Vec<u32>> = edits.iter().map(|e| put(&mut self.complex, e)).collect();
@@ -504,40 +464,6 @@ impl<'a> Bench<'a> {
             }
         }
         0
-    }
-
-    /// Draws fans of nodes that share no arc. Returns how many were drawn.
-    pub fn apply_fans(&mut self, fans: Vec<Fan>) -> usize {
-        self.commit(fans, fan::put)
-    }
-
-    /// Makes slides of nodes whose cells are disjoint. Returns how many were made.
-    pub fn apply_slides(&mut self, slides: &[Slide]) -> usize {
-        if slides.is_empty() {
-            return 0;
-        }
-        let drawn: Vec<_> = slides
-            .par_iter()
-            .map(|slide| self.embedding.draw_slide(self.mesh, self.adjacency, &self.complex, slide))
-            .collect();
-        let edits = slides.iter().zip(drawn).filter_map(|(slide, chains)| Some((slide, chains?))).collect();
-        self.commit(edits, |complex, (slide, chains)| {
-            complex.nodes[slide.node as usize].vertex = slide.vertex;
-            let at = slide.line.iter().position(|&v| v == slide.vertex).expect("a vertex of the line");
-            let places: Vec<Place> = slide.line.iter().map(|&v| Place::Vertex(v)).collect();
-            let back = (slide.along[0], places[..=at].iter().rev().copied().collect());
-            let ahead = (slide.along[1], places[at..].to_vec());
-            let mut touched = Vec::new();
-            for (h, chain) in chains.iter().chain([&back, &ahead]) {
-                let mut chain: Vec<Place> = chain.clone();
-                if h % 2 == 1 {
-                    chain.reverse();
-                }
-                complex.arcs[*h as usize / 2].as_mut().expect("a live arc").chain = chain;
-                touched.push(h / 2);
-            }
-            touched
-        })
     }
 
     /// Makes the changes that `plan` builds for `items`, given the stars of all nodes, in batches of disjoint ones.

@@ -6,6 +6,7 @@ use super::recut::{Bench, Change, outline};
 use crate::mesh::TriMesh;
 use crate::network::CurveKind;
 use crate::network::imprint::Place;
+use rayon::prelude::*;
 
 /// A node keeps this fraction of the line between its neighbours to either side.
 const KEEP: f64 = 0.15;
@@ -54,7 +55,7 @@ pub(super) fn slide(bench: &mut Bench, nodes: &[u32]) -> usize {
             }
             now.push(slide);
         }
-        made += bench.apply_slides(&now);
+        made += apply(bench, &now);
         waiting = later;
     }
     made
@@ -141,4 +142,69 @@ fn plan(mesh: &TriMesh, complex: &Complex, star: &[u32]) -> Option<Slide> {
         sides.push((change, ends));
     }
     Some(Slide { node, vertex: line[best], line, along: [star[x], star[y]], sides })
+}
+
+/// Makes slides of nodes whose cells are disjoint. Returns how many were made.
+fn apply(bench: &mut Bench, slides: &[Slide]) -> usize {
+    if slides.is_empty() {
+        return 0;
+    }
+    let drawn: Vec<_> = slides.par_iter().map(|slide| draw(bench, slide)).collect();
+    let edits = slides.iter().zip(drawn).filter_map(|(slide, chains)| Some((slide, chains?))).collect();
+    bench.commit(edits, |complex, (slide, chains)| {
+        complex.nodes[slide.node as usize].vertex = slide.vertex;
+        let at = slide.line.iter().position(|&v| v == slide.vertex).expect("a vertex of the line");
+        let places: Vec<Place> = slide.line.iter().map(|&v| Place::Vertex(v)).collect();
+        let back = (slide.along[0], places[..=at].iter().rev().copied().collect());
+        let ahead = (slide.along[1], places[at..].to_vec());
+        let mut touched = Vec::new();
+        for (h, chain) in chains.iter().chain([&back, &ahead]) {
+            let mut chain: Vec<Place> = chain.clone();
+            if h % 2 == 1 {
+                chain.reverse();
+            }
+            complex.arcs[*h as usize / 2].as_mut().expect("a live arc").chain = chain;
+            touched.push(h / 2);
+        }
+        touched
+    })
+}
+
+/// Draws a slide: the new chain of each smooth half-arc at the node, from the node.
+fn draw(bench: &Bench, slide: &Slide) -> Option<Vec<(u32, Vec<Place>)>> {
+    let embedding = &bench.embedding;
+    let mut chains = Vec::new();
+    for (change, ends) in &slide.sides {
+        let (disk, outline, mut corners) = embedding.union(&bench.complex, change)?;
+        let n = disk.boundary.len();
+        let moved = slide.along.iter().find_map(|&h| outline.iter().position(|&g| g == h))?;
+        let k = corners.len();
+        // The new place lies between the corners before and after, cyclically.
+        let (before, after) = (corners[(moved + k - 1) % k], corners[(moved + 1) % k]);
+        let span = (after + n - before - 1) % n + 1;
+        let place =
+            (1..span).map(|i| before + i).find(|&i| disk.vertices[disk.boundary[i % n] as usize] == slide.vertex)?;
+        corners[moved] = place % n;
+        let targets: Vec<usize> = ends.iter().map(|&(_, i)| corners[i]).collect();
+        let mut turned = corners.clone();
+        turned.rotate_left(moved);
+        for i in 1..k {
+            while turned[i] < turned[i - 1] {
+                turned[i] += n;
+            }
+        }
+        let uv = disk.circle_map(&embedding.cut.mesh.points, &embedding.angles(&disk, &turned))?;
+        for (&(h, _), &target) in ends.iter().zip(&targets) {
+            let line = embedding.line(
+                bench.mesh,
+                bench.adjacency,
+                &disk,
+                &uv,
+                disk.boundary[place % n],
+                disk.boundary[target],
+            )?;
+            chains.push((h, line));
+        }
+    }
+    Some(chains)
 }

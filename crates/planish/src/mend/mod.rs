@@ -4,11 +4,13 @@ mod handles;
 mod holes;
 mod lids;
 mod repair;
+mod repairs;
 pub(crate) mod rims;
 mod slivers;
 mod trim;
 
 pub use holes::close_holes;
-pub use repair::{Repairs, part_fans, repair, weld};
+pub use repair::{part_fans, repair, weld};
+pub use repairs::Repairs;
 pub(crate) use rims::finish;
 pub use trim::trim;

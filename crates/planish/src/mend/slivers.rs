@@ -1,6 +1,6 @@
 //! Triangles without height: removed by collapsing or flipping edges, so that the surface stays whole.
 
-use super::repair::Repairs;
+use super::repairs::Repairs;
 use crate::geom::{Aabb, tolerance};
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
 use glam::DVec3;

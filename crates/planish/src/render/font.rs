@@ -1,7 +1,6 @@
 //! A bitmap font of 5 x 7 dots for digits, capital letters and a few signs.
 
 use super::Image;
-use super::overlay::put;
 
 /// Dots from one character to the next.
 pub(super) const ADVANCE: usize = 6;
@@ -19,7 +18,7 @@ pub(super) fn draw_text(image: &mut Image, x: usize, y: usize, scale: usize, tex
                 }
                 for d in 0..scale * scale {
                     let (u, v) = ((k * ADVANCE + column) * scale + d % scale, row * scale + d / scale);
-                    put(image, x + u, y + v, [40, 40, 40]);
+                    image.put(x + u, y + v, [40, 40, 40]);
                 }
             }
         }

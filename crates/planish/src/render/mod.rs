@@ -31,6 +31,16 @@ pub struct Image {
     pub rgba: Vec<u8>,
 }
 
+impl Image {
+    /// Colours a pixel, opaque; one beside the picture is left out.
+    fn put(&mut self, x: usize, y: usize, color: [u8; 3]) {
+        if x < self.width && y < self.height {
+            let at = 4 * (y * self.width + x);
+            self.rgba[at..at + 4].copy_from_slice(&[color[0], color[1], color[2], 255]);
+        }
+    }
+}
+
 /// What the surface is painted with. Colours are sRGB.
 #[derive(Clone, Copy, Debug)]
 pub enum Paint<'a> {

@@ -76,26 +76,19 @@ pub(super) fn draw_bar(image: &mut Image, range: [f64; 2], label: &str) {
         let color = field_color(1.0 - y as f64 / (tall - 1) as f64);
         for x in 0..thick {
             let edge = x < scale || x >= thick - scale || y < scale || y >= tall - scale;
-            put(image, left + x, top + y, if edge { [40, 40, 40] } else { color });
+            image.put(left + x, top + y, if edge { [40, 40, 40] } else { color });
         }
     }
     for (k, number) in numbers.iter().enumerate() {
         let y = top + (tall - 1) * (TICKS - 1 - k) / (TICKS - 1);
         for x in 0..glyph / 2 {
             for row in 0..scale {
-                put(image, left + thick + x, (y + row).saturating_sub(scale / 2).min(top + tall - 1), [40, 40, 40]);
+                image.put(left + thick + x, (y + row).saturating_sub(scale / 2).min(top + tall - 1), [40, 40, 40]);
             }
         }
         draw_text(image, left + thick + glyph, y.saturating_sub(line / 2), scale, number);
     }
     draw_text(image, left, top.saturating_sub(2 * line), scale, label);
-}
-
-pub(super) fn put(image: &mut Image, x: usize, y: usize, color: [u8; 3]) {
-    if x < image.width && y < image.height {
-        let at = 4 * (y * image.width + x);
-        image.rgba[at..at + 4].copy_from_slice(&[color[0], color[1], color[2], 255]);
-    }
 }
 
 /// A number with the digits that matter for a scale of this span.

@@ -5,7 +5,8 @@
 //! sheet decides at the noisy point is another question: beside an edge noise brings the points of one face that lie high to the
 //! other, and the faces, each fitted to what is left, meet at too sharp an angle.
 
-use crate::cloud::local::nest::{self, LIMIT, MOST};
+use crate::cloud::local::joints::LIMIT;
+use crate::cloud::local::nest::{self, MOST};
 use glam::DVec3;
 
 /// Sheets whose angle has a lesser sine than this do not meet.

@@ -4,7 +4,8 @@
 //! line, have a wall between them, though hardly a point lies on it: the plane through that line upright on both.
 
 use crate::cloud::Quadric;
-use crate::cloud::local::nest::{LIMIT, Seen};
+use crate::cloud::local::joints::LIMIT;
+use crate::cloud::local::nest::Seen;
 use crate::cloud::local::points::Points;
 use glam::DVec3;
 

@@ -5,9 +5,10 @@
 //! of the gradient of a general quadric differs from place to place: with it exact points would no longer give exact
 //! quadrics. The length stays with Taubin's constraint.
 
-use super::fit::{Frame, tukey};
+use super::fitted::{Fit, SURE};
+use super::height::Frame;
+use super::weights::{kernel, tukey};
 use crate::cloud::Quadric;
-use crate::cloud::sites::front::{Fit, SURE};
 use crate::geom::KdTree;
 use glam::DVec3;
 
@@ -34,7 +35,7 @@ pub(crate) fn guides(closed: &[Fit], tree: &KdTree, p: DVec3, radius: f64, noise
     tree.within(p, radius, |i, at, d2| {
         let f = &closed[i as usize];
         if f.error < SURE * noise {
-            let weight = CLOSED_WEIGHT * super::fit::kernel(d2 / (radius * radius));
+            let weight = CLOSED_WEIGHT * kernel(d2 / (radius * radius));
             found.push(Guide { at: (at - p) / radius, normal: f.normal, weight, reach2: (f.radius / radius).powi(2) });
         }
     });

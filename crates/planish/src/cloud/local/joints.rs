@@ -2,9 +2,11 @@
 //!
 //! Sums have a fixed number of lanes, as in `points`. What is above a limit is known to be so before the sum is complete.
 
-use super::nest::LIMIT;
 use super::points::{BLOCK, LANES, lanes};
 use pulp::{Arch, Simd, WithSimd};
+
+/// Residuals count up to this many noise levels.
+pub(crate) const LIMIT: f64 = 3.0;
 
 /// Squares of distances in noise levels, each at most the square of [`LIMIT`].
 pub(crate) fn capped(residuals: &[f64]) -> Vec<f64> {

@@ -1,11 +1,14 @@
 //! Local fits: quadrics to the points of a ball, and what two or more of them say together about a place.
 
 pub(crate) mod fit;
+pub(crate) mod fitted;
 pub(crate) mod guides;
+pub(crate) mod height;
 pub(crate) mod joints;
 pub(crate) mod moments;
 pub(crate) mod nest;
 pub(crate) mod points;
 mod quadric;
+pub(crate) mod weights;
 
 pub use quadric::Quadric;

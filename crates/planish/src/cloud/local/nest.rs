@@ -13,8 +13,6 @@ use glam::DVec3;
 
 /// Most sheets that are nested: a corner of four faces.
 pub(crate) const MOST: usize = 4;
-/// Residuals count up to this many noise levels.
-pub(crate) const LIMIT: f64 = 3.0;
 
 /// A place belongs to the surface if the nesting is this close to zero there, in noise levels.
 const ON: f64 = 0.25;

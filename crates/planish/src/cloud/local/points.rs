@@ -2,8 +2,9 @@
 //!
 //! Every sum has a fixed number of lanes, so its bits do not depend on how wide the instructions are.
 
-use super::fit::{Frame, Height, kernel};
+use super::height::{Frame, Height};
 use super::moments::{COUNT, Moments, PARENTS};
+use super::weights::kernel;
 use crate::cloud::Quadric;
 use glam::DVec3;
 use pulp::{Arch, Simd, WithSimd};

@@ -3,7 +3,7 @@
 //! [X03] §7: normals agree along a sheet by the gradient of the neighbour's model at the sample; across an edge the
 //! reflection of one normal along the line to the other tells; besides, both must lie on the same side of each other.
 
-use crate::cloud::sites::front::Fit;
+use crate::cloud::local::fitted::Fit;
 use crate::geom::KdTree;
 use glam::DVec3;
 use rayon::prelude::*;

@@ -17,10 +17,10 @@ mod wind;
 
 pub use dipoles::Dipoles;
 
+use super::local::fitted::Fit;
 use super::orient::link::{Vote, components};
 use super::orient::segments::{Shape, by_area, segments};
 use super::orient::wind::wind;
-use super::sites::front::Fit;
 use glam::DVec3;
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeMap, BinaryHeap};

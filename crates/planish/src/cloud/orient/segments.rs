@@ -3,7 +3,7 @@
 //! METHODS 1.8: connected sets of merged patches, where two spheres that touch come apart.
 
 use super::link::{Vote, components, middle};
-use crate::cloud::sites::front::Fit;
+use crate::cloud::local::fitted::Fit;
 use crate::geom::KdTree;
 use glam::DVec3;
 use std::collections::BTreeMap;

@@ -6,7 +6,8 @@
 
 use super::Hints;
 use crate::cloud::Dipoles;
-use crate::cloud::sites::front::{Fit, other_sheet};
+use crate::cloud::local::fitted::Fit;
+use crate::cloud::sites::front::other_sheet;
 use crate::geom::KdTree;
 use glam::DVec3;
 use rayon::prelude::*;

@@ -7,7 +7,7 @@
 use super::link::Vote;
 use super::{DECIDED, Hints, SWEEPS, patches};
 use crate::cloud::Dipoles;
-use crate::cloud::sites::front::Fit;
+use crate::cloud::local::fitted::Fit;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 

@@ -12,11 +12,15 @@
 //! are fitted in parallel and the result is that of any number of threads. Where nothing fitted is near, a site stands
 //! on its own fit, which is the seed jump of [X03]. Supports follow from the data and not from factors c_i.
 
+use super::survey::{PLENTY, WIDE_ENOUGH};
 use super::{APART, Sites, in_pieces, layers};
 use crate::cloud::Quadric;
 use crate::cloud::local::fit::{Ball, Sheet, localized, sheet};
+use crate::cloud::local::fitted::{Fit, SURE};
 use crate::cloud::local::guides::guides;
-use crate::cloud::local::nest::{LIMIT, Seen, cost, nest};
+use crate::cloud::local::height::Frame;
+use crate::cloud::local::joints::LIMIT;
+use crate::cloud::local::nest::{Seen, cost, nest};
 use crate::cloud::local::points::Points;
 use crate::geom::KdTree;
 use crate::observe::Observer;
@@ -57,8 +61,6 @@ const OFFSET: f64 = 0.12;
 const ASKED: usize = 16;
 /// Fitted neighbours are sought within this many radii.
 const FARTHEST: f64 = 3.0;
-/// Fits that guide others have an expected error below this share of the noise.
-pub(crate) const SURE: f64 = 0.35;
 /// A carried-on sheet begins with the ball that it has, at most this many times that of the site.
 const CARRIED: f64 = 3.0;
 /// Points of less weight are left out.
@@ -68,36 +70,6 @@ const STRAY: f64 = 0.011;
 /// Ratio of one ball to the next when a sheet grows, and how often it grows at most.
 const WIDEN: f64 = 1.35;
 const STEPS: usize = 3;
-
-/// A ball of so many points leaves a tenth of the noise; if it is this many noise levels wide it grows no further.
-pub(crate) const PLENTY: usize = 700;
-pub(crate) const WIDE_ENOUGH: f64 = 10.0;
-
-/// A fitted sample of the surface: not oriented yet.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Fit {
-    pub quadric: Quadric,
-    pub center: DVec3,
-    pub normal: DVec3,
-    /// Radius of the points it was fitted to, world units.
-    pub radius: f64,
-    /// Standard deviation of the points around it.
-    pub noise: f64,
-    /// That over the noise of the region, at least 1.
-    pub thickness: f64,
-    /// Expected error.
-    pub error: f64,
-    pub irregularity: f64,
-    pub class: u8,
-    /// The site it stands on.
-    pub site: u32,
-    /// Number of sheets of that site.
-    pub sheets: u8,
-    /// Distance to the other sheet of a plate or a gap, world units; infinite where there is none.
-    pub gap: f64,
-    /// Points that it explains better than its neighbours do.
-    pub owned: u32,
-}
 
 /// Fits sites, leaning on what is fitted already, and adds what it found. `None` if cancelled.
 /// * `open` - the sites, ascending
@@ -450,7 +422,7 @@ fn widen(
 fn expected(s: &Sheet, p: DVec3, radius: f64, ball: &Points, noise: f64) -> f64 {
     let q = localized(&s.quadric, p, radius);
     let sigma = noise / radius;
-    let frame = crate::cloud::local::fit::Frame::of(q.value(DVec3::ZERO).1.normalize_or(DVec3::Z));
+    let frame = Frame::of(q.value(DVec3::ZERO).1.normalize_or(DVec3::Z));
     let mut sums = [(0.0, 0.0); 16];
     let mut count = 0.0;
     let mut distances = Vec::new();

@@ -4,7 +4,7 @@
 //! 1. two means of the residuals; a dip between them, and both sides present all around (at a crease they are not)
 //! 2. a height field for each side, points to the nearer one, and once more
 
-use crate::cloud::local::fit::{Frame, Height, framed_height};
+use crate::cloud::local::height::{Frame, Height, framed_height};
 use crate::cloud::local::moments::Moments;
 use crate::cloud::local::points::Points;
 use glam::DVec3;

@@ -10,15 +10,17 @@
 //!
 //! Departs from [X03]: no feature size is set by hand, and the noise is measured in every place by itself.
 
-use super::front::{PLENTY, WIDE_ENOUGH};
 use super::layers::{Layers, PEAKED, split};
 use crate::cloud::Quadric;
-use crate::cloud::local::fit::{Frame, Height, framed_height};
+use crate::cloud::local::height::{Frame, Height, framed_height};
 use crate::cloud::local::moments::Moments;
 use crate::cloud::local::points::Points;
 use crate::geom::KdTree;
 use glam::DVec3;
 
+/// A ball of so many points leaves a tenth of the noise; if it is this many noise levels wide it grows no further.
+pub(crate) const PLENTY: usize = 700;
+pub(crate) const WIDE_ENOUGH: f64 = 10.0;
 /// Points in the smallest ball.
 const SMALLEST: usize = 18;
 /// Ratio of the radii of two balls, one after the other.

@@ -5,7 +5,7 @@
 //! lines run from cell to cell without the flips of [K01] §4 (fig. 9).
 
 use super::caps::FACE_POINT;
-use super::patch::{Wish, edge_point, joined};
+use super::crossings::{edge_point, joined};
 use super::{AMBIGUOUS, FACE_EDGES, links};
 use crate::contour::Thresholds;
 use crate::contour::walk::Cell;
@@ -34,6 +34,9 @@ pub struct FacePoints {
     /// First name of each axis.
     base: [u32; 3],
 }
+
+/// Vertices that would rather lie elsewhere: name and place. They were kept in their cell or face.
+pub type Wish = (u32, DVec3);
 
 /// What a few layers give.
 #[derive(Default)]

@@ -8,6 +8,7 @@
 //! neighbours fit ([K01] §4 takes the table of 1987, which does not).
 
 pub(crate) mod caps;
+pub(crate) mod crossings;
 pub(crate) mod face;
 pub(crate) mod feature;
 pub(crate) mod patch;

@@ -17,7 +17,7 @@ mod refine;
 
 pub use refine::FieldCreases;
 
-use super::cell::patch::Wish;
+use super::cell::face::Wish;
 use super::polish::lines::{Lines, TAKEN, follow, insert_missing, join_ends};
 use super::polish::local::{CellRange, GONE, Local};
 use crate::field::{Creases, Directed};

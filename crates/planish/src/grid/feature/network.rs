@@ -3,10 +3,9 @@
 //! A feature curve ends on curves of the network; the grids on both sides of such a curve share their nodes, so the
 //! curve gets a stop there and the grid beyond it follows ([`crate::grid::side`]). Numbers of cells go along chords.
 
-use super::curve::{
-    FEWEST_CELLS, Family, FeatureCurve, FeatureError, Sections, cells_between, check_count, relax_along, weave,
-};
+use super::curve::{FEWEST_CELLS, Sections, cells_between, check_count, relax_along, weave};
 use super::strand::Strands;
+use super::{Family, FeatureCurve, FeatureError};
 use crate::grid::{Grid, GridError, GridParams, SideStops, relax_at, side};
 use crate::mesh::{FacePoint, TriMesh};
 use crate::network::{Network, PatchMesh};

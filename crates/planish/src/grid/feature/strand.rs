@@ -1,7 +1,7 @@
 //! Feature curves brought onto the mesh of their patch: places found again on cut triangles, ends led to the sides,
 //! curves of one family cut in together.
 
-use super::curve::{Family, FeatureCurve, FeatureError};
+use super::{Family, FeatureCurve, FeatureError};
 use crate::curve::SurfaceCurve;
 use crate::geom::tolerance;
 use crate::grid::side;
