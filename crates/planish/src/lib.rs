@@ -5,7 +5,7 @@
 //!
 //! ```
 //! use planish::synthetic::shapes;
-//! use planish::network::LayoutParams;
+//! use planish::layout::LayoutParams;
 //! use planish::pipeline::{self, PipelineParams};
 //!
 //! let ball = shapes::sphere(10.0, 4);
