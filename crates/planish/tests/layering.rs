@@ -106,7 +106,8 @@ fn paths(code: &str) -> Vec<String> {
     let mut lines = code.lines();
     while let Some(line) = lines.next() {
         let Some((before, tree)) = line.trim_start().split_once("use ") else { continue };
-        if !before.is_empty() && !(before.starts_with("pub") && before.ends_with(' ') && !before.contains('"')) {
+        let public = before.starts_with("pub") && before.ends_with(' ') && !before.contains('"');
+        if !before.is_empty() && !public {
             continue;
         }
         let mut tree = tree.to_string();
