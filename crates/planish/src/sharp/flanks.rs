@@ -17,11 +17,12 @@ const RADII: [f64; 5] = [2.0, 3.0, 4.5, 6.75, 10.0];
 /// Terms of the polynomials among `1, x, y, y², x², xy` with `y` along the line: a plane, one that bends along the line, and a
 /// quadric.
 const MODELS: [usize; 3] = [3, 4, 6];
-/// A window must stand for so many points of the scan.
+/// A window must stand for so many points of the scan: two more than a quadric has terms.
 const FEWEST: f64 = 8.0;
-/// Standard deviations within which estimates agree. Less follows the noise, more rounds off what bends: of 0.7 to 3 this kept
-/// most angles at noise of .1 and .25 % of the diagonal.
-const AGREE: f64 = 1.4;
+/// Squared difference at which two estimates no longer agree, over the variance of that difference, d. The wider window has
+/// less variance by d and a squared bias b; the squared difference is b + d in the mean, so the wider one is the better as
+/// long as the squared difference is below 2 d (unbiased risk, as in Mallows' C_p).
+const AGREE_SQUARED: f64 = 2.0;
 /// Least share of an estimate's own variance that counts as that of its difference to a more precise one.
 const SHARED: f64 = 0.25;
 /// Where what is right beside a line does not count, the first so many windows must have so many of these.
@@ -238,7 +239,42 @@ impl Estimate {
     fn agrees(&self, coarse: &Estimate) -> bool {
         (0..3).all(|k| {
             let (own, other) = (self.variance[k], coarse.variance[k]);
-            (self.terms[k] - coarse.terms[k]).powi(2) <= AGREE * AGREE * (other - own).max(SHARED * other)
+            (self.terms[k] - coarse.terms[k]).powi(2) <= AGREE_SQUARED * (other - own).max(SHARED * other)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::FeatureTags;
+    use crate::synthetic::shapes;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn variance_of_the_slope_beside_a_line_in_a_plane_is_that_of_the_points_of_a_half_disc_within_2_percent() {
+        // A line across the middle of a flat sheet of fine triangles: each flank is a half disc of the widest window.
+        let n = 240;
+        let mesh = shapes::rectangle(2.4, 2.4, n, n);
+        let middle = (mesh.bounds().min.x + mesh.bounds().max.x) / 2.0;
+        let on = |v: u32| (mesh.points[v as usize].x - middle).abs() < 1e-9;
+        let edges = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let tags = FeatureTags::from_edges(mesh.points.len(), edges.filter(|&[a, b]| on(a) && on(b)));
+        assert_eq!(tags.edges.len(), n);
+        let lines = Lines::new(&mesh, &tags);
+        let scale = ScanScale { noise: 0.01, spacing: 0.02, cell: 0.1 };
+        let flanks = lines.flanks(&scale);
+        let center = mesh.bounds().center();
+        let (_, beside) = (flanks.iter())
+            .min_by(|a, b| a.1[0].at.distance(center).total_cmp(&b.1[0].at.distance(center)))
+            .expect("a vertex in the middle of the line");
+        // Second moment of a half disc across its straight side, about its own middle.
+        let radius = RADII[RADII.len() - 1] * scale.cell;
+        let moment = radius.powi(4) * (PI / 8.0 - 8.0 / (9.0 * PI));
+        let expected = (scale.noise * scale.spacing).powi(2) / moment;
+        for flank in beside {
+            let ratio = flank.variance / expected;
+            assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+        }
     }
 }

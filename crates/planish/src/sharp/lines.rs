@@ -17,7 +17,7 @@ pub(super) struct Lines<'a> {
     pub on_line: Vec<bool>,
     /// Middles of the faces.
     pub centers: Vec<DVec3>,
-    /// Area vectors of the faces.
+    /// Unit normals of the faces times their areas.
     pub areas: Vec<DVec3>,
 }
 
@@ -48,7 +48,7 @@ impl Lines<'_> {
             tagged: Vec::new(),
             on_line: Vec::new(),
             centers: faces.clone().into_par_iter().map(center).collect(),
-            areas: faces.into_par_iter().map(|t| mesh.area_vector(t)).collect(),
+            areas: faces.into_par_iter().map(|t| mesh.area_vector(t) / 2.0).collect(),
         };
         lines.mark(tags);
         lines
