@@ -2,6 +2,7 @@
 
 use crate::failure::Failure;
 use crate::options::{StageOptions, StageParams};
+use crate::outputs::Policy;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use planish::cloud::{CleanParams, ProjectParams};
 use planish::contour::ContourParams;
@@ -80,12 +81,28 @@ pub struct Common {
     /// What one unit of the input is; carried into every export [default: the file's own, else mm]
     #[arg(long)]
     pub units: Option<UnitsWord>,
+    /// Replace files that planish did not write, too
+    #[arg(long)]
+    pub force: bool,
+    /// Replace no file that is there
+    #[arg(long, conflicts_with = "force")]
+    pub no_clobber: bool,
+    /// Allow the output to take the place of the input
+    #[arg(long)]
+    pub in_place: bool,
     /// Write nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
     /// Tell each stage with its time
     #[arg(short, long, conflicts_with = "quiet")]
     pub verbose: bool,
+}
+
+impl Common {
+    /// What may happen to files that are there.
+    pub fn policy(&self) -> Policy {
+        Policy { force: self.force, no_clobber: self.no_clobber, in_place: self.in_place }
+    }
 }
 
 /// A unit of length by its symbol.

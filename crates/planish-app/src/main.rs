@@ -5,6 +5,7 @@ mod commands;
 mod failure;
 mod files;
 mod options;
+mod outputs;
 mod pictures;
 mod products;
 mod progress;

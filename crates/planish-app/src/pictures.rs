@@ -301,6 +301,9 @@ fn png(image: &Image) -> Result<Vec<u8>, Failure> {
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Balanced);
+    encoder
+        .add_text_chunk("Software".into(), concat!("planish ", env!("CARGO_PKG_VERSION")).into())
+        .map_err(Failure::fault)?;
     let mut writer = encoder.write_header().map_err(Failure::fault)?;
     // The ground is opaque: a fourth byte would say nothing.
     let rgb: Vec<u8> = image.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();

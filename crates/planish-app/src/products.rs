@@ -1,21 +1,43 @@
-//! Products appear whole or not at all: each is written beside its place and renamed at the end.
+//! Products appear whole or not at all: each is written into a staging folder on the same file system and renamed at the end.
+//!
+//! A staging folder holds a lock for as long as its process lives. What a killed process has left is found by its free lock
+//! and removed by the next run that writes there.
 
 use crate::failure::Failure;
-use std::fs;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use tempfile::TempDir;
 
-/// Staging folders of this process, so that an interrupt that cannot wait can still remove them.
-static STAGING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// Staging folders of this process, and the folders made for them, so that an interrupt that cannot wait can still remove them.
+static STAGING: Mutex<Vec<Place>> = Mutex::new(Vec::new());
+
+/// How staging folders begin.
+const PREFIX: &str = ".planish-partial-";
+/// The file in a staging folder that its process keeps locked.
+const LOCK: &str = ".lock";
+
+struct Place {
+    staging: PathBuf,
+    /// Folders that were made for it, the outermost first.
+    made: Vec<PathBuf>,
+}
+
+impl Place {
+    /// Removes the folders that were made, as far as they are empty.
+    fn unmake(&self) {
+        self.made.iter().rev().for_each(|folder| _ = fs::remove_dir(folder));
+    }
+}
 
 /// What is being written for one target: a single file or a folder of products.
 pub struct Staged {
-    // Before `registered`, so that the folder is gone before it is forgotten.
-    staging: TempDir,
+    // Before the registry is told, so that the folder is gone before it is forgotten.
+    staging: Option<TempDir>,
     target: PathBuf,
     kind: Kind,
+    _lock: Option<File>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -25,7 +47,7 @@ enum Kind {
 }
 
 impl Staged {
-    /// A single file. Its folder must exist; a file of that name is replaced.
+    /// A single file. Its folder must exist; a file of that name is replaced, of a link what it leads to.
     /// # Errors
     /// If nothing can be written there.
     pub fn file(target: &Path) -> Result<Staged, Failure> {
@@ -35,7 +57,9 @@ impl Staged {
         if target.file_name().is_none() {
             return Err(Failure::usage(target, "is not a file name").hint("give a file name to -o"));
         }
-        Staged::open(target, Kind::File)
+        let whole = if target.is_symlink() { fs::canonicalize(target).ok() } else { None };
+        let target = whole.unwrap_or_else(|| target.to_path_buf());
+        Staged::open(parent(&target), &target, Kind::File, Vec::new())
     }
 
     /// A folder of products. Missing folders are made; products of the same name in it are replaced and
@@ -46,28 +70,49 @@ impl Staged {
         if target.exists() && !target.is_dir() {
             return Err(Failure::usage(target, "is a file, not a folder").hint("give a folder to -o"));
         }
-        fs::create_dir_all(parent(target)).map_err(|e| unwritable(target, &e))?;
-        Staged::open(target, Kind::Folder)
+        let missing = target.ancestors().take_while(|p| !p.as_os_str().is_empty() && !p.exists());
+        let mut made: Vec<PathBuf> = missing.map(Path::to_path_buf).collect();
+        made.reverse();
+        fs::create_dir_all(target).map_err(|e| unwritable(target, &e))?;
+        // Inside the target, which may be a file system of its own, or all that the user may write to.
+        Staged::open(target, target, Kind::Folder, made)
     }
 
-    fn open(target: &Path, kind: Kind) -> Result<Staged, Failure> {
-        let staging = tempfile::Builder::new()
-            .prefix(".planish-partial-")
-            .tempdir_in(parent(target))
-            .map_err(|e| unwritable(target, &e))?;
-        registry().push(staging.path().to_owned());
-        Ok(Staged { staging, target: target.to_owned(), kind })
+    fn open(beside: &Path, target: &Path, kind: Kind, made: Vec<PathBuf>) -> Result<Staged, Failure> {
+        sweep(beside);
+        let open = || -> io::Result<(TempDir, Option<File>)> {
+            let staging = tempfile::Builder::new().prefix(PREFIX).tempdir_in(beside)?;
+            // A file system without locks keeps what killed runs leave.
+            let lock = File::create(staging.path().join(LOCK))?;
+            let held = lock.try_lock().is_ok();
+            Ok((staging, held.then_some(lock)))
+        };
+        let place = |staging: PathBuf| Place { staging, made: made.clone() };
+        match open() {
+            Ok((staging, lock)) => {
+                registry().push(place(staging.path().to_owned()));
+                Ok(Staged { staging: Some(staging), target: target.to_owned(), kind, _lock: lock })
+            }
+            Err(e) => {
+                place(PathBuf::new()).unmake();
+                Err(unwritable(target, &e))
+            }
+        }
+    }
+
+    fn staging(&self) -> &Path {
+        self.staging.as_ref().map_or(Path::new("."), |s| s.path())
     }
 
     /// Where the file, or the folder's product `name`, is written meanwhile. The name stays, so that a
     /// format is found from the extension.
     pub fn path(&self, name: &str) -> PathBuf {
-        self.staging.path().join(name)
+        self.staging().join(name)
     }
 
     /// Where the single file is written meanwhile.
     pub fn file_path(&self) -> PathBuf {
-        self.staging.path().join(self.target.file_name().unwrap_or_default())
+        self.staging().join(self.target.file_name().unwrap_or_default())
     }
 
     /// Moves everything to its place.
@@ -76,50 +121,82 @@ impl Staged {
     pub fn commit(self) -> Result<(), Failure> {
         // Held throughout: an interrupt waits until either nothing or everything is in place.
         let mut registered = registry();
-        let target = self.target.clone();
-        self.move_all().map_err(|e| unwritable(&target, &e))?;
-        registered.retain(|p| p != self.staging.path());
+        self.move_all().map_err(|e| unwritable(&self.target, &e))?;
+        registered.retain(|p| p.staging != self.staging());
         Ok(())
     }
 
     fn move_all(&self) -> io::Result<()> {
         let folder = if self.kind == Kind::Folder { self.target.as_path() } else { parent(&self.target) };
         fs::create_dir_all(folder)?;
-        let mut entries: Vec<_> = fs::read_dir(self.staging.path())?.collect::<Result<_, _>>()?;
+        let mut entries: Vec<_> = fs::read_dir(self.staging())?.collect::<Result<_, _>>()?;
         entries.sort_by_key(|e| e.file_name());
-        for entry in entries {
+        for entry in entries.into_iter().filter(|e| e.file_name() != LOCK) {
             let place = folder.join(entry.file_name());
-            if place.is_dir() {
-                // A folder product (relief) is replaced as a whole: maps of an older run must not stay in it.
-                fs::remove_dir_all(&place)?;
+            if entry.file_type()?.is_dir() {
+                replace_maps(&entry.path(), &place)?;
+            } else {
+                fs::rename(entry.path(), &place)?;
             }
-            fs::rename(entry.path(), &place)?;
         }
         Ok(())
     }
 }
 
+/// Puts a folder of maps in its place. Of what is there only the maps that an older sidecar names go.
+fn replace_maps(from: &Path, to: &Path) -> io::Result<()> {
+    fs::create_dir_all(to)?;
+    for name in planish_io::relief_names(to) {
+        match fs::remove_file(to.join(name)) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
+            _ => {}
+        }
+    }
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        fs::rename(entry.path(), to.join(entry.file_name()))?;
+    }
+    Ok(())
+}
+
+/// Removes the staging folders in `folder` whose processes are gone.
+fn sweep(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten().filter(|e| e.file_name().to_string_lossy().starts_with(PREFIX)) {
+        let Ok(lock) = File::open(entry.path().join(LOCK)) else { continue };
+        if lock.try_lock().is_ok() {
+            let _ = fs::remove_dir_all(entry.path());
+        }
+    }
+}
+
 impl Drop for Staged {
     fn drop(&mut self) {
-        registry().retain(|p| p != self.staging.path());
+        let path = self.staging().to_path_buf();
+        drop(self.staging.take());
+        let mut registered = registry();
+        if let Some(at) = registered.iter().position(|p| p.staging == path) {
+            registered.swap_remove(at).unmake();
+        }
     }
 }
 
 /// Removes what is unfinished and ends the process; for an interrupt that a stage did not answer in time.
 pub fn abandon_and_exit(status: u8) -> ! {
     let registered = registry();
-    for folder in registered.iter() {
+    for place in registered.iter() {
         // The stage may still be writing: a folder can gain a file while it is being emptied.
         for _ in 0..20 {
-            if fs::remove_dir_all(folder).is_ok() || !folder.exists() {
+            if fs::remove_dir_all(&place.staging).is_ok() || !place.staging.exists() {
                 break;
             }
         }
+        place.unmake();
     }
     std::process::exit(status as i32)
 }
 
-fn registry() -> std::sync::MutexGuard<'static, Vec<PathBuf>> {
+fn registry() -> std::sync::MutexGuard<'static, Vec<Place>> {
     STAGING.lock().unwrap_or_else(|e| e.into_inner())
 }
 
@@ -151,6 +228,7 @@ pub fn plain(error: &io::Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::outputs::RELIEF;
 
     #[test]
     fn an_uncommitted_product_leaves_nothing_and_a_committed_one_replaces_the_old() {
@@ -171,17 +249,37 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_keeps_strange_files_and_loses_old_maps() {
+    fn a_folder_keeps_the_files_of_others_and_loses_only_maps_that_an_older_sidecar_names() {
         let dir = tempfile::tempdir().unwrap();
         let target = dir.path().join("deep/out");
-        fs::create_dir_all(target.join("relief")).unwrap();
-        fs::write(target.join("relief/patch-9.exr"), "old").unwrap();
+        let maps = target.join(RELIEF);
+        fs::create_dir_all(&maps).unwrap();
+        fs::write(maps.join("patch_0009.exr"), "old").unwrap();
+        fs::write(maps.join("sculpt.blend"), "mine").unwrap();
+        fs::write(maps.join("relief.json"), r#"{"planish_relief": 1, "patches": [{"file": "patch_0009.exr"}]}"#)
+            .unwrap();
         fs::write(target.join("notes.txt"), "mine").unwrap();
         let staged = Staged::folder(&target).unwrap();
-        fs::create_dir(staged.path("relief")).unwrap();
-        fs::write(staged.path("relief/patch-0.exr"), "new").unwrap();
+        fs::create_dir(staged.path(RELIEF)).unwrap();
+        fs::write(staged.path(RELIEF).join("patch_0000.exr"), "new").unwrap();
         staged.commit().unwrap();
-        assert!(target.join("notes.txt").exists() && target.join("relief/patch-0.exr").exists());
-        assert!(!target.join("relief/patch-9.exr").exists());
+        assert!(target.join("notes.txt").exists() && maps.join("patch_0000.exr").exists());
+        assert!(maps.join("sculpt.blend").exists() && !maps.join("patch_0009.exr").exists());
+        assert_eq!(fs::read_dir(&target).unwrap().count(), 2);
+    }
+
+    #[test]
+    fn an_uncommitted_folder_and_what_was_made_for_it_go_and_what_a_dead_process_left_is_swept() {
+        let dir = tempfile::tempdir().unwrap();
+        let left = dir.path().join(format!("{PREFIX}dead"));
+        fs::create_dir(&left).unwrap();
+        fs::write(left.join(LOCK), "").unwrap();
+        fs::write(left.join("half.ply"), "half").unwrap();
+        let living = Staged::file(&dir.path().join("a.txt")).unwrap();
+        assert!(!left.exists());
+        let folder = Staged::folder(&dir.path().join("deep/out")).unwrap();
+        assert!(living.file_path().parent().unwrap().exists());
+        drop(folder);
+        assert!(!dir.path().join("deep").exists());
     }
 }

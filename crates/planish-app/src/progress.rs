@@ -1,10 +1,12 @@
-//! Progress on stderr and Ctrl-C.
+//! Progress on stderr, and the signals that end the program.
 
 use crate::failure::Status;
 use crate::products;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use planish::Observer;
 use planish::pipeline::{PipelineObserver, StageRecord};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,14 +21,32 @@ const STEPS: u64 = 1000;
 
 static CANCELLED: AtomicBool = AtomicBool::new(false);
 
-/// Makes Ctrl-C end the program within a second, with nothing half-written left.
+/// Makes Ctrl-C, SIGTERM and a hangup end the program within a second, with nothing half-written left. A hangup that the
+/// parent had ignored (`nohup`) stays ignored.
 pub fn watch_interrupts() {
-    // A second handler cannot be set; then the first one is there already.
-    let _ = ctrlc::set_handler(|| {
-        CANCELLED.store(true, Ordering::SeqCst);
-        std::thread::sleep(GRACE);
-        products::abandon_and_exit(Status::Interrupted as u8);
+    let mut ends = vec![SIGINT, SIGTERM];
+    #[cfg(unix)]
+    if !is_hangup_ignored() {
+        ends.push(signal_hook::consts::SIGHUP);
+    }
+    // A system that refuses a handler ends the program its own way.
+    let Ok(mut signals) = Signals::new(ends) else { return };
+    std::thread::spawn(move || {
+        if signals.forever().next().is_some() {
+            CANCELLED.store(true, Ordering::SeqCst);
+            std::thread::sleep(GRACE);
+            let _ = writeln!(std::io::stderr(), "{}", crate::failure::Failure::interrupted());
+            products::abandon_and_exit(Status::Interrupted as u8);
+        }
     });
+}
+
+/// True if SIGHUP was ignored when the program started. Systems that do not tell count as not.
+#[cfg(unix)]
+fn is_hangup_ignored() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|l| l.strip_prefix("SigIgn:")).map(|m| u64::from_str_radix(m.trim(), 16));
+    matches!(mask, Some(Ok(mask)) if mask >> (signal_hook::consts::SIGHUP - 1) & 1 == 1)
 }
 
 /// True once the user has pressed Ctrl-C.

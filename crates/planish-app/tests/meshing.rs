@@ -1,17 +1,13 @@
 //! `planish mesh`, `smooth` and `decimate` as a user meets them.
 
+mod common;
+
+use common::planish;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
 
 const PART: &str = "units = \"mm\"\n[solid.block]\nbox = { size = [4, 3, 2] }\n[solid.bore]\ncylinder = { radius = 0.8, height = 3 }\n[solid.part]\ndifference = [\"block\", \"bore\"]\n";
 const JOB: &str = "[stock]\nfrom = [0, 0, -2]\nto = [6, 4, 0]\n[[tool]]\nname = \"flat\"\nkind = \"flat\"\ndiameter = 1\n[[path]]\ntool = \"flat\"\ngcode = \"cut.nc\"\n";
-
-fn planish(args: &[&str], folder: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_planish"));
-    command.args(args).current_dir(folder).stdin(Stdio::null());
-    command.output().expect("the program starts")
-}
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()

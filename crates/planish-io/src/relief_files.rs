@@ -130,6 +130,25 @@ fn write_image(path: &Path, relief: &Relief) -> Result<(), WriteError> {
     atomic::write(path, |out| Ok(out.write_all(bytes.get_ref())?))
 }
 
+/// Names of the maps that the sidecar in a folder lists, and its own; none where there is no sidecar of this program.
+pub fn relief_names(folder: impl AsRef<Path>) -> Vec<String> {
+    #[derive(Deserialize)]
+    struct Names {
+        #[serde(rename = "planish_relief")]
+        _version: u32,
+        patches: Vec<Name>,
+    }
+    #[derive(Deserialize)]
+    struct Name {
+        file: String,
+    }
+    let Ok(text) = std::fs::read(folder.as_ref().join(SIDECAR)) else { return Vec::new() };
+    let Ok(names) = serde_json::from_slice::<Names>(&text) else { return Vec::new() };
+    // A name with a folder in it would lead elsewhere.
+    let is_plain = |name: &String| Path::new(name).file_name().is_some_and(|n| n == name.as_str());
+    names.patches.into_iter().map(|p| p.file).filter(is_plain).chain([SIDECAR.into()]).collect()
+}
+
 /// Reads what [`write_relief`] wrote; returns the reliefs in the order of the patches, and their unit.
 /// # Errors
 /// `ReadError` for a folder without sidecar, a newer sidecar, other channels or sampling than those above, an image

@@ -4,6 +4,7 @@ use super::{Session, commit_report};
 use crate::args::Clean;
 use crate::failure::{Failure, Status};
 use crate::files;
+use crate::outputs::{self, Policy};
 use crate::products::Staged;
 use crate::progress;
 use crate::summary::Summary;
@@ -35,7 +36,9 @@ pub fn moved(scan: &Cloud) -> Option<Warning> {
 
 pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
     files::check_extension(&args.output, &planish_io::WRITTEN_SCANS)?;
+    args.lines.as_deref().map_or(Ok(()), |path| files::check_extension(path, &["obj"]))?;
     let staged = Staged::file(&args.output)?;
+    let lines = args.lines.as_deref().map(Staged::file).transpose()?;
     let own_report = session.stage_report()?;
     let params = args.clean.params(None)?;
     let project = args.project.params(None)?;
@@ -52,23 +55,27 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
     }
     let cleaned = made.map_err(|e| Failure::input(&args.scan, super::with_hint(&e.to_string())))?;
     let wrong = |path: &Path, e: &dyn std::fmt::Display| Failure::usage(path, e);
-    let (_, write) = session.step("write", || {
+    let (segments, write) = session.step("write", || {
         planish_io::write_scan(staged.file_path(), &cleaned.cloud).map_err(|e| wrong(&args.output, &e))?;
-        if args.segment {
-            for (path, part) in segments(&args.output, &cleaned) {
-                planish_io::write_scan(&path, &part).map_err(|e| wrong(&path, &e))?;
-            }
+        if let Some(lines) = &lines {
+            super::write_text(&lines.file_path(), &lines_obj(&cleaned))?;
         }
-        if let Some(path) = &args.lines {
-            super::write_text(path, &lines_obj(&cleaned))?;
-        }
-        Ok(())
+        let parts = if args.segment { segments(&args.output, &cleaned) } else { Vec::new() };
+        let paths: Vec<PathBuf> = parts.iter().map(|(path, _)| path.clone()).chain(args.lines.clone()).collect();
+        outputs::allow(&[&args.scan, &args.output], &paths, Policy { in_place: false, ..session.common.policy() })?;
+        let one = |(path, part): (PathBuf, Cloud)| {
+            let staged = Staged::file(&path)?;
+            planish_io::write_scan(staged.file_path(), &part).map_err(|e| wrong(&path, &e))?;
+            Ok(staged)
+        };
+        parts.into_iter().map(one).collect::<Result<Vec<Staged>, Failure>>()
     })?;
     report.stages = vec![read, fit, moved, write];
     report.input.diagonal = samples.diagonal;
     pipeline::sample_figures(&samples, &mut report.quality, &mut report.warnings);
     figures(&cleaned, &mut report);
     staged.commit()?;
+    segments.into_iter().chain(lines).try_for_each(Staged::commit)?;
     commit_report(own_report, &report)?;
     if !session.common.quiet {
         session.tell_warnings(&report);

@@ -5,6 +5,7 @@ use super::{Session, commit_report, pipeline_failure};
 use crate::args::Edit as EditArgs;
 use crate::failure::{Failure, Status};
 use crate::files;
+use crate::outputs;
 use crate::pictures::{self, View};
 use crate::products::Staged;
 use crate::summary::Summary;
@@ -79,6 +80,8 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
     if let Some(folder) = &args.pictures {
         std::fs::create_dir_all(folder).map_err(|e| Failure::usage(folder, format!("cannot be made ({e})")))?;
     }
+    let files: Vec<PathBuf> = pictures.iter().map(|(file, _)| file.clone()).collect();
+    outputs::allow(&[&args.input, &args.script, &output], &files, session.common.policy())?;
     for (file, png) in &pictures {
         std::fs::write(file, png).map_err(|e| Failure::usage(file, e))?;
     }

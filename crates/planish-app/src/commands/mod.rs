@@ -16,6 +16,7 @@ mod smooth;
 use crate::args::{Cli, Command, Common};
 use crate::failure::{Failure, Status};
 use crate::files;
+use crate::outputs;
 use crate::products::Staged;
 use crate::progress::{self, Bars};
 use planish::model::Units;
@@ -29,6 +30,7 @@ use std::path::Path;
 /// What the user is to be told.
 pub fn run(cli: Cli) -> Result<Status, Failure> {
     progress::watch_interrupts();
+    outputs::check(&cli.command)?;
     match cli.command {
         Command::Demo(args) => demo::demo(&Session::new(&args.common)?, &args),
         Command::Run(args) => run::run(&Session::new(&args.common)?, &args),

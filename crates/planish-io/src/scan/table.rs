@@ -181,6 +181,7 @@ fn assemble(rows: &[f64], width: usize, count: usize, names: &[String]) -> Resul
 
 /// Writes `x y z` and, if there are, normal, colour (0 to 255) and the single numbers, with a header line.
 pub(super) fn write<W: Write>(out: &mut W, world: &[DVec3], cloud: &Cloud) -> Result<(), WriteError> {
+    writeln!(out, concat!("# planish ", env!("CARGO_PKG_VERSION")))?;
     let mut head = String::from("# x y z");
     for a in &cloud.attributes {
         match (a.name.as_str(), a.width) {
