@@ -152,14 +152,13 @@ fn meet(curve: &[DVec3], conditions: &[Condition], direction: &Direction) -> Vec
 
 /// Unit normals along a smooth seam at [`sample_count`] uniform parameters, perpendicular to the curve: a cubic
 /// spline through the mean of both patches' normals that starts and turns at the corners as their planes say.
+/// * `control` - control points of the curve
+/// * `both` - at a parameter of the curve the sum of both patches' normals, of any length
 pub(crate) fn normals(
-    network: &Network,
-    surfaces: &[Surface],
-    means: &[MeanNormals],
     curve: usize,
-    uses: [(u32, u8); 2],
     control: &[DVec3],
     planes: &Planes,
+    both: impl Fn(f64) -> DVec3,
 ) -> Result<Vec<DVec3>, FitError> {
     let n = control.len();
     let parameters = uniform_parameters(sample_count(n));
@@ -167,16 +166,7 @@ pub(crate) fn normals(
     let mean: Vec<DVec3> = parameters
         .iter()
         .map(|&t| {
-            let sum: DVec3 = uses
-                .iter()
-                .map(|&(p, k)| {
-                    let side = network.patches[p as usize].sides[k as usize];
-                    let (u, v) = place(k as usize, side.reversed, t);
-                    let jet: Jet = surfaces[p as usize].jet(u, v);
-                    means[p as usize].mend(jet.area_vector(), u, v)
-                })
-                .sum();
-            last = sum.try_normalize().unwrap_or(last);
+            last = both(t).try_normalize().unwrap_or(last);
             last
         })
         .collect();

@@ -15,16 +15,16 @@
 //! valence other than 4 (Peters and Fan): the seams are smooth within the angle that `measure_seams` tells.
 
 use super::basis::{basis_at, is_uniform, uniform_knots, uniform_parameters};
-use super::corner::{Plane, planes};
+use super::corner::{Plane, Planes, planes};
 use super::fit::{Directions, project_net, solve_inside, surface_of};
 use super::fold::{MeanNormals, folds};
 use super::network_fit::{fill, patch_directions};
 use super::seam_curve::{SPAN_SAMPLES, constrain, normals, own_normals};
-use super::sides::{along_curve, check, check_grids, is_smooth, node, side_len};
+use super::sides::{along_curve, check, check_grids, is_smooth, node, place, side_len};
 use super::{FitError, Surface};
 use crate::grid::Grid;
 use crate::linalg::{Banded, BandedCholesky};
-use crate::network::{CurveKind, Network};
+use crate::network::{CurveKind, Network, Patch};
 use crate::observe::Observer;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -85,117 +85,165 @@ pub fn stitch(
     if !(params.stiffness >= 0.0 && params.stiffness.is_finite()) {
         return Err(FitError::Parameter { name: "stiffness", value: params.stiffness, wanted: "0 or more" });
     }
-    let nodes = check_grids(network, grids)?;
-    let shapes: Vec<_> = surfaces.iter().map(|s| (s.rows, s.cols, s.control.len())).collect();
-    let counts = check(network, "surfaces", &shapes)?;
-    surfaces.iter().try_for_each(Surface::check)?;
-    let uneven = |s: &Surface| !is_uniform(&s.knots_u) || !is_uniform(&s.knots_v);
-    if let Some(patch) = surfaces.iter().position(uneven) {
-        return Err(FitError::Knots { patch });
-    }
-    let uses = network.uses();
-    let is_seam = |c: usize, kind: CurveKind| network.curves[c].kind == kind && uses[c].len() == 2;
-    if !uses.iter().any(|uses| uses.len() == 2) {
-        return Ok(surfaces.to_vec());
-    }
-    let directions = Directions::new(nodes.iter().zip(&counts).filter(|(n, _)| **n > 0).map(|(&n, &c)| (n, c)))?;
-    let fitted: Vec<Vec<DVec3>> = uses
-        .iter()
-        .map(|uses| {
-            uses.first().map_or_else(Vec::new, |&(p, k)| {
-                let (s, side) = (&surfaces[p as usize], network.patches[p as usize].sides[k as usize]);
-                along_curve(&s.control, s.rows, s.cols, k as usize, side.reversed, 0)
-            })
-        })
-        .collect();
-    let means: Vec<MeanNormals> =
-        grids.par_iter().zip(surfaces).map(|(g, s)| MeanNormals::new(g, [s.cols, s.rows])).collect();
-    let planes = planes(network, surfaces, &means, &fitted);
-    let curves: Vec<Vec<DVec3>> = (0..uses.len())
-        .into_par_iter()
-        .map(|c| {
-            let ends: [Vec<Plane>; 2] = [0, 1].map(|e| planes.at(c, e).cloned().collect());
-            if uses[c].is_empty() {
-                Vec::new()
-            } else {
-                // How a feature bends is its own affair: by the planes of two faces at once it would leave its nodes, and the
-                // patches beside it would turn their slopes after it.
-                let bends = is_smooth(&network.curves[c]);
-                constrain(c, &fitted[c], ends, bends, directions.get(nodes[c], counts[c]))
-            }
-        })
-        .collect();
+    let Some(work) = Work::new(network, grids, surfaces)? else { return Ok(surfaces.to_vec()) };
     let stop = || if observer.cancelled() { Err(FitError::Cancelled) } else { Ok(()) };
+    let curves = work.curves();
     stop()?;
-    // The inside for the moved curves: what the normals are taken from.
-    let projected: Vec<Option<(Surface, Vec<DVec3>)>> = network
-        .patches
-        .par_iter()
-        .enumerate()
-        .map(|(p, patch)| {
-            if observer.cancelled() {
-                return None;
-            }
-            let [along_u, along_v] = patch_directions(patch, &grids[p], &directions, &counts);
-            let projection = project_net(&follow(network, p, &surfaces[p], &curves), along_u, along_v);
-            let net = fill(patch, &curves, &projection, along_u, along_v);
-            Some((surface_of(net, along_u, along_v), projection))
-        })
-        .collect();
-    let (filled, projections): (Vec<Surface>, Vec<Vec<DVec3>>) =
-        projected.into_iter().collect::<Option<Vec<_>>>().ok_or(FitError::Cancelled)?.into_iter().unzip();
+    let filled = work.filled(&curves, observer)?;
     observer.progress(0.5);
-    let fields: Vec<Result<Vec<DVec3>, FitError>> = (0..uses.len())
-        .into_par_iter()
-        .map(|c| match uses[c][..] {
-            [a, b] if is_seam(c, CurveKind::Smooth) => {
-                normals(network, &filled, &means, c, [a, b], &curves[c], &planes)
-            }
-            _ => Ok(Vec::new()),
-        })
-        .collect();
-    let fields = fields.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let fields = work.fields(&filled, &curves)?;
     stop()?;
-    let stitched: Vec<Surface> = network
-        .patches
-        .par_iter()
-        .enumerate()
-        .map(|(p, patch)| {
-            let [along_u, along_v] = patch_directions(patch, &grids[p], &directions, &counts);
-            let targets = std::array::from_fn(|k| {
-                let side = patch.sides[k];
-                let c = side.curve as usize;
-                let (mut normals, stiffness) = if is_seam(c, CurveKind::Feature) {
-                    (own_normals(&means[p], k, side.reversed, &curves[c]), ANGLES * params.stiffness)
-                } else {
-                    (fields[c].clone(), params.stiffness)
-                };
-                if side.reversed {
-                    normals.reverse();
-                }
-                Target { normals, stiffness }
-            });
-            let mut best = filled[p].clone();
-            let mut fewest = usize::MAX;
-            for easing in EASING {
-                let mut net = filled[p].control.clone();
-                turn_ring(&mut net, along_v.control(), along_u.control(), &targets, easing);
-                solve_inside(&mut net, &projections[p], along_u, along_v, 2);
-                let surface = surface_of(net, along_u, along_v);
-                let count = folds(&surface, &grids[p]);
-                if count < fewest {
-                    (best, fewest) = (surface, count);
-                }
-                if fewest == 0 {
-                    break;
-                }
-            }
-            best
-        })
+    let stitched = (0..filled.len())
+        .into_par_iter()
+        .map(|p| work.turned(p, &filled[p], &work.targets(p, &fields, &curves, params.stiffness)))
         .collect();
     stop()?;
     observer.progress(1.0);
     Ok(stitched)
+}
+
+/// The network at work: what all steps ask.
+struct Work<'a> {
+    network: &'a Network,
+    grids: &'a [Grid],
+    surfaces: &'a [Surface],
+    /// For each curve the patches on it and their sides.
+    uses: Vec<Vec<(u32, u8)>>,
+    /// Points of the grids and control points along every curve.
+    nodes: Vec<usize>,
+    counts: Vec<usize>,
+    directions: Directions,
+    means: Vec<MeanNormals>,
+    /// Curves as fitted, and the planes at their ends.
+    fitted: Vec<Vec<DVec3>>,
+    planes: Planes,
+}
+
+/// A patch fitted inside its moved curves, and the projection of its grid that all its nets share.
+struct Filled {
+    surface: Surface,
+    projection: Vec<DVec3>,
+}
+
+impl<'a> Work<'a> {
+    /// `None` if no two patches meet.
+    fn new(network: &'a Network, grids: &'a [Grid], surfaces: &'a [Surface]) -> Result<Option<Work<'a>>, FitError> {
+        let nodes = check_grids(network, grids)?;
+        let shapes: Vec<_> = surfaces.iter().map(|s| (s.rows, s.cols, s.control.len())).collect();
+        let counts = check(network, "surfaces", &shapes)?;
+        surfaces.iter().try_for_each(Surface::check)?;
+        let uneven = |s: &Surface| !is_uniform(&s.knots_u) || !is_uniform(&s.knots_v);
+        if let Some(patch) = surfaces.iter().position(uneven) {
+            return Err(FitError::Knots { patch });
+        }
+        let uses = network.uses();
+        if !uses.iter().any(|uses| uses.len() == 2) {
+            return Ok(None);
+        }
+        let directions = Directions::new(nodes.iter().zip(&counts).filter(|(n, _)| **n > 0).map(|(&n, &c)| (n, c)))?;
+        let curve = |uses: &Vec<(u32, u8)>| {
+            uses.first().map_or_else(Vec::new, |&(p, k)| {
+                let (s, side) = (&surfaces[p as usize], network.patches[p as usize].sides[k as usize]);
+                along_curve(&s.control, s.rows, s.cols, k as usize, side.reversed, 0)
+            })
+        };
+        let fitted: Vec<Vec<DVec3>> = uses.iter().map(curve).collect();
+        let means: Vec<MeanNormals> =
+            grids.par_iter().zip(surfaces).map(|(g, s)| MeanNormals::new(g, [s.cols, s.rows])).collect();
+        let planes = planes(network, surfaces, &means, &fitted);
+        Ok(Some(Work { network, grids, surfaces, uses, nodes, counts, directions, means, fitted, planes }))
+    }
+
+    fn is_seam(&self, curve: usize, kind: CurveKind) -> bool {
+        self.network.curves[curve].kind == kind && self.uses[curve].len() == 2
+    }
+
+    /// The curves, moved so that they respect the planes at their ends.
+    fn curves(&self) -> Vec<Vec<DVec3>> {
+        let one = |c: usize| {
+            if self.uses[c].is_empty() {
+                return Vec::new();
+            }
+            let ends: [Vec<Plane>; 2] = [0, 1].map(|e| self.planes.at(c, e).cloned().collect());
+            // How a feature bends is its own affair: by the planes of two faces at once it would leave its nodes, and the
+            // patches beside it would turn their slopes after it.
+            let bends = is_smooth(&self.network.curves[c]);
+            constrain(c, &self.fitted[c], ends, bends, self.directions.get(self.nodes[c], self.counts[c]))
+        };
+        (0..self.uses.len()).into_par_iter().map(one).collect()
+    }
+
+    /// The patches with their inside fitted to the moved curves: what the normals are taken from.
+    fn filled(&self, curves: &[Vec<DVec3>], observer: &dyn Observer) -> Result<Vec<Filled>, FitError> {
+        let one = |(p, patch): (usize, &Patch)| {
+            if observer.cancelled() {
+                return None;
+            }
+            let [along_u, along_v] = patch_directions(patch, &self.grids[p], &self.directions, &self.counts);
+            let projection = project_net(&follow(self.network, p, &self.surfaces[p], curves), along_u, along_v);
+            let net = fill(patch, curves, &projection, along_u, along_v);
+            Some(Filled { surface: surface_of(net, along_u, along_v), projection })
+        };
+        self.network.patches.par_iter().enumerate().map(one).collect::<Option<_>>().ok_or(FitError::Cancelled)
+    }
+
+    /// The normals along every smooth seam; none along other curves.
+    fn fields(&self, filled: &[Filled], curves: &[Vec<DVec3>]) -> Result<Vec<Vec<DVec3>>, FitError> {
+        let one = |c: usize| match self.uses[c][..] {
+            [a, b] if self.is_seam(c, CurveKind::Smooth) => {
+                let normal = |(p, k): (u32, u8), t: f64| {
+                    let (p, k) = (p as usize, k as usize);
+                    let (u, v) = place(k, self.network.patches[p].sides[k].reversed, t);
+                    self.means[p].mend(filled[p].surface.jet(u, v).area_vector(), u, v)
+                };
+                normals(c, &curves[c], &self.planes, |t| [a, b].into_iter().map(|at| normal(at, t)).sum())
+            }
+            _ => Ok(Vec::new()),
+        };
+        // The first error by number of the curve, whichever thread finds its own first.
+        let found: Vec<Result<Vec<DVec3>, FitError>> = (0..self.uses.len()).into_par_iter().map(one).collect();
+        found.into_iter().collect()
+    }
+
+    /// What the four sides of a patch are to be like.
+    fn targets(&self, patch: usize, fields: &[Vec<DVec3>], curves: &[Vec<DVec3>], stiffness: f64) -> [Target; 4] {
+        std::array::from_fn(|k| {
+            let side = self.network.patches[patch].sides[k];
+            let c = side.curve as usize;
+            let (mut normals, stiffness) = if self.is_seam(c, CurveKind::Feature) {
+                (own_normals(&self.means[patch], k, side.reversed, &curves[c]), ANGLES * stiffness)
+            } else {
+                (fields[c].clone(), stiffness)
+            };
+            if side.reversed {
+                normals.reverse();
+            }
+            Target { normals, stiffness }
+        })
+    }
+
+    /// A patch with its ring turned into the normals, as far as it does not fold by that.
+    fn turned(&self, patch: usize, filled: &Filled, targets: &[Target; 4]) -> Surface {
+        let Filled { surface, projection } = filled;
+        let grid = &self.grids[patch];
+        let [along_u, along_v] = patch_directions(&self.network.patches[patch], grid, &self.directions, &self.counts);
+        let mut best = surface.clone();
+        let mut fewest = usize::MAX;
+        for easing in EASING {
+            let mut net = surface.control.clone();
+            turn_ring(&mut net, along_v.control(), along_u.control(), targets, easing);
+            solve_inside(&mut net, projection, along_u, along_v, 2);
+            let surface = surface_of(net, along_u, along_v);
+            let count = folds(&surface, grid);
+            if count < fewest {
+                (best, fewest) = (surface, count);
+            }
+            if fewest == 0 {
+                break;
+            }
+        }
+        best
+    }
 }
 
 /// The control net of a patch with what is on and beside its features moved along with their curves.
