@@ -3,7 +3,7 @@
 mod common;
 
 use planish::curve::{SnakeParams, SurfaceCurve, section};
-use planish::edit::{Edit, Ground, apply};
+use planish::edit::{Carry, Edit, Ground, apply};
 use planish::geom::Bvh;
 use planish::grid::{self, Family, FeatureCurve, FeatureError, GridParams, Sections, relax_with_features};
 use planish::mesh::{Adjacency, FacePoint, TriMesh, shapes};
@@ -652,7 +652,7 @@ fn a_network_is_carried_to_another_shape_of_its_class_and_stays_finished() {
         .collect();
     let ground = Ground::new(&to);
     let mut drawing = Drawing::default();
-    let edit = Edit::Carry { from: "template".into(), landmarks: marks };
+    let edit = Edit::Carry(Carry { from: "template".into(), landmarks: marks });
     let others = |name: &str| match name {
         "template" => Ok((from.clone(), Drawing { network: network.clone(), ..Drawing::default() })),
         _ => Err("is not there".to_string()),
@@ -660,7 +660,7 @@ fn a_network_is_carried_to_another_shape_of_its_class_and_stays_finished() {
     apply(&mut drawing, &edit, &ground, &others, &Silent).unwrap();
     assert_eq!(drawing.network.patches.len(), network.patches.len());
     assert!(imprint(&to, &drawing.network).is_ok());
-    let missing = Edit::Carry { from: "nothing".into(), landmarks: Vec::new() };
+    let missing = Edit::Carry(Carry { from: "nothing".into(), landmarks: Vec::new() });
     let before = drawing.clone();
     assert!(apply(&mut drawing, &missing, &ground, &others, &Silent).unwrap_err().to_string().contains("nothing"));
     assert_eq!(drawing, before);

@@ -8,7 +8,7 @@ use crate::files;
 use crate::pictures::{self, View};
 use crate::products::Staged;
 use crate::summary::Summary;
-use planish::edit::{self, ApplyError, Edit, Ground, Made};
+use planish::edit::{self, ApplyError, Edit, Ground, Made, Redo, Undo};
 use planish::model::{Drawing, HistoryEntry, Model};
 use planish::network::{Diagnosis, diagnose};
 use planish::pipeline::{self, Earlier, PipelineParams, Warning};
@@ -299,11 +299,11 @@ fn one(
 ) -> Result<Made, Wrong> {
     let before: Drawing = model.drawing();
     let moved = match edit {
-        Edit::Undo { count } => (0..*count).try_for_each(|_| match model.undo() {
+        Edit::Undo(Undo { count }) => (0..*count).try_for_each(|_| match model.undo() {
             true => Ok(()),
             false => Err(Wrong::Nothing("there is nothing left to take back")),
         }),
-        Edit::Redo { count } => (0..*count).try_for_each(|_| match model.redo() {
+        Edit::Redo(Redo { count }) => (0..*count).try_for_each(|_| match model.redo() {
             true => Ok(()),
             false => Err(Wrong::Nothing("there is nothing left to make again")),
         }),

@@ -1,8 +1,8 @@
 //! What stays of patches and of what is drawn in them when the curves change: their numbers, their feature curves,
 //! their sections.
 
-use super::mirror::{Images, ON_PLANE};
-use super::{Edit, Ground};
+use super::change::mirror::{self, ON_PLANE};
+use super::{Ground, Images};
 use crate::curve::SurfaceCurve;
 use crate::curve::symmetry::Plane;
 use crate::grid::{Family, FeatureCurve, Sections};
@@ -74,10 +74,9 @@ impl Onto {
 
 /// Gives the patches their old numbers and first sides back where an edit has moved curves and nothing else; feature
 /// curves and sections go to the numbers that their patches have now, and those whose patch is gone go with it.
-pub(super) fn keep(edit: &Edit, drawing: &mut Drawing, before: &Drawing) {
+/// * `moves_alone` - true for an edit that moves curves and nothing else
+pub(super) fn keep(moves_alone: bool, drawing: &mut Drawing, before: &Drawing) {
     let (old, new) = (&before.network, &drawing.network);
-    let moves_alone =
-        matches!(edit, Edit::DragCorner { .. } | Edit::DragCurve { .. } | Edit::Relax { .. } | Edit::Spline { .. });
     let same_ends = |(a, b): (&crate::network::Curve, &crate::network::Curve)| a.corners == b.corners;
     if moves_alone
         && old.patches.len() == new.patches.len()
@@ -134,7 +133,7 @@ pub(super) fn mirror(ground: &Ground, drawing: &mut Drawing, before: &Drawing, p
         }
         if is_own && low < -near {
             let open = SurfaceCurve::open(feature.points.clone());
-            let points = super::mirror::across(ground, &open, plane).map_or(feature.points.clone(), |c| c.points);
+            let points = mirror::across(ground, &open, plane).map_or(feature.points.clone(), |c| c.points);
             add(first, points);
             continue;
         }

@@ -3,295 +3,97 @@
 //!
 //! An edit changes a [`Drawing`] and nothing else; the mesh stays, and what was made from the drawing is made anew.
 //! Places are world positions (taken to the nearest place of the mesh), places by face, or corners.
+//! One file per edit, with its check: `draw/`, `change/`, `feature/`. A new one is a file there, a variant of [`Edit`]
+//! and a line of `Edit::command`.
 
 mod apply;
+mod change;
 mod check;
+mod draw;
 mod error;
+mod feature;
+mod history;
 mod keep;
-mod mirror;
 mod outcome;
 mod place;
 mod pull;
 mod stroke;
+mod work;
 
-pub use apply::{Ground, apply};
+pub use apply::apply;
+pub use change::{
+    AddCorner, Clear, DeleteCorner, DeleteCurves, DragCorner, DragCurve, Join, Mirror, Relax, Spline, SplitCurve,
+    SplitRegion, Symmetry, mirror_network,
+};
+pub use draw::{Boundaries, Carry, Complete, Cut, Extend, FeatureLines, Paint, Project, carry_network};
 pub use error::ApplyError;
-pub use mirror::{Images, carry_network, mirror_network};
-pub use outcome::{Made, RelaxedCurve};
+pub use feature::{DeleteFeature, Feature, Sections};
+pub use history::{Redo, Undo};
+pub use outcome::{Images, Made, RelaxedCurve};
 pub use place::{Name, Spot};
 pub use pull::{Forces, Magnetism, Pull, Scalar, SplineMove};
+pub use work::Ground;
 
-use crate::curve::PaintMode;
-use crate::curve::symmetry::Plane;
-use crate::grid::Family;
 use crate::model::Drawing;
-use crate::network::{CurveKind, Stretch};
 use serde::{Deserialize, Serialize};
+use work::Work;
 
 /// One edit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "edit", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(tag = "edit", rename_all = "snake_case")]
 pub enum Edit {
-    /// Paints a curve through picks. Picks go to corners, curves and sharp edges within `snap` of the diagonal; where
-    /// the curve meets others, corners divide both.
-    Paint {
-        /// The picks, in order.
-        picks: Vec<Spot>,
-        /// How the way between picks is found.
-        #[serde(default)]
-        mode: PaintMode,
-        /// True for a closed curve.
-        #[serde(default)]
-        closed: bool,
-        /// What a magnetic stroke is drawn to.
-        #[serde(default)]
-        magnet: Option<Magnetism>,
-        /// Share of the diagonal.
-        #[serde(default = "usual_snap")]
-        snap: f64,
-    },
-    /// Leads a curve on from its free end through more picks, as [`Edit::Paint`] would.
-    Extend {
-        /// The curve; the end that it was painted towards is meant if both are free.
-        curve: Name,
-        /// The picks, in order.
-        #[serde(default)]
-        picks: Vec<Spot>,
-        /// How the way between picks is found.
-        #[serde(default)]
-        mode: PaintMode,
-        /// True to lead it on to its own other end.
-        #[serde(default)]
-        closed: bool,
-        /// What a magnetic stroke is drawn to.
-        #[serde(default)]
-        magnet: Option<Magnetism>,
-        /// Share of the diagonal.
-        #[serde(default = "usual_snap")]
-        snap: f64,
-    },
-    /// The cut by a plane, as a curve.
-    Cut {
-        /// A place on the cut.
-        through: Spot,
-        /// Normal of the plane.
-        normal: [f64; 3],
-        /// Share of the diagonal.
-        #[serde(default = "usual_snap")]
-        snap: f64,
-    },
-    /// A polyline brought onto the mesh: along `direction`, or to the nearest places.
-    Project {
-        /// World positions.
-        points: Vec<[f64; 3]>,
-        /// Zero for the nearest places.
-        #[serde(default)]
-        direction: [f64; 3],
-        /// Share of the diagonal.
-        #[serde(default = "usual_snap")]
-        snap: f64,
-    },
-    /// The boundaries of the mesh as curves, where there are none yet.
-    Boundaries {},
-    /// Edges sharper than an angle as curves.
-    FeatureLines {
-        /// Degrees.
-        angle_deg: f64,
-        /// Lines shorter than this share of the diagonal are left out.
-        #[serde(default)]
-        shortest: f64,
-    },
-    /// A corner; on a curve it divides it.
-    AddCorner {
-        /// Where.
-        at: Spot,
-        /// Share of the diagonal.
-        #[serde(default = "usual_snap")]
-        snap: f64,
-    },
-    /// Divides a curve at a share of its length.
-    SplitCurve {
-        /// The curve.
-        curve: Name,
-        /// 0 to 1.
-        at: f64,
-    },
-    /// Joins the two curves at a corner.
-    Join {
-        /// The corner.
-        corner: Name,
-    },
-    /// Deletes curves.
-    DeleteCurves {
-        /// The curves, numbered as before the edit.
-        curves: Vec<Name>,
-    },
-    /// Deletes a corner without curves or between two.
-    DeleteCorner {
-        /// The corner.
-        corner: Name,
-    },
-    /// Deletes all corners and curves.
-    Clear {},
-    /// Moves a corner; its curves follow.
-    DragCorner {
-        /// The corner.
-        corner: Name,
-        /// Where to.
-        to: Spot,
-        /// Share of each curve that relaxes.
-        #[serde(default = "usual_reach")]
-        reach: f64,
-        /// How it relaxes.
-        #[serde(default)]
-        forces: Forces,
-    },
-    /// Pulls a point of a curve; a section around it relaxes.
-    DragCurve {
-        /// The curve.
-        curve: Name,
-        /// Share of its length.
-        at: f64,
-        /// World units.
-        by: [f64; 3],
-        /// Share of the length that relaxes.
-        #[serde(default = "usual_width")]
-        width: f64,
-        /// How it relaxes.
-        #[serde(default)]
-        forces: Forces,
-        /// Shares of the length where the curve stays where it is.
-        #[serde(default)]
-        pins: Vec<f64>,
-        /// Stretches with weights of their own.
-        #[serde(default)]
-        stiffness: Vec<Stretch>,
-    },
-    /// Relaxes a curve, a section of it, or all curves.
-    Relax {
-        /// The curve; absent for all that are free to move and do not lie in the plane of symmetry. Of these one stays
-        /// as it is where it would run into another.
-        #[serde(default)]
-        curve: Option<Name>,
-        /// Middle and width of the section, shares of the length.
-        #[serde(default)]
-        section: Option<[f64; 2]>,
-        /// How it relaxes.
-        #[serde(default)]
-        forces: Forces,
-        /// What it is drawn to.
-        #[serde(default)]
-        pull: Option<Pull>,
-        /// Shares of the length where the curve stays where it is.
-        #[serde(default)]
-        pins: Vec<f64>,
-        /// Stretches with weights of their own.
-        #[serde(default)]
-        stiffness: Vec<Stretch>,
-    },
-    /// Fits a space curve with some control vertices, moves it, and lets the curve follow. Without moves it smooths.
-    Spline {
-        /// The curve.
-        curve: Name,
-        /// Control vertices.
-        control: usize,
-        /// Moves, one after the other.
-        #[serde(default)]
-        moves: Vec<SplineMove>,
-    },
-    /// Splits a region of 3, 5 or 6 sides into four-sided patches.
-    SplitRegion {
-        /// A place in the region.
-        at: Spot,
-        /// Turns the split; absent for the flattest corner.
-        #[serde(default)]
-        from: Option<usize>,
-    },
-    /// Lays out everything that is not parted yet.
-    Complete {
-        /// Patches to aim at, over the whole mesh.
-        patches: usize,
-        /// Edges sharper than this become curves, degrees.
-        #[serde(default = "usual_sharp")]
-        sharp_angle_deg: f64,
-    },
-    /// A feature curve of a patch, painted through picks.
-    Feature {
-        /// The picks, from side to side; the patch is that of the middle one.
-        picks: Vec<Spot>,
-        /// Which iso-curves it is one of; absent to tell it by the sides that its ends lie nearest to.
-        #[serde(default)]
-        family: Option<Family>,
-        /// How the way between picks is found.
-        #[serde(default)]
-        mode: PaintMode,
-        /// What a magnetic stroke is drawn to.
-        #[serde(default)]
-        magnet: Option<Magnetism>,
-    },
-    /// Deletes a feature curve.
-    DeleteFeature {
-        /// Its number.
-        feature: Name,
-    },
-    /// Gives the numbers of cells between the feature curves of a patch; empty lists take them back.
-    Sections {
-        /// A place in the patch.
-        at: Spot,
-        /// Along u.
-        #[serde(default)]
-        u: Vec<usize>,
-        /// Along v.
-        #[serde(default)]
-        v: Vec<usize>,
-    },
-    /// Sets the plane of symmetry, or finds it.
-    Symmetry {
-        /// The plane; absent to find it.
-        #[serde(default)]
-        plane: Option<Plane>,
-    },
-    /// Replaces the curves, feature curves and sections behind the plane of symmetry by mirror images of those before it.
-    Mirror {
-        /// True for the other way round.
-        #[serde(default)]
-        swap: bool,
-    },
-    /// Carries the network of another model over, by landmarks on both.
-    Carry {
-        /// The other model, as the script names it.
-        from: String,
-        /// Positions on it with those on this one.
-        landmarks: Vec<[[f64; 3]; 2]>,
-    },
-    /// Takes back the last edits.
-    Undo {
-        /// How many.
-        #[serde(default = "once")]
-        count: usize,
-    },
-    /// Makes edits again that were taken back.
-    Redo {
-        /// How many.
-        #[serde(default = "once")]
-        count: usize,
-    },
-}
-
-fn usual_snap() -> f64 {
-    0.01
-}
-fn usual_reach() -> f64 {
-    0.6
-}
-fn usual_width() -> f64 {
-    0.6
-}
-fn usual_sharp() -> f64 {
-    40.0
-}
-fn once() -> usize {
-    1
+    /// A stroke through picks.
+    Paint(Paint),
+    /// A curve led on from its free end.
+    Extend(Extend),
+    /// The cut by a plane.
+    Cut(Cut),
+    /// A polyline brought onto the mesh.
+    Project(Project),
+    /// The boundaries of the mesh.
+    Boundaries(Boundaries),
+    /// Sharp edges.
+    FeatureLines(FeatureLines),
+    /// A corner more.
+    AddCorner(AddCorner),
+    /// A curve divided.
+    SplitCurve(SplitCurve),
+    /// Two curves joined.
+    Join(Join),
+    /// Curves less.
+    DeleteCurves(DeleteCurves),
+    /// A corner less.
+    DeleteCorner(DeleteCorner),
+    /// All corners and curves less.
+    Clear(Clear),
+    /// A corner dragged.
+    DragCorner(DragCorner),
+    /// A curve pulled.
+    DragCurve(DragCurve),
+    /// Curves relaxed.
+    Relax(Relax),
+    /// A curve drawn through a space curve.
+    Spline(Spline),
+    /// A region split into patches.
+    SplitRegion(SplitRegion),
+    /// The rest laid out by the program.
+    Complete(Complete),
+    /// A feature curve painted.
+    Feature(Feature),
+    /// A feature curve less.
+    DeleteFeature(DeleteFeature),
+    /// Cells between feature curves.
+    Sections(Sections),
+    /// The plane of symmetry.
+    Symmetry(Symmetry),
+    /// One side replaced by the image of the other.
+    Mirror(Mirror),
+    /// A network carried over from another shape.
+    Carry(Carry),
+    /// Edits taken back.
+    Undo(Undo),
+    /// Edits made again.
+    Redo(Redo),
 }
 
 impl Edit {
@@ -309,10 +111,57 @@ impl Edit {
         }
         value.to_string()
     }
+
+    /// The one place that knows all edits.
+    fn command(&self) -> &dyn Command {
+        match self {
+            Edit::Paint(edit) => edit,
+            Edit::Extend(edit) => edit,
+            Edit::Cut(edit) => edit,
+            Edit::Project(edit) => edit,
+            Edit::Boundaries(edit) => edit,
+            Edit::FeatureLines(edit) => edit,
+            Edit::AddCorner(edit) => edit,
+            Edit::SplitCurve(edit) => edit,
+            Edit::Join(edit) => edit,
+            Edit::DeleteCurves(edit) => edit,
+            Edit::DeleteCorner(edit) => edit,
+            Edit::Clear(edit) => edit,
+            Edit::DragCorner(edit) => edit,
+            Edit::DragCurve(edit) => edit,
+            Edit::Relax(edit) => edit,
+            Edit::Spline(edit) => edit,
+            Edit::SplitRegion(edit) => edit,
+            Edit::Complete(edit) => edit,
+            Edit::Feature(edit) => edit,
+            Edit::DeleteFeature(edit) => edit,
+            Edit::Sections(edit) => edit,
+            Edit::Symmetry(edit) => edit,
+            Edit::Mirror(edit) => edit,
+            Edit::Carry(edit) => edit,
+            Edit::Undo(edit) => edit,
+            Edit::Redo(edit) => edit,
+        }
+    }
+}
+
+/// What every edit is: numbers that are looked at first, and a change of the drawing.
+trait Command {
+    /// Looks for numbers that are not finite or out of their range.
+    /// # Errors
+    /// `NotFinite`, `OutOfRange` with what the first one is of; `IdleMagnet`.
+    fn check(&self) -> Result<(), ApplyError> {
+        Ok(())
+    }
+
+    /// Changes the drawing. On an error it may be left half-changed: [`apply`] puts back what it was.
+    fn apply(&self, work: &mut Work) -> Result<(), ApplyError>;
+
+    /// True if it moves curves and corners and nothing else, so that patches keep their numbers.
+    fn only_moves(&self) -> bool {
+        false
+    }
 }
 
 /// Another model by the name that a script has for it: its mesh and its drawing.
 pub type Others<'a> = dyn Fn(&str) -> Result<(crate::mesh::TriMesh, Drawing), String> + 'a;
-
-/// What `kind` means for an edge line found by its angle.
-const LINE_KIND: CurveKind = CurveKind::Feature;

@@ -55,3 +55,19 @@ impl Made {
         }
     }
 }
+
+/// What became of the curves of a network that was mirrored.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Images {
+    /// For each curve of the network before its number now; nothing if it lay behind the plane.
+    pub number: Vec<Option<u32>>,
+    /// For each curve now its image; curves in the plane and those that cross it are their own.
+    pub image: Vec<u32>,
+}
+
+impl Images {
+    /// The number now of a curve of the network before.
+    pub fn kept(&self, curve: u32) -> Option<u32> {
+        self.number.get(curve as usize).copied().flatten()
+    }
+}

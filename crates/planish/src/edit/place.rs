@@ -34,3 +34,8 @@ pub enum Name {
         near: [f64; 3],
     },
 }
+
+/// Share of the diagonal within which picks go to what is there.
+pub(super) fn usual_snap() -> f64 {
+    0.01
+}

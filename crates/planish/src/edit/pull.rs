@@ -1,6 +1,6 @@
 //! What draws, holds and moves curves: scalars, forces, moves of a space curve.
 
-use crate::curve::Sweep;
+use crate::curve::{SnakeParams, Sweep};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -85,6 +85,13 @@ pub struct Forces {
 impl Default for Forces {
     fn default() -> Forces {
         Forces { fairness: 0.1, curvature: 1.0, arc_length: 1.0, sweeps: 200, settle: 1e-4, sweep: Sweep::CoarseToFine }
+    }
+}
+
+impl Forces {
+    pub(super) fn params(&self) -> SnakeParams {
+        let Forces { fairness, curvature, arc_length, sweeps, settle, sweep } = *self;
+        SnakeParams { fairness, curvature, arc_length, sweeps, settle, sweep, attraction: 0.0 }
     }
 }
 

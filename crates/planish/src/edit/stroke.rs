@@ -1,10 +1,9 @@
-//! Strokes of edits: picks brought onto what is there, and curves led on from their ends.
+//! Strokes of edits: picks brought onto what is there, and the way between them.
 
-use super::apply::Work;
+use super::work::Work;
 use super::{ApplyError, Magnetism, Scalar, Spot};
 use crate::curve::{Magnet, PaintMode, PaintParams, SnapTargets, Stroke, SurfaceCurve, snap};
 use crate::mesh::{FacePoint, sharp_edges};
-use crate::network::CurveKind;
 
 /// How a stroke of an edit is painted.
 pub(super) struct Brush<'a> {
@@ -42,7 +41,7 @@ impl Work<'_, '_> {
     }
 
     /// A stroke from `from` on, if there is one, through picks, and to `to` or closed.
-    fn stroke_between(
+    pub(super) fn stroke_between(
         &self,
         from: Option<FacePoint>,
         picks: &[Spot],
@@ -69,48 +68,5 @@ impl Work<'_, '_> {
     /// A stroke through picks.
     pub(super) fn stroke(&self, picks: &[Spot], closed: bool, brush: &Brush) -> Result<SurfaceCurve, ApplyError> {
         self.stroke_between(None, picks, None, closed, brush)
-    }
-
-    /// Leads a curve on from its free end through picks, and to its other end if `closed`.
-    pub(super) fn extend(&mut self, curve: u32, picks: &[Spot], closed: bool, brush: &Brush) -> Result<(), ApplyError> {
-        let network = &self.drawing.network;
-        let [start, end] = network.curves[curve as usize].corners;
-        let ends = |k: u32| network.curves.iter().flat_map(|c| c.corners).filter(|&c| c == k).count();
-        let free = [end, start].into_iter().find(|&k| ends(k) == 1).ok_or(ApplyError::NotFree { curve })?;
-        let place = |k: u32| network.corners[k as usize].place;
-        let other = if free == end { start } else { end };
-        let mut way = self.stroke_between(Some(place(free)), picks, closed.then(|| place(other)), false, brush)?;
-        self.take_back_spur(curve, free, &mut way);
-        let snap = brush.snap;
-        self.edit(|e, diagonal, _| -> Result<(), ApplyError> {
-            e.draw_curve(&way, CurveKind::Smooth, snap * diagonal)?;
-            let ends = e.ends_at(free);
-            if ends.len() == 2 && ends[0] / 2 != ends[1] / 2 {
-                e.join(free)?;
-            }
-            Ok(())
-        })
-    }
-
-    /// A way that is drawn to something may go back along the curve that it leads on: the corner `free` between them
-    /// goes back to where they part.
-    fn take_back_spur(&mut self, curve: u32, free: u32, way: &mut SurfaceCurve) {
-        let mesh = self.ground.canvas.mesh;
-        let network = &mut self.drawing.network;
-        let old = &mut network.curves[curve as usize];
-        let at_start = old.corners[0] == free;
-        if at_start {
-            old.points.reverse();
-        }
-        let end = old.points.len() - 1;
-        let same = |k: usize| old.points[end - k].position(mesh) == way.points[k].position(mesh);
-        let spur = (1..=end.min(way.points.len() - 1) / 2).take_while(|&k| same(k)).count();
-        old.points.truncate(end + 1 - spur);
-        way.points.drain(..spur);
-        way.points[0] = old.points[end - spur];
-        network.corners[free as usize].place = way.points[0];
-        if at_start {
-            old.points.reverse();
-        }
     }
 }

@@ -1,0 +1,18 @@
+//! An empty drawing.
+
+use crate::edit::work::Work;
+use crate::edit::{ApplyError, Command};
+use crate::network::Network;
+use serde::{Deserialize, Serialize};
+
+/// Deletes all corners and curves.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Clear {}
+
+impl Command for Clear {
+    fn apply(&self, work: &mut Work) -> Result<(), ApplyError> {
+        work.drawing.network = Network::default();
+        Ok(())
+    }
+}

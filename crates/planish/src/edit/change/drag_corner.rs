@@ -1,0 +1,47 @@
+//! A corner dragged.
+
+use crate::edit::check::{self, Range, within};
+use crate::edit::work::Work;
+use crate::edit::{ApplyError, Command, Forces, Name, RelaxedCurve, Spot};
+use serde::{Deserialize, Serialize};
+
+/// Moves a corner; its curves follow.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DragCorner {
+    /// The corner.
+    pub corner: Name,
+    /// Where to.
+    pub to: Spot,
+    /// Share of each curve that relaxes.
+    #[serde(default = "usual_reach")]
+    pub reach: f64,
+    /// How it relaxes.
+    #[serde(default)]
+    pub forces: Forces,
+}
+
+fn usual_reach() -> f64 {
+    0.6
+}
+
+impl Command for DragCorner {
+    fn check(&self) -> Result<(), ApplyError> {
+        check::name(&self.corner)?;
+        check::spot("to", &self.to)?;
+        within("reach", self.reach, Range::Positive)?;
+        check::forces(&self.forces)
+    }
+
+    fn apply(&self, work: &mut Work) -> Result<(), ApplyError> {
+        let (corner, to) = (work.corner(&self.corner)?, work.place(&self.to)?);
+        let params = self.forces.params();
+        let relaxed = work.edit(|e, _, observer| e.drag_corner(corner, to, self.reach, &params, observer))?;
+        work.relaxed.extend(relaxed.into_iter().map(|(curve, relaxed)| RelaxedCurve { curve, relaxed }));
+        Ok(())
+    }
+
+    fn only_moves(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,75 @@
+//! A curve drawn through a space curve.
+
+use crate::curve::SplineEdit;
+use crate::edit::check::{self, Range, within};
+use crate::edit::work::Work;
+use crate::edit::{ApplyError, Command, Name, SplineMove};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Control vertices of a cubic space curve.
+const FEWEST_CONTROL: usize = 4;
+/// More would follow every edge of any mesh, and the system for them is dense.
+const MOST_CONTROL: usize = 1000;
+
+/// Fits a space curve with some control vertices, moves it, and lets the curve follow. Without moves it smooths.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spline {
+    /// The curve.
+    pub curve: Name,
+    /// Control vertices.
+    pub control: usize,
+    /// Moves, one after the other.
+    #[serde(default)]
+    pub moves: Vec<SplineMove>,
+}
+
+impl Command for Spline {
+    fn check(&self) -> Result<(), ApplyError> {
+        check::name(&self.curve)?;
+        if !(FEWEST_CONTROL..=MOST_CONTROL).contains(&self.control) {
+            let wanted = "between 4 and 1000";
+            return Err(ApplyError::OutOfRange { what: "control", value: self.control as f64, wanted });
+        }
+        self.moves.iter().try_for_each(|m| match m {
+            SplineMove::Control { by, .. } => check::finite("a move", by),
+            SplineMove::Edit { at, by } => {
+                within("the place of a move", *at, Range::Share)?;
+                check::finite("a move", by)
+            }
+        })
+    }
+
+    fn apply(&self, work: &mut Work) -> Result<(), ApplyError> {
+        let curve = work.curve(&self.curve)?;
+        self.moves.iter().try_for_each(|m| match m {
+            SplineMove::Control { by, .. } | SplineMove::Edit { by, .. } => work.shift(by).map(drop),
+        })?;
+        let canvas = &work.ground.canvas;
+        let (mesh, adjacency) = (canvas.mesh, &canvas.adjacency);
+        work.edit(|e, _, _| -> Result<(), ApplyError> {
+            let course = e.course(curve);
+            let even = course.spaced(mesh, adjacency, canvas.edge)?;
+            // A short curve still has as many places as its spline has vertices.
+            let even = even.resampled(mesh, adjacency, even.points.len().max(2 * self.control))?;
+            let mut spline = SplineEdit::fit(mesh, &even, self.control)?;
+            for m in &self.moves {
+                match *m {
+                    SplineMove::Control { vertex, by } => {
+                        let at = spline.control.get(vertex).copied().unwrap_or_default();
+                        spline.move_control(vertex, at + DVec3::from_array(by))?;
+                    }
+                    SplineMove::Edit { at, by } => {
+                        spline.move_edit_point(at, spline.position(at) + DVec3::from_array(by));
+                    }
+                }
+            }
+            Ok(e.replace_curve(curve, &spline.carry(mesh, adjacency, &even))?)
+        })
+    }
+
+    fn only_moves(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,28 @@
+//! A curve divided.
+
+use crate::edit::check::{self, Range, within};
+use crate::edit::work::Work;
+use crate::edit::{ApplyError, Command, Name};
+use serde::{Deserialize, Serialize};
+
+/// Divides a curve at a share of its length.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SplitCurve {
+    /// The curve.
+    pub curve: Name,
+    /// 0 to 1.
+    pub at: f64,
+}
+
+impl Command for SplitCurve {
+    fn check(&self) -> Result<(), ApplyError> {
+        check::name(&self.curve)?;
+        within("at", self.at, Range::Share)
+    }
+
+    fn apply(&self, work: &mut Work) -> Result<(), ApplyError> {
+        let curve = work.curve(&self.curve)?;
+        work.edit(|e, _, _| e.split_curve(curve, self.at)).map(drop)
+    }
+}

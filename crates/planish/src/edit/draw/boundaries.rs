@@ -1,0 +1,16 @@
+//! The boundaries of the mesh.
+
+use crate::edit::work::Work;
+use crate::edit::{ApplyError, Command};
+use serde::{Deserialize, Serialize};
+
+/// The boundaries of the mesh as curves, where there are none yet.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Boundaries {}
+
+impl Command for Boundaries {
+    fn apply(&self, work: &mut Work) -> Result<(), ApplyError> {
+        work.edit(|e, _, _| e.add_boundaries()).map(drop)
+    }
+}

@@ -1,0 +1,19 @@
+//! Edits that draw curves.
+
+mod boundaries;
+mod carry;
+mod complete;
+mod cut;
+mod extend;
+mod feature_lines;
+mod paint;
+mod project;
+
+pub use boundaries::Boundaries;
+pub use carry::{Carry, carry_network};
+pub use complete::Complete;
+pub use cut::Cut;
+pub use extend::Extend;
+pub use feature_lines::FeatureLines;
+pub use paint::Paint;
+pub use project::Project;

@@ -1,0 +1,29 @@
+//! A feature curve less.
+
+use super::forget_cells;
+use crate::edit::check;
+use crate::edit::work::Work;
+use crate::edit::{ApplyError, Command, Name};
+use serde::{Deserialize, Serialize};
+
+/// Deletes a feature curve.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeleteFeature {
+    /// Its number.
+    pub feature: Name,
+}
+
+impl Command for DeleteFeature {
+    fn check(&self) -> Result<(), ApplyError> {
+        check::name(&self.feature)
+    }
+
+    fn apply(&self, work: &mut Work) -> Result<(), ApplyError> {
+        let feature = work.feature(&self.feature)?;
+        let sketch = &mut work.drawing.sketch;
+        let gone = sketch.features.remove(feature as usize);
+        forget_cells(&mut sketch.sections, gone.patch, gone.family);
+        Ok(())
+    }
+}
