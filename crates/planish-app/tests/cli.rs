@@ -120,6 +120,15 @@ fn version_is_told_with_status_0() {
 }
 
 #[test]
+fn the_program_is_smaller_than_40_mb() {
+    // Builds for debugging are as large as they are.
+    if cfg!(not(debug_assertions)) {
+        let bytes = fs::metadata(env!("CARGO_BIN_EXE_planish")).unwrap().len();
+        assert!(bytes < 40_000_000, "{bytes}");
+    }
+}
+
+#[test]
 fn wrong_usage_is_status_2() {
     let folder = tempfile::tempdir().unwrap();
     write_box(&folder.path().join("box.ply"), 2);
