@@ -29,7 +29,7 @@ def test_every_region_is_a_four_sided_patch_and_no_cell_is_folded(head):
     # Both sides have the same patches.
     assert quality["patches.count"] >= 40 and quality["patches.count"] % 2 == 0
     assert not [w for w in report["warnings"] if w["code"] == "network_unfinished"]
-    assert quality["relief.roundtrip_max_rel"] < 1e-12
+    assert quality["relief.rounding_max_rel"] < 1e-12
 
 
 def test_a_picture_is_made_after_every_edit(head):

@@ -24,7 +24,7 @@ TOLERANCES = {
     "seam.count": (0.4, 8),
     "seam.gap_max": ROUNDING,
     "seam.angle": (1.0, 0.05),
-    "relief.roundtrip_max": ROUNDING,
+    "relief.rounding_max": ROUNDING,
     "relief.max": DISTANCE,
     "surface.control_points": (0.5, 0),
     "surface.": DISTANCE,

@@ -15,7 +15,8 @@ def fit(folder, *arguments, status=0):
 
 
 def same_surfaces(a, b):
-    skip = {"mesh.feature_edges"}
+    # Maps are read back only where they are written.
+    skip = {"mesh.feature_edges", "relief.roundtrip_max", "relief.roundtrip_max_rel"}
     # A model does not know the scan that it comes from.
     def fitted(one):
         return sorted(k for k in set(one["quality"]) - skip if not k.startswith(("scan.", "truth.")))
@@ -68,7 +69,7 @@ def test_a_project_alone_is_fitted_anew_with_the_control_points_asked_for(demo, 
         names = [s["name"] for s in one["stages"]]
         assert "layout" not in names and "grids" not in names and "surfaces" in names
         assert one["input"]["units"] == "cm" and one["quality"]["grid.points"] == report["quality"]["grid.points"]
-        assert one["quality"]["relief.roundtrip_max_rel"] < 1e-9
+        assert one["quality"]["relief.rounding_max_rel"] < 1e-9
     seconds = sum(s["seconds"] for s in fine["stages"] if s["name"] in {"surfaces", "seams", "relief"})
     assert seconds < 0.5
     # Without options: with the parameters it was made with, so nothing changes.

@@ -57,7 +57,7 @@ pub enum Command {
     Fit(Fit),
     /// Model and script -> the model with curves, corners and feature curves edited
     Edit(Edit),
-    /// Model -> STEP, mesh or displacement maps; the format comes from the extension
+    /// Model -> STEP, mesh, network or displacement maps; the format comes from the extension
     Export(Export),
     /// Distances and normal errors between any two meshes or models
     Compare(Compare),
@@ -212,6 +212,15 @@ impl HoleArgs {
     pub fn choice(&self) -> Option<bool> {
         if self.open || self.close { Some(self.close) } else { None }
     }
+
+    /// Refuses the options for an input that is no scan.
+    /// # Errors
+    /// If one of them is given.
+    pub fn refuse(&self, hint: &'static str) -> Result<(), Failure> {
+        let Some(close) = self.choice() else { return Ok(()) };
+        let flag = if close { "--close" } else { "--open" };
+        Err(Failure::usage(flag, "is for holes of a scan, and the input is none").hint(hint))
+    }
 }
 
 /// `planish clean`
@@ -313,8 +322,8 @@ pub struct Layout {
 /// `planish fit`
 #[derive(Args, Debug)]
 pub struct Fit {
-    /// The mesh: PLY, OBJ, STL, GLB or glTF; or a model, whose network and grids are kept: only its surfaces, seams
-    /// and relief are made anew, with its own parameters where no option says otherwise
+    /// The mesh: PLY, OBJ, STL, GLB or glTF; or a model, whose network and grids are kept (one without grids gets them):
+    /// only its surfaces, seams and relief are made anew, with its own parameters where no option says otherwise
     #[arg(value_name = "MESH|MODEL.planish")]
     pub input: PathBuf,
     /// Network on the mesh [default: an automatic one]
@@ -359,7 +368,8 @@ pub struct Export {
     /// The model
     #[arg(value_name = "MODEL.planish")]
     pub model: PathBuf,
-    /// Where to: .step or .stp (surfaces), .ply, .obj, .stl or .glb (a mesh), or a folder (displacement maps)
+    /// Where to: .step or .stp (surfaces), .ply, .obj, .stl or .glb (a mesh), .json (the network), or a folder
+    /// (displacement maps)
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Which surface a mesh format gets
@@ -428,17 +438,23 @@ impl AllStages {
         self.params_suiting(PipelineParams::default(), seed)
     }
 
-    /// The parameters for the surfaces of a model that is there already: `stored` with the given options in place.
+    /// The parameters for a model that is there already: `stored` with the given options in place.
+    /// * `gridded` - it has grids, which are kept
     /// # Errors
     /// If an option is given for a stage that does not run again.
-    pub fn params_over(&self, stored: PipelineParams, seed: Option<u64>) -> Result<PipelineParams, Failure> {
-        if let Some(flag) = self.layout.first_given().or_else(|| self.grid.first_given()) {
-            return Err(Failure::usage(flag, "does not go with a model, whose network and grids are kept")
+    pub fn params_over(
+        &self,
+        stored: PipelineParams,
+        gridded: bool,
+        seed: Option<u64>,
+    ) -> Result<PipelineParams, Failure> {
+        let idle = self.layout.first_given().or_else(|| self.grid.first_given().filter(|_| gridded));
+        if let Some(flag) = idle {
+            let kept = if gridded { "network and grids are" } else { "network is" };
+            return Err(Failure::usage(flag, format!("does not go with this model, whose {kept} kept"))
                 .hint("fit its mesh: `planish export MODEL.planish --surface mesh -o MESH.ply`"));
         }
-        let fit = self.fit.params_over(stored.fit, seed)?;
-        let stitch = self.stitch.params_over(stored.stitch, seed)?;
-        Ok(PipelineParams { fit, stitch, ..stored })
+        Ok(PipelineParams { layout: stored.layout.clone(), ..self.params_suiting(stored, seed)? })
     }
 
     /// The parameters of all stages: `suited` with the given options in place.

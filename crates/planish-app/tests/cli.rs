@@ -4,6 +4,7 @@ mod common;
 
 use common::*;
 use std::fs;
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -42,6 +43,15 @@ fn version_is_told_with_status_0() {
     let folder = tempfile::tempdir().unwrap();
     let output = planish(&["--version"], folder.path());
     assert_eq!((status(&output), stdout(&output).trim()), (0, concat!("planish ", env!("CARGO_PKG_VERSION"))));
+}
+
+#[test]
+fn the_program_is_smaller_than_40_mb() {
+    // Builds for debugging are as large as they are.
+    if cfg!(not(debug_assertions)) {
+        let bytes = fs::metadata(env!("CARGO_BIN_EXE_planish")).unwrap().len();
+        assert!(bytes < 40_000_000, "{bytes}");
+    }
 }
 
 #[test]
@@ -156,7 +166,7 @@ fn run_leaves_all_products_and_the_same_bytes_on_1_and_2_threads() {
     // A folder that is there already, with a file of the user's own and an old product.
     fs::create_dir(folder.path().join("one")).unwrap();
     fs::write(folder.path().join("one/notes.txt"), "mine").unwrap();
-    fs::write(folder.path().join("one/surface.step"), "old").unwrap();
+    fs::write(folder.path().join("one/surface.step"), "old, by planish").unwrap();
     for (out, threads) in [("one", "1"), ("two", "2")] {
         let output = planish(
             &["run", "box.ply", "-o", out, "--threads", threads, "--units", "cm", "--patches", "6"],
@@ -318,6 +328,131 @@ fn a_script_draws_a_network_on_a_bare_mesh_and_the_history_goes_back_and_forth_i
     assert_eq!(status(&output), 3);
     assert!(error_line(&output).contains("step 1 (redo, line 1): there is nothing left to make again"));
     assert!(!folder.path().join("x.planish").exists());
+}
+
+/// A figure of a report.
+fn figure(path: &Path, key: &str) -> f64 {
+    let report: serde_json::Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    report["quality"][key].as_f64().unwrap_or_else(|| panic!("no {key} in {report}"))
+}
+
+#[test]
+fn fit_makes_of_a_model_that_edit_left_without_surfaces_what_edit_would_have_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_box(&path.join("box.ply"), 6);
+    fs::write(path.join("lines.toml"), "[[step]]\nedit = \"feature_lines\"\nangle_deg = 40.0\n").unwrap();
+    let done = |args: &[&str]| {
+        let output = planish(args, path);
+        assert_eq!(status(&output), 0, "{args:?}: {}", stderr(&output));
+        stdout(&output)
+    };
+    done(&["edit", "box.ply", "lines.toml", "-o", "whole.planish"]);
+    done(&["edit", "box.ply", "lines.toml", "-o", "bare.planish", "--no-fit"]);
+    let table = done(&["fit", "bare.planish", "-o", "fitted.planish", "--report", "plain.json"]);
+    assert!(table.contains("control points"), "{table}");
+    done(&["export", "whole.planish", "-o", "whole.step"]);
+    done(&["export", "fitted.planish", "-o", "fitted.step"]);
+    let step = |name: &str| fs::read_to_string(path.join(name)).unwrap().replace("fitted", "whole");
+    assert!(step("whole.step") == step("fitted.step"));
+    assert!(done(&["info", "fitted.planish"]).contains("feature_lines, fit"));
+    // Grids are still to be made: their options count, also those that were given to `edit`.
+    done(&["fit", "bare.planish", "-o", "dense.planish", "--min-side", "40", "--report", "dense.json"]);
+    done(&["edit", "box.ply", "lines.toml", "-o", "wish.planish", "--no-fit", "--min-side", "40"]);
+    done(&["fit", "wish.planish", "-o", "wish.planish", "--report", "wish.json"]);
+    let points = |name: &str| figure(&path.join(name), "grid.points");
+    assert_eq!([points("plain.json"), points("dense.json"), points("wish.json")], [1734.0, 9600.0, 9600.0]);
+    // Now they are there.
+    let output = planish(&["fit", "dense.planish", "-o", "no.planish", "--min-side", "20"], path);
+    assert!(status(&output) == 2 && error_line(&output).starts_with("error: --min-side: "), "{}", stderr(&output));
+}
+
+#[test]
+fn a_model_whose_network_is_not_finished_is_not_fitted_and_the_way_out_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    write_box(&folder.path().join("box.ply"), 12);
+    for (script, wanted) in [(BOX_SCRIPT, "unfinished network with 2 things to put right"), ("", "has no network")] {
+        fs::write(folder.path().join("s.toml"), script).unwrap();
+        let output = planish(&["edit", "box.ply", "s.toml", "-o", "box.planish", "-q"], folder.path());
+        assert_eq!(status(&output), 0, "{}", stderr(&output));
+        let output = planish(&["fit", "box.planish", "-o", "no.planish"], folder.path());
+        assert_eq!(status(&output), 3);
+        let line = error_line(&output);
+        assert!(line.contains(wanted) && line.contains("planish edit"), "{line}");
+        assert!(!folder.path().join("no.planish").exists());
+    }
+}
+
+#[test]
+fn the_network_of_a_model_goes_out_as_layout_writes_it_and_in_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_box(&path.join("box.ply"), 6);
+    let done = |args: &[&str]| {
+        let output = planish(args, path);
+        assert_eq!(status(&output), 0, "{args:?}: {}", stderr(&output));
+    };
+    done(&["layout", "box.ply", "-o", "network.json", "--patches", "6"]);
+    done(&["fit", "box.ply", "--network", "network.json", "-o", "box.planish"]);
+    done(&["export", "box.planish", "-o", "out.json"]);
+    let bytes = |name: &str| fs::read(path.join(name)).unwrap();
+    assert!(bytes("out.json") == bytes("network.json"));
+    // With the mesh of the model, too.
+    done(&["export", "box.planish", "--surface", "mesh", "-o", "mesh.ply"]);
+    done(&["fit", "mesh.ply", "--network", "out.json", "-o", "again.planish"]);
+    done(&["export", "again.planish", "-o", "again.json"]);
+    assert!(bytes("again.json") == bytes("network.json"));
+}
+
+#[test]
+fn a_script_makes_one_edge_of_a_box_smooth_and_model_network_and_seams_keep_to_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_box(&path.join("box.ply"), 6);
+    let edit = |input: &str, script: &str| {
+        fs::write(path.join("s.toml"), script).unwrap();
+        let output = planish(&["edit", input, "s.toml", "-o", "box.planish", "--report", "r.json"], path);
+        assert_eq!(status(&output), 0, "{script}: {}", stderr(&output));
+        let report: serde_json::Value = serde_json::from_slice(&fs::read(path.join("r.json")).unwrap()).unwrap();
+        let output = planish(&["export", "box.planish", "-o", "n.json"], path);
+        assert_eq!(status(&output), 0, "{}", stderr(&output));
+        let smooth = fs::read_to_string(path.join("n.json")).unwrap().matches("\"kind\":\"smooth\"").count();
+        let seams = report["seams"].as_array().unwrap();
+        let angles = |feature: bool| -> Vec<f64> {
+            let own = seams.iter().filter(|s| s["feature"] == feature);
+            own.map(|s| s["angle_rms_deg"].as_f64().unwrap()).collect()
+        };
+        (smooth, angles(false), angles(true), report["edits"][0]["curves"].as_array().unwrap().len())
+    };
+    let (smooth, bent, sharp, _) = edit("box.ply", "[[step]]\nedit = \"feature_lines\"\nangle_deg = 40.0\n");
+    assert_eq!((smooth, bent.len(), sharp.len()), (0, 0, 12));
+    let step = "[[step]]\nedit = \"continuity\"\ncurves = [{ near = [0.5, 0.0, 1.0] }]\nseam = ";
+    let (smooth, bent, sharp, changed) = edit("box.planish", &format!("{step}\"smooth\"\n"));
+    assert_eq!((smooth, bent.len(), sharp.len(), changed), (1, 1, 11, 1));
+    assert!(bent[0] < 60.0 && sharp.iter().all(|a| *a > 80.0), "{bent:?} {sharp:?}");
+    let (smooth, bent, sharp, _) = edit("box.planish", &format!("{step}\"sharp\"\n"));
+    assert_eq!((smooth, bent.len(), sharp.len()), (0, 0, 12));
+}
+
+#[test]
+fn displacement_maps_read_back_from_their_files_bring_the_surface_to_the_grid_within_single_precision() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_box(&path.join("box.ply"), 6);
+    // A bump that a surface of few control points leaves to its map.
+    let bumped = fs::read_to_string(path.join("box.ply")).unwrap().replace("\n0.5 0.5 1\n", "\n0.5 0.5 1.1\n");
+    fs::write(path.join("box.ply"), bumped).unwrap();
+    let options = ["--patches", "6", "--control", "4x4", "-o", "out"];
+    let output = planish(&[&["run", "box.ply"], &options[..]].concat(), path);
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    let output = planish(&["export", "out/model.planish", "-o", "maps", "--report", "maps.json"], path);
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    let read = |key: &str| figure(&path.join("out/report.json"), key);
+    let (most, away, exact) = (read("relief.max"), read("relief.roundtrip_max"), read("relief.rounding_max"));
+    // Not an identity: single precision is seen, and no more than that.
+    assert!(most > 0.01 && away > 1e-12 && away < 1.1 * most * 2f64.powi(-24), "{away} of {most}");
+    assert!(exact < 1e-15, "{exact}");
+    assert_eq!(figure(&path.join("maps.json"), "relief.roundtrip_max"), away);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! A model as what its file name asks for.
 
-use crate::{MeshFormat, StepInput, WriteError, WriteOptions, write_mesh, write_relief, write_step};
+use crate::{MeshFormat, StepInput, WriteError, WriteOptions, write_mesh, write_network, write_relief, write_step};
 use planish::Model;
 use planish::mesh::TriMesh;
 use std::path::Path;
@@ -12,6 +12,8 @@ pub enum ExportKind {
     Step,
     /// `.ply`, `.obj`, `.stl`, `.glb`: the displaced surface as a mesh.
     Mesh,
+    /// `.json`: the network.
+    Network,
     /// No extension, or a folder that is there: a folder with the displacement maps.
     Relief,
 }
@@ -24,12 +26,14 @@ pub fn export_kind(path: impl AsRef<Path>) -> Result<ExportKind, WriteError> {
     let extension = crate::mesh_file::extension(path);
     match extension.to_ascii_lowercase().as_str() {
         "step" | "stp" => Ok(ExportKind::Step),
+        "json" => Ok(ExportKind::Network),
         _ if MeshFormat::of(path).is_some_and(|f| f != MeshFormat::Gltf) => Ok(ExportKind::Mesh),
         "" => Ok(ExportKind::Relief),
         _ if path.is_dir() => Ok(ExportKind::Relief),
         _ => Err(WriteError::UnknownExtension {
             extension,
-            known: ".step, .stp, .ply, .obj, .stl, .glb, or a folder for the displacement maps".into(),
+            known: ".step, .stp, .ply, .obj, .stl, .glb, .json for the network, or a folder for the displacement maps"
+                .into(),
         }),
     }
 }
@@ -37,7 +41,7 @@ pub fn export_kind(path: impl AsRef<Path>) -> Result<ExportKind, WriteError> {
 /// Writes `model` as the name of `path` asks for (see [`ExportKind`]).
 /// * `displaced` - makes the displaced surface; called only if a mesh is asked for
 /// # Errors
-/// Those of [`write_step`], [`write_mesh`], [`write_relief`] and [`export_kind`].
+/// Those of [`write_step`], [`write_mesh`], [`write_network`], [`write_relief`] and [`export_kind`].
 pub fn export(
     path: impl AsRef<Path>,
     model: &Model,
@@ -52,6 +56,7 @@ pub fn export(
             write_step(path, &StepInput { network, surfaces, units: model.units, name: &name, time: None })?;
         }
         ExportKind::Mesh => export_mesh(path, &displaced(), model)?,
+        ExportKind::Network => write_network(path, &model.network, &model.mesh)?,
         ExportKind::Relief => write_relief(path, &model.reliefs, model.units)?,
     }
     Ok(kind)

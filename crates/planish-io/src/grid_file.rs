@@ -7,6 +7,8 @@ use crate::text::shown;
 use crate::{Place, ReadError};
 use planish::DVec3;
 use planish::field::ScalarGrid;
+use rayon::prelude::*;
+use std::borrow::Cow;
 use std::io::Read;
 use std::path::Path;
 
@@ -23,13 +25,12 @@ pub fn read_grid(path: impl AsRef<Path>) -> Result<ScalarGrid, ReadError> {
     if !metadata.is_file() {
         return Err(ReadError::NotAFile(if metadata.is_dir() { "a folder" } else { "a pipe or a device" }));
     }
-    let bytes = std::fs::read(path)?;
-    if bytes.is_empty() {
+    if metadata.len() == 0 {
         return Err(ReadError::Empty);
     }
     match path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase().as_str() {
-        "nrrd" => nrrd(&bytes),
-        "npy" => npy(&bytes),
+        "nrrd" => nrrd(&std::fs::read(path)?),
+        "npy" => npy(std::fs::File::open(path)?, metadata.len()),
         other => Err(ReadError::UnknownExtension { extension: other.into(), known: ".nrrd, .npy".into() }),
     }
 }
@@ -40,6 +41,11 @@ pub fn is_grid(path: &Path) -> bool {
         .and_then(|e| e.to_str())
         .is_some_and(|e| ["nrrd", "npy"].contains(&e.to_ascii_lowercase().as_str()))
 }
+
+/// Numbers that a thread converts at a time: a quarter of a megabyte of `f32`.
+const CHUNK: usize = 1 << 16;
+/// Edge of the tiles that an array is turned around in: sixteen `f32` are one line of the cache.
+const TILE: usize = 16;
 
 /// A number type of a volume.
 #[derive(Clone, Copy, PartialEq)]
@@ -66,18 +72,22 @@ impl Scalar {
         }
     }
 
-    /// All numbers of `bytes`.
-    fn numbers(self, bytes: &[u8], big: bool) -> Vec<f32> {
+    /// The numbers of `bytes`, as many as `numbers` has room for.
+    fn convert(self, bytes: &[u8], big: bool, numbers: &mut [f32]) {
+        /// Each number by its `N` bytes.
+        fn each<const N: usize>(bytes: &[u8], numbers: &mut [f32], number: impl Fn([u8; N]) -> f32 + Sync) {
+            let (all, _) = bytes.as_chunks::<N>();
+            numbers.par_chunks_mut(CHUNK).zip(all.par_chunks(CHUNK)).for_each(|(numbers, all)| {
+                numbers.iter_mut().zip(all).for_each(|(n, bytes)| *n = number(*bytes));
+            });
+        }
         macro_rules! each {
             ($t:ty) => {
-                bytes
-                    .chunks_exact(std::mem::size_of::<$t>())
-                    .map(|c| {
-                        let mut number = [0u8; std::mem::size_of::<$t>()];
-                        number.copy_from_slice(c);
-                        (if big { <$t>::from_be_bytes(number) } else { <$t>::from_le_bytes(number) }) as f32
-                    })
-                    .collect()
+                if big {
+                    each(bytes, numbers, |b| <$t>::from_be_bytes(b) as f32)
+                } else {
+                    each(bytes, numbers, |b| <$t>::from_le_bytes(b) as f32)
+                }
             };
         }
         match self {
@@ -196,7 +206,7 @@ fn nrrd(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
     let samples = count(size, Place::Line(size_line))?;
     let needed = samples * kind.size();
     let body = match encoding.as_str() {
-        "raw" => bytes[data..].to_vec(),
+        "raw" => Cow::Borrowed(&bytes[data..]),
         "gzip" | "gz" => {
             // One byte more than there may be tells that there is too much; a bomb fills no memory.
             let mut out = Vec::with_capacity(needed.min(bytes.len() * 8));
@@ -205,12 +215,14 @@ fn nrrd(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
                 what: format!("the compressed data is damaged ({e})"),
                 place: Place::Byte(data),
             })?;
-            out
+            Cow::Owned(out)
         }
         other => return Err(unsupported(format!("the encoding \"{other}\""), encoding_line)),
     };
-    agree(&body, needed, size, data)?;
-    checked(ScalarGrid { size, origin, spacing, values: kind.numbers(&body, big).into() }, line)
+    agree(body.len() as u64, needed, size, data)?;
+    let mut values = vec![0.0; samples];
+    kind.convert(&body, big, &mut values);
+    checked(ScalarGrid { size, origin, spacing, values: values.into() }, line)
 }
 
 /// Axis-parallel directions as spacings.
@@ -242,13 +254,12 @@ fn unsupported(what: String, line: usize) -> ReadError {
 }
 
 /// Refuses data of another length than the header says.
-fn agree(body: &[u8], needed: usize, size: [usize; 3], at: usize) -> Result<(), ReadError> {
+fn agree(left: u64, needed: usize, size: [usize; 3], at: usize) -> Result<(), ReadError> {
     let what = format!("{} x {} x {} samples", size[0], size[1], size[2]);
-    if body.len() < needed {
-        let (needed, left) = (needed as u64, body.len() as u64);
-        return Err(ReadError::Truncated { what, needed, left, place: Place::Byte(at) });
+    if left < needed as u64 {
+        return Err(ReadError::Truncated { what, needed: needed as u64, left, place: Place::Byte(at) });
     }
-    if body.len() > needed {
+    if left > needed as u64 {
         let what = format!("{what} take {needed} bytes, but there are more");
         return Err(ReadError::Syntax { what, place: Place::Byte(at + needed) });
     }
@@ -279,21 +290,32 @@ fn nrrd_type(word: &str) -> Option<Scalar> {
     })
 }
 
-fn npy(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
+fn npy(mut file: impl Read, length: u64) -> Result<ScalarGrid, ReadError> {
     let fault = |what: String| ReadError::Header { what, place: Place::Byte(10), hint: "save it with numpy.save" };
-    if !bytes.starts_with(b"\x93NUMPY") || bytes.len() < 12 {
+    let mut head = [0; 12];
+    let short = length < head.len() as u64;
+    let head = &mut head[..if short { 0 } else { 10 }];
+    file.read_exact(head)?;
+    if !head.starts_with(b"\x93NUMPY") {
         let hint = "name a volume: .nrrd or .npy".into();
         return Err(ReadError::WrongFormat { expected: "NumPy", found: "something else", hint });
     }
-    let (start, length) = match bytes[6] {
-        1 => (10, u16::from_le_bytes([bytes[8], bytes[9]]) as usize),
-        _ => (12, u32::from_le_bytes([bytes[8], bytes[9], bytes[10], bytes[11]]) as usize),
+    let (start, header_length) = match head[6] {
+        1 => (10, u16::from_le_bytes([head[8], head[9]]) as usize),
+        _ => {
+            let mut rest = [0; 2];
+            file.read_exact(&mut rest)?;
+            (12, u32::from_le_bytes([head[8], head[9], rest[0], rest[1]]) as usize)
+        }
     };
-    let Some(header) = bytes.get(start..start + length) else {
-        let (needed, left) = (length as u64, (bytes.len() - start.min(bytes.len())) as u64);
+    let left = length - start as u64;
+    if header_length as u64 > left {
+        let needed = header_length as u64;
         return Err(ReadError::Truncated { what: "the header".into(), needed, left, place: Place::Byte(start) });
-    };
-    let header = String::from_utf8_lossy(header).into_owned();
+    }
+    let mut header = vec![0; header_length];
+    file.read_exact(&mut header)?;
+    let header = String::from_utf8_lossy(&header).into_owned();
     let entry = |key: &str| {
         let at = header.find(&format!("'{key}'"))?;
         header[at..].split_once(':').map(|(_, rest)| rest.trim_start().to_owned())
@@ -323,23 +345,46 @@ fn npy(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
         return Err(fault(format!("an array of {} dimensions is no volume", shape.len())));
     };
     let size = [nx, ny, nz];
-    let needed = count(size, Place::Byte(start))?.saturating_mul(kind.size());
-    let body = &bytes[start + length..];
-    agree(body, needed, size, start + length)?;
-    let numbers = kind.numbers(body, order == ">");
-    let values = if fortran {
-        numbers
+    let samples = count(size, Place::Byte(start))?;
+    agree(left - header_length as u64, samples.saturating_mul(kind.size()), size, start + header_length)?;
+    let mut values = vec![0.0; samples];
+    let mut bytes = Vec::new();
+    let mut next = |numbers: &mut [f32]| {
+        bytes.resize(numbers.len() * kind.size(), 0);
+        file.read_exact(&mut bytes)?;
+        kind.convert(&bytes, order == ">", numbers);
+        Ok::<_, std::io::Error>(())
+    };
+    if fortran {
+        values.chunks_mut(16 * CHUNK).try_for_each(next)?;
     } else {
-        // The last index is the fastest in memory: z.
-        let mut values = Vec::with_capacity(numbers.len());
-        for k in 0..nz {
-            for j in 0..ny {
-                values.extend((0..nx).map(|i| numbers[(i * ny + j) * nz + k]));
+        // The last index, z, is the fastest in memory: slices of equal x come one after the other.
+        let slice = ny * nz;
+        let mut numbers = vec![0.0; TILE.min(nx) * slice];
+        for first in (0..nx).step_by(TILE) {
+            let numbers = &mut numbers[..TILE.min(nx - first) * slice];
+            next(numbers)?;
+            place_slices(numbers, first, &mut values, size);
+        }
+    }
+    Ok(ScalarGrid { size, origin: DVec3::ZERO, spacing: DVec3::ONE, values: values.into() })
+}
+
+/// Puts slices of equal x, from `first` on and with z as the fastest index, among `values`, whose fastest is x.
+fn place_slices(slices: &[f32], first: usize, values: &mut [f32], [nx, ny, nz]: [usize; 3]) {
+    let layer = nx * ny;
+    values.par_chunks_mut((TILE * layer).max(1)).enumerate().for_each(|(block, layers)| {
+        let low = block * TILE;
+        let count = layers.len() / layer;
+        for j in 0..ny {
+            for (i, slice) in slices.chunks_exact(ny * nz).enumerate() {
+                let run = &slice[j * nz + low..][..count];
+                for (k, &number) in run.iter().enumerate() {
+                    layers[k * layer + j * nx + first + i] = number;
+                }
             }
         }
-        values
-    };
-    Ok(ScalarGrid { size, origin: DVec3::ZERO, spacing: DVec3::ONE, values: values.into() })
+    });
 }
 
 #[cfg(test)]

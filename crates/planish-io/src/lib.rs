@@ -32,6 +32,6 @@ pub use mesh_file::{MeshFormat, Up, WriteOptions, read_mesh, read_tagged_mesh, w
 pub use network_file::{NetworkFileError, read_network, write_network};
 pub use place::Place;
 pub use project::{ProjectError, read_model, write_model};
-pub use relief_files::{read_relief, relief_names, write_relief};
+pub use relief_files::{read_relief, relief_names, relief_roundtrip, write_relief};
 pub use scan::{SCAN_EXTENSIONS, ScanOptions, WRITTEN_SCANS, is_scan, read_scan, write_scan};
 pub use step::{StepInput, StepSummary, write_step};

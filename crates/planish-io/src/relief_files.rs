@@ -10,7 +10,9 @@
 
 use crate::{Place, ReadError, WriteError, atomic};
 use exr::prelude::*;
-use planish::relief::Relief;
+use planish::grid::Grid;
+use planish::relief::{self, Relief};
+use planish::surface::Surface;
 use planish::{DVec3, Units};
 use serde::{Deserialize, Serialize};
 use std::io::Write;
@@ -187,6 +189,30 @@ pub fn read_relief(folder: impl AsRef<Path>) -> Result<(Vec<Relief>, Units), Rea
         reliefs.push(read_image(&folder.join(name), entry)?);
     }
     Ok((reliefs, sidecar.units))
+}
+
+/// Largest distance of the surfaces with the displacement maps of `folder` to the grids that the maps were made of, units
+/// of the model: what another program gets back of the grids. Maps hold single precision, so it is some 1e-7 of the
+/// displacements.
+/// # Errors
+/// Those of [`read_relief`]; `ReadError::Syntax` for maps of another model.
+pub fn relief_roundtrip(folder: impl AsRef<Path>, surfaces: &[Surface], grids: &[Grid]) -> Result<f64, ReadError> {
+    let (reliefs, _) = read_relief(folder)?;
+    if reliefs.len() != surfaces.len() || reliefs.len() != grids.len() {
+        let what = format!("{} maps for {} surfaces and {} grids", reliefs.len(), surfaces.len(), grids.len());
+        return Err(ReadError::Syntax { what, place: Place::Line(1) });
+    }
+    let mut largest: f64 = 0.0;
+    for (p, ((relief, surface), grid)) in reliefs.iter().zip(surfaces).zip(grids).enumerate() {
+        let other = |what: String| ReadError::Syntax { what, place: Place::Item("patch", p) };
+        let points = relief::displace(surface, relief).map_err(|e| other(e.to_string()))?;
+        if (relief.rows, relief.cols, points.len()) != (grid.rows, grid.cols, grid.points.len()) {
+            let (map, nodes) = ((relief.cols, relief.rows), (grid.cols, grid.rows));
+            return Err(other(format!("a map of {map:?} pixels for a grid of {nodes:?} nodes")));
+        }
+        largest = points.iter().zip(&grid.points).map(|(a, b)| a.distance(*b)).fold(largest, f64::max);
+    }
+    Ok(largest)
 }
 
 fn read_image(path: &Path, entry: &Entry) -> Result<Relief, ReadError> {

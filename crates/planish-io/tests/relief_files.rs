@@ -5,9 +5,11 @@
 mod common;
 
 use common::folder;
-use planish::relief::Relief;
+use planish::grid::Grid;
+use planish::relief::{Relief, bake, frames};
+use planish::surface::{Surface, fit};
 use planish::{DVec3, Units};
-use planish_io::{read_relief, write_relief};
+use planish_io::{read_relief, relief_roundtrip, write_relief};
 
 /// A relief whose numbers `f32` holds exactly.
 fn relief(cols: usize, rows: usize, seed: f64) -> Relief {
@@ -110,4 +112,56 @@ fn openexr_reads_tangent_bitangent_normal_as_r_g_b_with_v_0_in_the_lowest_row() 
             }
         }
     }
+}
+
+/// The cubic surface through `place` on 7 x 7 control points, and a grid of 23 x 31 nodes off it by `detail` in every direction.
+fn patch(place: impl Fn(f64, f64) -> DVec3, detail: f64) -> (Surface, Grid) {
+    let nodes = |rows: usize, cols: usize, off: f64| -> Vec<DVec3> {
+        let at = |n: usize| ((n % cols) as f64 / (cols - 1) as f64, (n / cols) as f64 / (rows - 1) as f64);
+        let off = |n: usize| DVec3::new((1.3 * n as f64).sin(), (2.1 * n as f64).cos(), (0.7 * n as f64).sin()) * off;
+        (0..rows * cols).map(|n| place(at(n).0, at(n).1) + off(n)).collect()
+    };
+    let surface = fit(&nodes(23, 31, 0.0), 23, 31, [7, 7]).unwrap();
+    (surface, Grid { rows: 23, cols: 31, points: nodes(23, 31, detail), places: Vec::new() })
+}
+
+#[test]
+fn maps_read_back_give_the_grid_within_single_precision_in_every_kind_of_frame() {
+    let detail = 0.05;
+    let turn = std::f64::consts::FRAC_PI_2;
+    let patches = [
+        // A quarter of a cylinder: orthogonal derivatives.
+        patch(|u, v| DVec3::new((turn * u).cos(), (turn * u).sin(), v), detail),
+        // A sheared saddle far from the origin: derivatives at 20 degrees to each other.
+        patch(|u, v| DVec3::new(1e4 + u + 0.9 * v, 0.35 * v - 1e4, u * v), detail),
+        // A quarter of a cone: the side v = 1 is one point, where the frame is that of the place beside it.
+        patch(|u, v| DVec3::new((turn * u).cos(), (turn * u).sin(), 0.0) * (1.0 - v) + DVec3::Z * v, detail),
+        // One point, one line: no frame at all, the world axes.
+        patch(|_, _| DVec3::ONE, detail),
+        patch(|u, v| DVec3::X * (u + v), detail),
+    ];
+    let (surfaces, grids): (Vec<Surface>, Vec<Grid>) = patches.into_iter().unzip();
+    let world = |k: usize| frames(&surfaces[k], 23, 31)[40].tangent == DVec3::X;
+    assert!(world(3) && world(4) && !world(0) && !world(2));
+    let reliefs: Vec<Relief> = grids.iter().zip(&surfaces).map(|(g, s)| bake(g, s).unwrap()).collect();
+    for (k, relief) in reliefs.iter().enumerate() {
+        let folder = folder();
+        write_relief(folder.path(), std::slice::from_ref(relief), Units::Mm).unwrap();
+        let away = relief_roundtrip(folder.path(), &surfaces[k..=k], &grids[k..=k]).unwrap();
+        let most = relief.vectors.iter().map(|d| d.length()).fold(0.0, f64::max);
+        // Each of three numbers is off by half a unit in its last of 24 bits; places by 1e-16 of how far out they are.
+        let far = grids[k].points.iter().map(|p| p.length()).fold(0.0, f64::max);
+        assert!(away > 1e-3 * most * 2f64.powi(-24), "patch {k}: {away}");
+        assert!(away < most * 2f64.powi(-24) + 1e-15 * far, "patch {k}: {away} of {most}");
+    }
+    // All in one folder, and told if they are those of others.
+    let folder = folder();
+    write_relief(folder.path(), &reliefs, Units::Mm).unwrap();
+    assert!(relief_roundtrip(folder.path(), &surfaces, &grids).unwrap() < 1e-8);
+    assert!(relief_roundtrip(folder.path(), &surfaces[1..], &grids[1..]).is_err());
+    let mut other = grids.clone();
+    other[2].points.truncate(22 * 31);
+    other[2].rows = 22;
+    let told = relief_roundtrip(folder.path(), &surfaces, &other).unwrap_err().to_string();
+    assert!(told.contains("(patch 2)") && told.contains(" - hint: "), "{told}");
 }

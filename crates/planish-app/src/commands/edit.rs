@@ -72,6 +72,9 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
         report.warnings.extend(made.warnings);
         report.seams = seam_rows(&model, &made.seams);
         model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
+    } else if !args.stages.none_given() {
+        // What was asked for now counts when the model is fitted.
+        model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
     }
     let staged = Staged::file(&output)?;
     let write = || planish_io::write_model(staged.file_path(), &model).map_err(|e| Failure::usage(&output, e));

@@ -1,6 +1,6 @@
 //! `planish export`: a model in another program's format.
 
-use super::{Session, commit_report};
+use super::{Session, commit_report, write_relief};
 use crate::args::{Export, SurfaceWord};
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -24,9 +24,16 @@ pub fn export(session: &Session, args: &Export) -> Result<Status, Failure> {
         name: args.model.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         up: args.up.into(),
     };
+    let mut report = Report::new("export", files::model_facts(&args.model, &model, model.units));
     let unfit = |e: pipeline::PipelineError| Failure::input(&args.model, e).hint("fit it again with `planish fit`");
     let ((), write) = session.step("write", || match kind {
-        ExportKind::Relief => planish_io::write_relief(staged.path(""), &model.reliefs, model.units).map_err(wrong),
+        ExportKind::Relief => write_relief(&staged.path(""), &model, &mut report.quality).map_err(wrong),
+        ExportKind::Network if model.network.patches.is_empty() => {
+            Err(Failure::input(&args.model, "has no patches yet").hint("finish its network with `planish edit`"))
+        }
+        ExportKind::Network => {
+            planish_io::write_network(staged.file_path(), &model.network, &model.mesh).map_err(wrong)
+        }
         ExportKind::Step => {
             let (network, surfaces) = (&model.network, model.surfaces.as_slice());
             let step = StepInput { network, surfaces, units: model.units, name: &options.name, time: None };
@@ -42,7 +49,6 @@ pub fn export(session: &Session, args: &Export) -> Result<Status, Failure> {
         }
     })?;
     staged.commit()?;
-    let mut report = Report::new("export", files::model_facts(&args.model, &model, model.units));
     report.stages = vec![read, write];
     commit_report(own_report, &report)?;
     if !session.common.quiet {

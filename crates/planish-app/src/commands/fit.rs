@@ -1,4 +1,4 @@
-//! `planish fit`: mesh and network to a model; or the surfaces of a model anew.
+//! `planish fit`: mesh and network to a model; or the surfaces of a model, and its grids where it has none.
 
 use super::run::{Job, fitted, seam_rows, summary, verdict};
 use super::{Session, commit_report, pipeline_failure};
@@ -6,10 +6,13 @@ use crate::args::Fit;
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::products::Staged;
+use planish::mesh::Adjacency;
 use planish::model::{HistoryEntry, Model};
+use planish::network::diagnose;
 use planish::pipeline::{self, PipelineParams};
 use planish_io::Up;
 use planish_io::report::Report;
+use std::path::Path;
 
 pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
     files::check_extension(&args.output, &["planish"])?;
@@ -52,39 +55,56 @@ fn anew(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
     fitted(session, job, vec![read])
 }
 
-/// A model with the mesh, network and grids of another, and surfaces of its own.
+/// A model with the mesh, network and grids of another, and surfaces of its own; with grids of its own, if there are none.
 fn refit(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
     if args.network.is_some() {
         return Err(Failure::usage("--network", "does not go with a model, which has its own")
             .hint("fit its mesh: `planish export MODEL.planish --surface mesh -o MESH.ply`"));
     }
-    // Options that cannot be are told before the file is read.
-    args.stages.params_over(PipelineParams::default(), session.common.seed)?;
     let (mut model, read) = session.step("read", || files::model(&args.input))?;
-    if model.grids.is_empty() {
-        return Err(Failure::input(&args.input, "has no grids to fit surfaces to").hint("fit its mesh"));
-    }
+    let gridded = !model.grids.is_empty();
     let stored = match model.params.as_str() {
         "" => PipelineParams::default(),
         json => serde_json::from_str(json).map_err(|e| {
             Failure::input(&args.input, format!("has parameters of another version ({e})")).hint("fit its mesh")
         })?,
     };
-    let params = args.stages.params_over(stored, session.common.seed)?;
+    let params = args.stages.params_over(stored, gridded, session.common.seed)?;
+    if !gridded {
+        finished(&args.input, &model)?;
+    }
     if let Some(units) = session.common.units {
         model.units = units.into();
     }
     let mut report = Report::new("fit", files::model_facts(&args.input, &model, model.units));
     let wrong = |e| pipeline_failure(&args.input, None, e);
-    let fitted = pipeline::refit(&mut model, &params, &session.bars).map_err(wrong)?;
-    let found = pipeline::assess(&model, &session.bars).map_err(wrong)?;
     report.stages = vec![read];
-    report.stages.extend(fitted);
+    let found = if gridded {
+        report.stages.extend(pipeline::refit(&mut model, &params, &session.bars).map_err(wrong)?);
+        pipeline::assess(&model, &session.bars).map_err(wrong)?
+    } else {
+        pipeline::rework(&mut model, &params, &session.bars).map_err(wrong)?
+    };
     report.stages.extend(found.stages);
     report.quality = found.quality;
     report.warnings = found.warnings;
     report.seams = seam_rows(&model, &found.seams);
     model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
-    model.history.push(HistoryEntry { command: "refit".into(), parameters: model.params.clone() });
+    let command = if gridded { "refit" } else { "fit" };
+    model.history.push(HistoryEntry { command: command.into(), parameters: model.params.clone() });
     Ok((report, model))
+}
+
+/// Refuses a model whose network does not part the mesh into four-sided patches.
+fn finished(path: &Path, model: &Model) -> Result<(), Failure> {
+    let left = diagnose(&model.mesh, &Adjacency::new(&model.mesh), &model.network);
+    if left.is_finished() && !model.network.patches.is_empty() {
+        return Ok(());
+    }
+    let what = match left.faults.len() {
+        _ if model.network.curves.is_empty() => "has no network".to_owned(),
+        1 => format!("has an unfinished network: {}", left.faults[0]),
+        n => format!("has an unfinished network with {n} things to put right"),
+    };
+    Err(Failure::input(path, what).hint("`planish info` tells what is left to do with `planish edit`"))
 }

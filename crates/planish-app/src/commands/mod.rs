@@ -19,8 +19,9 @@ use crate::files;
 use crate::outputs;
 use crate::products::Staged;
 use crate::progress::{self, Bars};
-use planish::model::Units;
-use planish::pipeline::{PipelineError, StageRecord};
+use planish::model::{Model, Units};
+use planish::pipeline::{Figure, PipelineError, Quality, StageRecord};
+use planish_io::WriteError;
 use planish_io::report::Report;
 use std::io::Write;
 use std::path::Path;
@@ -96,6 +97,18 @@ impl Session {
         }
         Ok((result?, record))
     }
+}
+
+/// Writes the displacement maps of a model into `folder`, and tells how near they bring the surfaces to the grids again when
+/// they are read back.
+fn write_relief(folder: &Path, model: &Model, quality: &mut Quality) -> Result<(), WriteError> {
+    planish_io::write_relief(folder, &model.reliefs, model.units)?;
+    let read = planish_io::relief_roundtrip(folder, &model.surfaces, &model.grids);
+    let away = read.map_err(|e| WriteError::Image(format!("the maps do not read back: {e}")))?;
+    let diagonal = model.mesh.bounds().diagonal();
+    quality.insert("relief.roundtrip_max".into(), Figure::Number(away));
+    quality.insert("relief.roundtrip_max_rel".into(), Figure::Number(away / diagonal));
+    Ok(())
 }
 
 /// Writes the report into its staged file and moves it to its place.

@@ -1,6 +1,6 @@
 //! `planish run`: everything, from a mesh to all products.
 
-use super::{Session, commit_report, pipeline_failure, write_text};
+use super::{Session, commit_report, pipeline_failure, write_relief, write_text};
 use crate::args::Run;
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -31,6 +31,7 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
         extra = Some(facts);
         (mesh, Some(tags))
     } else {
+        args.holes.refuse("close the holes of a mesh with `planish mesh` first")?;
         let (tagged, read) = session.step("read", || files::tagged_mesh(&args.input))?;
         before.push(read);
         tagged
@@ -163,7 +164,7 @@ pub fn produce(session: &Session, job: Job, staged: Staged, before: Vec<StageRec
     let (mut report, model) = fitted(session, job, before)?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let options = WriteOptions { units: model.units, up, name };
-    let ((), write) = session.step("write", || write_products(&staged, output, &model, &options))?;
+    let ((), write) = session.step("write", || write_products(&staged, output, &model, &options, &mut report))?;
     let (pictures, draw) = session.step("pictures", || pictures::pictures(&model, raw.as_ref(), &report, up))?;
     report.stages.extend([write, draw]);
     write_text(&staged.path("report.json"), &report.to_json())?;
@@ -312,7 +313,13 @@ pub fn seam_rows(model: &Model, seams: &[planish::surface::SeamQuality]) -> Vec<
         .collect()
 }
 
-fn write_products(staged: &Staged, output: &Path, model: &Model, options: &WriteOptions) -> Result<(), Failure> {
+fn write_products(
+    staged: &Staged,
+    output: &Path,
+    model: &Model,
+    options: &WriteOptions,
+    report: &mut Report,
+) -> Result<(), Failure> {
     let wrong = |name: &str, e: &dyn std::fmt::Display| Failure::usage(output.join(name), e);
     let mesh = |name: &str, mesh: &TriMesh| {
         planish_io::write_mesh(staged.path(name), mesh, options).map_err(|e| wrong(name, &e))
@@ -327,6 +334,6 @@ fn write_products(staged: &Staged, output: &Path, model: &Model, options: &Write
     mesh("mesh.ply", &model.mesh)?;
     planish_io::write_model(staged.path("model.planish"), model).map_err(|e| wrong("model.planish", &e))?;
     planish_io::write_step(staged.path("surface.step"), &step).map_err(|e| wrong("surface.step", &e))?;
-    planish_io::write_relief(staged.path("relief"), &model.reliefs, model.units).map_err(|e| wrong("relief", &e))?;
+    write_relief(&staged.path("relief"), model, &mut report.quality).map_err(|e| wrong("relief", &e))?;
     mesh("preview.glb", &pipeline::displaced_mesh(model).map_err(Failure::fault)?)
 }

@@ -92,7 +92,11 @@ const FIGURES: [(&str, &str, Reading); 23] = [
     ("seam.angle_rms_deg", "Angle across smooth seams, root mean square", Reading::Degrees),
     ("relief.texels", "Texels of all displacement maps", Reading::Plain),
     ("relief.max", "Largest displacement", Reading::Length),
-    ("relief.roundtrip_max", "Surface plus displacement against the grid, largest", Reading::Length),
+    (
+        "relief.roundtrip_max",
+        "Surface plus displacement, read back from the files, to the grid, largest",
+        Reading::Length,
+    ),
 ];
 
 #[derive(Clone, Copy, PartialEq)]

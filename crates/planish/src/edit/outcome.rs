@@ -2,7 +2,7 @@
 
 use crate::curve::Relaxed;
 use crate::model::Drawing;
-use crate::network::Fault;
+use crate::network::{Curve, Fault};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
@@ -23,7 +23,7 @@ pub struct Made {
     pub changed: bool,
     /// Corners that are new or have moved.
     pub corners: Vec<u32>,
-    /// Curves that are new or have another course.
+    /// Curves that are new or have another course or another seam.
     pub curves: Vec<u32>,
     /// Feature curves that are new.
     pub features: Vec<u32>,
@@ -41,8 +41,10 @@ impl Made {
             (0..now.len()).filter(|&k| !old.contains(&now[k])).map(|k| k as u32).collect()
         };
         let corners = |d: &Drawing| d.network.corners.iter().map(|c| vec![bits(&c.place)]).collect::<Vec<_>>();
-        let curves =
-            |d: &Drawing| d.network.curves.iter().map(|c| c.points.iter().map(bits).collect()).collect::<Vec<_>>();
+        let curves = |d: &Drawing| {
+            let one = |c: &Curve| c.points.iter().map(bits).chain([(c.kind as u32, [0; 3])]).collect();
+            d.network.curves.iter().map(one).collect::<Vec<_>>()
+        };
         let features =
             |d: &Drawing| d.sketch.features.iter().map(|f| f.points.iter().map(bits).collect()).collect::<Vec<_>>();
         let old = |list: Vec<Vec<_>>| list.into_iter().collect::<BTreeSet<_>>();

@@ -11,9 +11,7 @@ use super::corner::{Plane, Planes, end_derivatives, end_weights};
 use super::fit::Direction;
 use super::fold::MeanNormals;
 use super::sides::place;
-use super::{Jet, Surface};
 use crate::linalg::{Banded, BandedCholesky};
-use crate::network::Network;
 use glam::DVec3;
 
 /// Cosine above which the two planes beside a feature count as one: their own line of intersection would be no
