@@ -1,8 +1,11 @@
 //! What the user can say: commands in the order of the pipeline, and their options.
 
+pub mod groups;
+
+pub use groups::{Common, HoleArgs, Policy, ScanArgs};
+
 use crate::failure::Failure;
 use crate::options::{StageOptions, StageParams};
-use crate::outputs::Policy;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use planish::cloud::{CleanParams, ProjectParams};
 use planish::contour::ContourParams;
@@ -10,7 +13,6 @@ use planish::field;
 use planish::grid::GridParams;
 use planish::layout::LayoutParams;
 use planish::mesh::{DecimateParams, SmoothParams};
-use planish::model::Units;
 use planish::pipeline::PipelineParams;
 use planish::surface::{FitParams, StitchParams};
 use planish_io::Up;
@@ -63,70 +65,6 @@ pub enum Command {
     Compare(Compare),
     /// What is in a file, and what is wrong with it
     Info(Info),
-}
-
-/// Options of every command.
-#[derive(Args, Clone, Debug)]
-#[command(next_help_heading = "Common options")]
-pub struct Common {
-    /// Write the report to FILE.json
-    #[arg(long, value_name = "FILE.json")]
-    pub report: Option<PathBuf>,
-    /// Number of threads; the result does not depend on it [default: all cores]
-    #[arg(long, value_name = "N")]
-    pub threads: Option<NonZeroUsize>,
-    /// Seed of everything random
-    #[arg(long, value_name = "N")]
-    pub seed: Option<u64>,
-    /// What one unit of the input is; carried into every export [default: the file's own, else mm]
-    #[arg(long)]
-    pub units: Option<UnitsWord>,
-    /// Replace files that planish did not write, too
-    #[arg(long)]
-    pub force: bool,
-    /// Replace no file that is there
-    #[arg(long, conflicts_with = "force")]
-    pub no_clobber: bool,
-    /// Allow the output to take the place of the input
-    #[arg(long)]
-    pub in_place: bool,
-    /// Write nothing but errors
-    #[arg(short, long)]
-    pub quiet: bool,
-    /// Tell each stage with its time
-    #[arg(short, long, conflicts_with = "quiet")]
-    pub verbose: bool,
-}
-
-impl Common {
-    /// What may happen to files that are there.
-    pub fn policy(&self) -> Policy {
-        Policy { force: self.force, no_clobber: self.no_clobber, in_place: self.in_place }
-    }
-}
-
-/// A unit of length by its symbol.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum UnitsWord {
-    /// Millimetres
-    Mm,
-    /// Centimetres
-    Cm,
-    /// Metres
-    M,
-    /// Inches
-    In,
-}
-
-impl From<UnitsWord> for Units {
-    fn from(word: UnitsWord) -> Units {
-        match word {
-            UnitsWord::Mm => Units::Mm,
-            UnitsWord::Cm => Units::Cm,
-            UnitsWord::M => Units::M,
-            UnitsWord::In => Units::In,
-        }
-    }
 }
 
 /// An axis that points up.
@@ -183,44 +121,6 @@ pub struct Run {
     pub common: Common,
     #[command(flatten)]
     pub stages: AllStages,
-}
-
-/// How a scan is read.
-#[derive(Args, Clone, Debug, Default)]
-pub struct ScanArgs {
-    /// Columns of a text scan: letters (xyzirgb, n for a normal, _ skips) or names parted by commas
-    #[arg(long, value_name = "NAMES")]
-    pub columns: Option<String>,
-    /// Classes of a LAS scan that are kept, e.g. 2,6
-    #[arg(long, value_name = "N", value_delimiter = ',')]
-    pub classes: Vec<u8>,
-}
-
-/// Holes of a scan.
-#[derive(Args, Clone, Debug, Default)]
-pub struct HoleArgs {
-    /// Leave all holes of a scan open, also those that only noise and shadows made
-    #[arg(long, conflicts_with = "close")]
-    pub open: bool,
-    /// Close all holes of a scan [default: all of a closed shape, the small ones of an open one]
-    #[arg(long)]
-    pub close: bool,
-}
-
-impl HoleArgs {
-    /// What the user decided.
-    pub fn choice(&self) -> Option<bool> {
-        if self.open || self.close { Some(self.close) } else { None }
-    }
-
-    /// Refuses the options for an input that is no scan.
-    /// # Errors
-    /// If one of them is given.
-    pub fn refuse(&self, hint: &'static str) -> Result<(), Failure> {
-        let Some(close) = self.choice() else { return Ok(()) };
-        let flag = if close { "--close" } else { "--open" };
-        Err(Failure::usage(flag, "is for holes of a scan, and the input is none").hint(hint))
-    }
 }
 
 /// `planish clean`

@@ -6,7 +6,7 @@
 //! of two options of one name one would do nothing. A field that is one of several
 //! things (`resolution`: a tolerance or control points) becomes one flag for each, of which one may be given.
 
-use crate::args::{Common, HoleArgs, ScanArgs};
+use crate::args::groups::{Common, HoleArgs, ScanArgs};
 use crate::failure::Failure;
 use clap::builder::{PossibleValuesParser, ValueParser};
 use clap::error::ErrorKind;

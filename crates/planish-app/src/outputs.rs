@@ -4,7 +4,7 @@
 //! A file bears the mark of the program if its head or its tail names it; every writer leaves that mark. What does not
 //! bear it belongs to somebody else.
 
-use crate::args::{Command, Common};
+use crate::args::{Command, Common, Policy};
 use crate::failure::Failure;
 use std::fs;
 use std::io::{Read, Seek, SeekFrom};
@@ -20,17 +20,6 @@ pub const RELIEF: &str = "relief";
 
 /// Bytes at either end of a file in which the mark is looked for: headers of all formats, and the XML at the end of an E57.
 const MARKED: u64 = 1 << 16;
-
-/// What may happen to files that are there.
-#[derive(Clone, Copy, Debug)]
-pub struct Policy {
-    /// Replace also what this program did not write.
-    pub force: bool,
-    /// Replace nothing.
-    pub no_clobber: bool,
-    /// An output may be the input.
-    pub in_place: bool,
-}
 
 /// Checks the files of a command that are known before its work.
 /// # Errors

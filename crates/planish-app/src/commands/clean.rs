@@ -1,10 +1,10 @@
 //! `planish clean`: a scan to denoised, oriented points with flags.
 
 use super::{Session, commit_report};
-use crate::args::Clean;
+use crate::args::{Clean, Policy};
 use crate::failure::{Failure, Status};
 use crate::files;
-use crate::outputs::{self, Policy};
+use crate::outputs;
 use crate::products::Staged;
 use crate::progress;
 use crate::summary::Summary;
