@@ -33,6 +33,7 @@ pub mod pipeline;
 pub mod relief;
 pub mod render;
 pub mod surface;
+pub mod synthetic;
 
 pub use glam::{DVec2, DVec3};
 pub use model::{HistoryEntry, Model, Units, UnknownUnit};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms and the floor each stands on; a room may use its own and lower floors. The ground floor also speaks of
 /// meshes in its queries, and those are plain types.
-const FLOORS: [(&str, u32); 16] = [
+const FLOORS: [(&str, u32); 17] = [
     ("observe", 0),
     ("linalg", 0),
     ("geom", 1),
@@ -13,6 +13,7 @@ const FLOORS: [(&str, u32); 16] = [
     ("cloud", 2),
     ("field", 3),
     ("contour", 4),
+    ("synthetic", 5),
     ("curve", 5),
     ("network", 6),
     ("grid", 7),

@@ -34,7 +34,7 @@ pub use adjacency::{Adjacency, Fan, NONE, next, previous};
 pub(crate) use bent::split_bent;
 pub use broken_lines::mend_lines;
 pub(crate) use broken_lines::{bridge_gaps, cut_spikes};
-pub use compare::{CompareError, CompareParams, Comparison, compare};
+pub use compare::{CompareError, CompareParams, Comparison, compare, compare_samples};
 pub use decimate::{DecimateError, DecimateParams, DecimateTarget, Decimated, decimate};
 pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
 pub use face_point::FacePoint;
