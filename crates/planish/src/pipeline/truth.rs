@@ -158,7 +158,9 @@ pub fn truth_figures(
             figures.insert(format!("truth.{name}_{what}_rel"), Figure::Number(world / found.diagonal));
         }
         figures.insert(format!("truth.{name}_normal_deg"), Figure::Number(found.normal_deg.mean));
-        figures.insert(format!("truth.{name}_zone_deg"), Figure::Number(zone(truth, &samples).normal_deg));
+        if name == "mesh" {
+            figures.insert("truth.mesh_zone_deg".into(), Figure::Number(zone(truth, &samples).normal_deg));
+        }
     }
     figures.insert("truth.mesh_topology".into(), Figure::Flag(same_topology(truth, meshed)));
     let edges = edges_found(truth, model, within);

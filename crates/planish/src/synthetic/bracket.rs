@@ -120,3 +120,40 @@ impl Bracket {
         ])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Adjacency, diagnose, next, self_intersections, sharp_edges};
+    use std::f64::consts::{PI, SQRT_2};
+
+    impl Bracket {
+        /// Length of all edges but the round one.
+        fn edges(&self) -> f64 {
+            let Bracket { length, height, width, thickness, round, chamfer, gusset, gusset_thickness, hole, .. } =
+                *self;
+            let across = 2.0 * width + 2.0 * (width - 2.0 * chamfer) + width - gusset_thickness;
+            let outline = (length - round) + thickness + (length - thickness) + PI / 2.0 * round;
+            let upright = (height - chamfer - thickness) + (height - chamfer - round);
+            let chamfers = 4.0 * (chamfer * SQRT_2 + thickness);
+            let gusset = 2.0 * (gusset * SQRT_2 + 2.0 * gusset) + 2.0 * gusset_thickness;
+            across + 2.0 * (outline + upright) + chamfers + gusset + 16.0 * PI * hole
+        }
+    }
+
+    #[test]
+    fn sharp_edges_of_a_bracket_have_their_length_within_a_thousandth_and_its_genus_is_4() {
+        for seed in 0..3 {
+            let mesh = bracket(seed, 120).unwrap();
+            let sharp = sharp_edges(&mesh, &Adjacency::new(&mesh), 40.0);
+            let at = |h: usize| mesh.points[mesh.origin(h as u32) as usize];
+            let ends = (0..sharp.len()).filter(|&h| sharp[h]).map(|h| at(h).distance(at(next(h as u32) as usize)));
+            let (length, wanted) = (ends.sum::<f64>() / 2.0, Bracket::new(seed).edges());
+            assert!((length / wanted - 1.0).abs() < 1e-3, "{length} for {wanted}");
+            let facts = diagnose(&mesh);
+            assert!(facts.watertight && facts.manifold && facts.components == 1);
+            assert_eq!(facts.genus, Some(4));
+            assert!(self_intersections(&mesh).is_empty());
+        }
+    }
+}

@@ -100,3 +100,40 @@ fn plate(size: DVec2, corner: f64, from: f64, to: f64) -> Solid {
 fn upright(radius: f64, from: f64, to: f64) -> Solid {
     Solid::Cylinder { radius, height: to - from }.moved(DVec3::Z * (from + to) / 2.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Adjacency, diagnose, next, self_intersections, sharp_edges};
+    use std::f64::consts::TAU;
+
+    /// Length of all edges: rims of flange, housing and cavity, circles of boss, bore, holes and window, and the top
+    /// edges of the ribs up to their fillets.
+    fn edges(seed: u64) -> f64 {
+        let own = |counter: u64, usual: f64| dimension(seed, counter, usual, SPREAD);
+        let around = |x: f64, y: f64, corner: f64| 2.0 * (x + y) - (8.0 - TAU) * corner;
+        let (housing, wall, inner) = ([own(2, HOUSING[0]), own(3, HOUSING[1])], own(6, WALL), own(14, INNER));
+        let inside = housing.map(|side| side - 2.0 * wall);
+        let flange = 2.0 * around(own(0, FLANGE[0]), own(1, FLANGE[1]), own(7, FLANGE_CORNER));
+        let rims = around(housing[0], housing[1], HOUSING_CORNER) + around(inside[0], inside[1], own(9, CAVITY));
+        let round = own(10, BOSS) + 2.0 * own(15, BORE) + 8.0 * own(16, HOLE) + 2.0 * own(17, WINDOW);
+        let at_boss = ((own(10, BOSS) + inner).powi(2) - (own(12, RIB) / 2.0).powi(2)).sqrt();
+        flange + rims + TAU * round + 4.0 * (inside[0] / 2.0 - inner - at_boss)
+    }
+
+    #[test]
+    fn sharp_edges_of_a_casting_have_their_length_within_a_hundredth_and_its_genus_is_6() {
+        for seed in 0..3 {
+            let mesh = casting(seed, 150).unwrap();
+            let sharp = sharp_edges(&mesh, &Adjacency::new(&mesh), 40.0);
+            let at = |h: usize| mesh.points[mesh.origin(h as u32) as usize];
+            let ends = (0..sharp.len()).filter(|&h| sharp[h]).map(|h| at(h).distance(at(next(h as u32) as usize)));
+            let (length, wanted) = (ends.sum::<f64>() / 2.0, edges(seed));
+            assert!((length / wanted - 1.0).abs() < 1e-2, "{length} for {wanted}");
+            let facts = diagnose(&mesh);
+            assert!(facts.watertight && facts.manifold && facts.components == 1);
+            assert_eq!(facts.genus, Some(6));
+            assert!(self_intersections(&mesh).is_empty());
+        }
+    }
+}
