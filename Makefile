@@ -4,6 +4,7 @@
 #   make test    all tests: the library, the program, and files read back by other programs' libraries
 #   make lint    formatting and clippy, warnings are errors
 #   make bench   time every stage: bench/runs/<date>-<machine>.json
+#   make figures headline figures of parts and measured meshes: bench/runs/<date>-<machine>-figures.json
 #   make docs    reference of the libraries, and the pictures of the guide from the demo
 #
 # One cargo profile (release) for everything: a second one would build every dependency twice.
@@ -15,7 +16,7 @@ PYTHON  := .venv/bin/python
 DATA    := $(or $(PLANISH_DATA),../shared/data)
 
 .NOTPARALLEL:
-.PHONY: build demo test test-rust test-readers lint bench docs clean
+.PHONY: build demo test test-rust test-readers lint bench figures docs clean
 .DELETE_ON_ERROR:
 
 build: .stamp/packages
@@ -43,6 +44,11 @@ lint: .stamp/packages
 
 bench: .stamp/packages
 	$(CARGO) bench --profile release --locked --workspace --bench pipeline
+
+# FIGURES: shapes, noises in percent and seeds, such as "fandisk.ply,casting 0.1,0.25 1,2,3"; all of them take half an hour.
+figures: .stamp/packages
+	@test -d "$(DATA)" || echo "skipped: the measured meshes; there is no $(DATA), and PLANISH_DATA names none"
+	$(CARGO) bench --profile release --locked --workspace --bench figures -- $(FIGURES)
 
 docs: build
 	$(CARGO) doc --release --locked --no-deps -p planish -p planish-io

@@ -15,15 +15,15 @@ GOLDEN = pathlib.Path(__file__).parent / "golden"
 CASES = {"box": (meshes.box, ["--patches", 6]), "ball": (meshes.ball, ["--patches", 24])}
 
 # How far a figure may be from the kept one: (relative, absolute). Counts of the mesh are exact; what rests on the
-# automatic network may move with it; distances may halve or double; rounding errors only have a ceiling.
-EXACT, SHAPE, DISTANCE, ROUNDING = (0.0, 0.0), (0.3, 0.02), (1.0, 1e-9), (0.0, 1e-9)
+# automatic network may move with it; distances by a fifth; rounding errors only have a ceiling.
+EXACT, SHAPE, DISTANCE, ROUNDING = (0.0, 0.0), (0.3, 0.02), (0.2, 1e-9), (0.0, 1e-9)
 TOLERANCES = {
     "mesh.": EXACT,
     "grid.folds": EXACT,
     "patches.": (0.4, 4),
     "seam.count": (0.4, 8),
     "seam.gap_max": ROUNDING,
-    "seam.angle": (1.0, 0.05),
+    "seam.angle": (0.2, 0.02),
     "relief.rounding_max": ROUNDING,
     "relief.max": DISTANCE,
     "surface.control_points": (0.5, 0),
@@ -58,8 +58,7 @@ def test_figures_are_the_kept_ones_within_their_tolerances(tmp_path, name):
         relative, absolute = tolerance(key)
         got = found["quality"][key]
         assert isinstance(got, bool) == isinstance(want, bool), key
-        # Symmetric: twice as much is as far as half as much.
-        room = absolute + relative * min(abs(got), abs(want)) if relative >= 1 else absolute + relative * abs(want)
+        room = absolute + relative * abs(want)
         if abs(got - want) > room:
             wrong.append(f"{key}: {got}, kept {want}, room {room}")
     assert not wrong, "\n".join(wrong)

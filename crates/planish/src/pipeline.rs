@@ -11,7 +11,7 @@ mod truth;
 pub use quality::{SEAM_ANGLE_WARNING_DEG, displaced_mesh, span_count, surface_mesh, surface_mesh_cut, worst_seams};
 pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
 pub use scan::{ScanError, ScanMeshed, ScanParams, mesh_scan, params_for, sample_figures, scan_figures, voxel_for};
-pub use truth::{EdgesFound, edges_found, truth_figures};
+pub use truth::{EdgesFound, Zone, edge_reach, edges_found, truth_figures, zone};
 
 use crate::grid::{self, FeatureError, Grid, GridError, GridParams};
 use crate::layout::{self, LayoutError, LayoutParams};

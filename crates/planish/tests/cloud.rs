@@ -350,7 +350,7 @@ fn holed_sheet(radius: f64) -> Vec<DVec3> {
 }
 
 #[test]
-fn small_holes_of_an_open_sheet_are_closed_within_a_hundredth_and_stay_when_asked_for() {
+fn small_holes_of_an_open_sheet_are_closed_within_2_thousandths_and_stay_when_asked_for() {
     // Eleven spacings wide, with their rims 8 % of the diagonal around.
     let points = holed_sheet(0.025);
     let made = scanned(points.clone(), None);
@@ -359,7 +359,7 @@ fn small_holes_of_an_open_sheet_are_closed_within_a_hundredth_and_stay_when_aske
     assert!(!made.closed && facts.manifold, "{facts:?}");
     assert_eq!((facts.components, facts.boundary_loops), (1, 1), "{} lids", made.lids);
     let off = mesh.points.iter().map(|p| (p.z - 0.1 * (4.0 * p.x).sin()).abs()).fold(0.0, f64::max);
-    assert!(off < 0.01, "{off}");
+    assert!(off < 0.002, "{off}");
     assert_eq!(made.meshed.extracted.tags.vertices.len(), mesh.points.len());
     assert_eq!(diagnose(&meshed(points, Some(false))).boundary_loops, 26);
 }
@@ -442,7 +442,7 @@ fn the_field_is_negative_inside_positive_outside_and_unknown_far_away() {
     assert!(field.value(DVec3::X * 2.5).is_nan() && field.value(DVec3::ZERO).is_nan());
     let closed = SampleField::new(&samples, true);
     assert!(closed.value(DVec3::ZERO) < 0.0 && closed.value(DVec3::X * 2.5) > 0.0);
-    assert!((field.value(DVec3::Y * 1.01) - 0.01).abs() < 2e-3);
+    assert!((field.value(DVec3::Y * 1.01) - 0.01).abs() < 5e-4);
     assert!(field.gradient(DVec3::Y).dot(DVec3::Y) > 0.999);
 }
 

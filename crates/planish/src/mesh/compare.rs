@@ -90,6 +90,17 @@ pub struct Comparison {
     pub flipped_share: f64,
 }
 
+/// A place of one surface against the closest of the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// The place, world units.
+    pub place: DVec3,
+    /// Distance to the closest place of the other surface, world units.
+    pub distance: f64,
+    /// Angle between the normals there, degrees.
+    pub angle_deg: f64,
+}
+
 /// Samples between two looks at the observer.
 const CHUNK: usize = 1 << 14;
 
@@ -102,6 +113,18 @@ pub fn compare(
     params: &CompareParams,
     observer: &dyn Observer,
 ) -> Result<Comparison, CompareError> {
+    Ok(compare_samples(a, b, params, observer)?.0)
+}
+
+/// As [`compare`], with the samples: first those of `a`, then those of `b`.
+/// # Errors
+/// As [`compare`].
+pub fn compare_samples(
+    a: &TriMesh,
+    b: &TriMesh,
+    params: &CompareParams,
+    observer: &dyn Observer,
+) -> Result<(Comparison, Vec<Sample>), CompareError> {
     if params.samples == 0 {
         return Err(CompareError::NoSamples);
     }
@@ -110,20 +133,19 @@ pub fn compare(
     }
     let (a, b) = (Side::new(a, 'a')?, Side::new(b, 'b')?);
     let diagonal = Aabb::of(&a.mesh.points).diagonal();
-    let ab = measure(&a, &b, params, 0, observer)?;
-    let ba = measure(&b, &a, params, 1, observer)?;
+    let mut samples = measure(&a, &b, params, 0, observer)?;
+    samples.extend(measure(&b, &a, params, 1, observer)?);
     observer.progress(1.0);
 
-    let spread_of = |part: fn(&(f64, f64)) -> f64, sides: &[&[(f64, f64)]]| {
-        spread(sides.iter().flat_map(|s| s.iter().map(part)).collect())
-    };
-    let both = spread_of(|s| s.0, &[&ab, &ba]);
-    let flipped = ab.iter().chain(&ba).filter(|s| s.1 > 90.0).count();
-    Ok(Comparison {
+    let (ab, ba) = samples.split_at(params.samples);
+    let distances = |samples: &[Sample]| spread(samples.iter().map(|s| s.distance).collect());
+    let both = distances(&samples);
+    let flipped = samples.iter().filter(|s| s.angle_deg > 90.0).count();
+    let comparison = Comparison {
         diagonal,
         samples: params.samples,
-        a_to_b: spread_of(|s| s.0, &[&ab]),
-        b_to_a: spread_of(|s| s.0, &[&ba]),
+        a_to_b: distances(ab),
+        b_to_a: distances(ba),
         both,
         both_rel: Spread {
             mean: both.mean / diagonal,
@@ -131,9 +153,10 @@ pub fn compare(
             p95: both.p95 / diagonal,
             max: both.max / diagonal,
         },
-        normal_deg: spread_of(|s| s.1, &[&ab, &ba]),
-        flipped_share: flipped as f64 / (ab.len() + ba.len()) as f64,
-    })
+        normal_deg: spread(samples.iter().map(|s| s.angle_deg).collect()),
+        flipped_share: flipped as f64 / samples.len() as f64,
+    };
+    Ok((comparison, samples))
 }
 
 /// One of the two surfaces: its triangles of some area, their summed areas, and the tree.
@@ -190,14 +213,14 @@ impl Side {
     }
 }
 
-/// Distance and normal angle (degrees) of samples of `from` against `to`.
+/// Samples of `from` against `to`.
 fn measure(
     from: &Side,
     to: &Side,
     params: &CompareParams,
     pass: u64,
     observer: &dyn Observer,
-) -> Result<Vec<(f64, f64)>, CompareError> {
+) -> Result<Vec<Sample>, CompareError> {
     // The two directions draw from different streams.
     let seed = random::bits(params.seed, pass);
     let mut result = Vec::with_capacity(params.samples);
@@ -208,10 +231,10 @@ fn measure(
         observer.progress((pass as f64 + result.len() as f64 / params.samples as f64) / 2.0);
         let range = result.len()..(result.len() + CHUNK).min(params.samples);
         result.par_extend(range.into_par_iter().map(|n| {
-            let (p, m) = from.sample(seed, n as u64, params.samples);
-            let hit = to.bvh.closest(p);
+            let (place, m) = from.sample(seed, n as u64, params.samples);
+            let hit = to.bvh.closest(place);
             let n = to.mesh.normal(hit.place.face as usize);
-            (hit.distance, m.cross(n).length().atan2(m.dot(n)).to_degrees())
+            Sample { place, distance: hit.distance, angle_deg: m.cross(n).length().atan2(m.dot(n)).to_degrees() }
         }));
     }
     Ok(result)

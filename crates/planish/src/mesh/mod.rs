@@ -15,7 +15,7 @@ mod tags;
 mod walk;
 
 pub use adjacency::{Adjacency, Fan, NONE, next, previous};
-pub use compare::{CompareError, CompareParams, Comparison, compare};
+pub use compare::{CompareError, CompareParams, Comparison, compare, compare_samples};
 pub use decimate::{DecimateError, DecimateParams, DecimateTarget, Decimated, decimate};
 pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
 pub use face_point::FacePoint;

@@ -3,7 +3,8 @@
 use super::record::Figure;
 use super::{PipelineError, Quality, quality};
 use crate::geom::KdTree;
-use crate::mesh::{Adjacency, CompareParams, TriMesh, compare, next, sharp_edges};
+use crate::mesh::compare::Sample;
+use crate::mesh::{Adjacency, CompareParams, TriMesh, compare_samples, diagnose, next, sharp_edges};
 use crate::model::Model;
 use crate::network::CurveKind;
 use crate::observe::Observer;
@@ -18,6 +19,12 @@ const BENT_DEG: f64 = 15.0;
 pub const ANGLE_DEG: f64 = 3.0;
 /// Edges of the truth are asked at steps of this share of the diagonal: finer than any distance that is judged.
 const STEP: f64 = 5e-4;
+
+/// The zone of the sharp edges: within this share of the diagonal.
+const ZONE: f64 = 0.01;
+/// An edge has its seam within this share of the diagonal, where noise is less than [`FAINT`] of it and where it is more.
+const WITHIN: [f64; 2] = [1e-3, 2e-3];
+const FAINT: f64 = 1.5e-3;
 
 /// What became of the sharp edges of a truth.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -85,6 +92,50 @@ pub fn edges_found(truth: &TriMesh, model: &Model, within: f64) -> EdgesFound {
     EdgesFound { length, found: share(found, length), met: share(met, length), false_share: share(astray, all) }
 }
 
+/// The distance at which a seam counts as that of an edge when builds are compared, world units: of a true shape and the
+/// noise of its scan, not of what a build takes for the noise.
+/// * `noise` - standard deviation of the points, share of the diagonal
+pub fn edge_reach(truth: &TriMesh, noise: f64) -> f64 {
+    WITHIN[usize::from(noise > FAINT)] * truth.bounds().diagonal()
+}
+
+/// How near a result is to its truth around the sharp edges.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Zone {
+    /// Root mean square of the distances both ways, world units.
+    pub rms: f64,
+    /// Mean angle between the normals, degrees.
+    pub normal_deg: f64,
+}
+
+/// Of samples of a truth and a result against each other those within a hundredth of the diagonal of a true edge.
+pub fn zone(truth: &TriMesh, samples: &[Sample]) -> Zone {
+    let diagonal = truth.bounds().diagonal();
+    let edges: Vec<DVec3> = edge_places(truth, SHARP_DEG, STEP * diagonal).iter().map(|p| p.0).collect();
+    let edges = KdTree::new(&edges);
+    let mut near = Vec::new();
+    let (mut squares, mut angles, mut count) = (0.0, 0.0, 0);
+    for s in samples {
+        edges.nearest_within(s.place, 1, ZONE * diagonal, &mut near);
+        if !near.is_empty() {
+            squares += s.distance * s.distance;
+            angles += s.angle_deg;
+            count += 1;
+        }
+    }
+    let n = count.max(1) as f64;
+    Zone { rms: (squares / n).sqrt(), normal_deg: angles / n }
+}
+
+/// Closed, manifold, of as many pieces and handles as the truth.
+fn same_topology(truth: &TriMesh, made: &TriMesh) -> bool {
+    let (truth, made) = (diagnose(truth), diagnose(made));
+    made.watertight == truth.watertight
+        && made.manifold
+        && made.components == truth.components
+        && made.genus == truth.genus
+}
+
 /// Figures of a mesh and the model made of it against the truth.
 /// * `within` - distance at which a seam counts as that of an edge, world units
 /// # Errors
@@ -101,13 +152,17 @@ pub fn truth_figures(
     let base = quality::surface_mesh(model)?;
     let params = CompareParams::default();
     for (name, mesh) in [("mesh", meshed), ("surface", &base), ("displaced", &displaced)] {
-        let found = compare(truth, mesh, &params, observer)?;
+        let (found, samples) = compare_samples(truth, mesh, &params, observer)?;
         for (what, world) in [("rms", found.both.rms), ("p95", found.both.p95), ("max", found.both.max)] {
             figures.insert(format!("truth.{name}_{what}"), Figure::Number(world));
             figures.insert(format!("truth.{name}_{what}_rel"), Figure::Number(world / found.diagonal));
         }
         figures.insert(format!("truth.{name}_normal_deg"), Figure::Number(found.normal_deg.mean));
+        if name == "mesh" {
+            figures.insert("truth.mesh_zone_deg".into(), Figure::Number(zone(truth, &samples).normal_deg));
+        }
     }
+    figures.insert("truth.mesh_topology".into(), Figure::Flag(same_topology(truth, meshed)));
     let edges = edges_found(truth, model, within);
     let shares = [
         ("truth.sharp_length", edges.length),
