@@ -5,7 +5,8 @@
 //! `B_u^T P B_v`; everything after that has the size of the control net.
 //!
 //! Departs from [K98]: the outer rings of control points can be given (exact seams), then the others are the
-//! least-squares solution for those.
+//! least-squares solution for those; and the bends of the control net may have a weight, against which §4.2.1 argues: scans are
+//! noisy and relief is kept in maps (`docs/methods/surfaces.md`).
 
 use super::basis::{BasisRows, uniform_knots, uniform_parameters};
 use super::{FitError, Surface};
@@ -22,8 +23,8 @@ const BLOCK: usize = 128;
 
 /// Fits a clamped uniform bicubic B-spline to a grid of points.
 ///
-/// * `points` - `rows * cols` of them, row-major, world units; node `(i, j)` has the parameters
-///   `(i / (cols - 1), j / (rows - 1))`
+/// * `points` - `rows * cols` of them, row-major, world units; node `(i, j)` has the parameters `(i / (cols - 1), j /
+///   (rows - 1))`
 /// * `control` - control points along `v` and along `u`: `[rows, cols]`, each `4..=` the grid's count
 ///
 /// # Errors
