@@ -134,7 +134,7 @@ pub struct Clean {
     /// Also write each segment into a file of its own beside the output
     #[arg(long)]
     pub segment: bool,
-    /// Also write feature lines as polylines
+    /// Also write sharp lines as polylines
     #[arg(long, value_name = "FILE.obj")]
     pub lines: Option<PathBuf>,
     #[command(flatten)]
@@ -150,8 +150,8 @@ pub struct Clean {
 /// `planish mesh`
 #[derive(Args, Debug)]
 pub struct Mesh {
-    /// A scan (see `clean`); a mesh (PLY, OBJ, STL, GLB, glTF), also one with holes and intersections; a script of solids or a milling job
-    /// (.toml); or a volume (.nrrd, .npy)
+    /// A scan (see `clean`); a mesh (PLY, OBJ, STL, GLB, glTF), also one with holes and intersections; a script of
+    /// solids or a milling job (.toml); or a volume (.nrrd, .npy)
     pub input: PathBuf,
     /// The mesh: .ply (with feature tags), .obj, .stl or .glb
     #[arg(short, long, value_name = "FILE")]

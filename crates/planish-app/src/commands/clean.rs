@@ -109,7 +109,7 @@ fn segments(output: &Path, cleaned: &Cleaned) -> Vec<(PathBuf, Cloud)> {
         .collect()
 }
 
-/// Feature lines as polylines of an OBJ file.
+/// Sharp lines as polylines of an OBJ file.
 fn lines_obj(cleaned: &Cleaned) -> String {
     use std::fmt::Write;
     let mut text = format!("# planish {}: feature lines\n", env!("CARGO_PKG_VERSION"));

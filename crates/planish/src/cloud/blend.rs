@@ -2,11 +2,13 @@
 //!
 //! [X03] Xie et al. 2003, §4.2 eq. 4: modified Shepard blend of the local quadrics. Ohtake et al., *Multi-level Partition
 //! of Unity Implicits*, 2003: near edges and corners the blended functions are themselves maxima and minima.
-//! * value: weighted mean of the cells whose support holds the point, those that disagree with it left out by degrees: a
+//! * value: weighted mean of the cells whose support holds the point; those that disagree with it lose weight by degrees, since a
 //!   cell that knows one face of an edge goes on where the face has ended
-//! * gradient: that of the sheets that decide in these cells, the heaviest side of an edge alone
+//! * gradient: mean of the normals that decide in these cells, on the heaviest cell's side of an edge
 //!
-//! Departs from [X03]: one blend over all quadrics rounds every crease by the width of the supports.
+//! Departs from [X03]: one blend over all quadrics rounds every crease by the width of the supports. The price is
+//! that the field is not C1, that the gradient is not the derivative of the value, and that at most 64 cells are
+//! weighed anew (`docs/methods/samples.md`).
 
 use super::Cell;
 use crate::geom::Aabb;

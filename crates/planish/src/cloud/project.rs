@@ -1,7 +1,7 @@
-//! What the cleaning leaves of every point: its place on the surface, normal, curvature, flags; and feature lines.
+//! Every point moved onto the surface, with normal, curvature and flags; sharp lines of the samples.
 //!
-//! METHODS 1.8: outliers are flagged and not deleted; feature lines are the points beside a second sheet, moved to where
-//! both sheets meet, thinned and joined.
+//! [X03] §8.1, eq. 5 and 6 (curvatures); `docs/methods/samples.md`, section 8. Outliers are flagged and not deleted. Sharp lines
+//! are made of the points beside a second sheet, moved to where both sheets meet, thinned and joined.
 
 use super::sites::cover;
 use super::{Blend, Cloud, CloudError, Samples};
@@ -19,7 +19,7 @@ const ASKED: usize = 10;
 const SHARP_DEG: f64 = 30.0;
 /// Points within this many noise levels (and one spacing) of a second sheet are feature points.
 const BESIDE: f64 = 2.0;
-/// Distance of points of a feature line, in spacings.
+/// Distance of points of a sharp line, in spacings.
 const LINE: f64 = 3.0;
 /// Steps to the surface at most.
 const STEPS: usize = 4;
@@ -43,7 +43,7 @@ pub struct Cleaned {
     /// Points on the surface, with `normal`, `curvature` (mean), `gauss`, `irregularity`, `noise`, `segment`, `feature`,
     /// `outlier`, `confidence`, and the attributes of the scan.
     pub cloud: Cloud,
-    /// Feature lines.
+    /// Sharp lines.
     pub lines: Vec<Vec<DVec3>>,
     /// For each point of the scan whether it is an outlier or no number.
     pub strays: Vec<bool>,

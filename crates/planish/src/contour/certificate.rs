@@ -1,5 +1,7 @@
 //! The certificate on random trilinear grids: closed, manifold, free of self-intersections, with the Euler number of the
 //! interpolant.
+//!
+//! See `docs/methods/contour.md`, steps 5 and 6.
 
 use super::cell::topology::Trilinear;
 use super::{ContourParams, Extracted, extract};

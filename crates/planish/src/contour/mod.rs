@@ -242,7 +242,7 @@ pub fn extract(
     let polished =
         polish::polish(&mut mesh, field, base, cells, &wishes, creases, &mut kinds, &mut edges, limits.sharp);
     (counts.moved, counts.kept) = (polished.moved, polished.kept);
-    // Every hit is a vertex, but at the rim of what is known, in larger cells, and where vertices were merged or added.
+    // Every hit is a vertex, but at the boundary of what is known, in larger cells, and where vertices were merged or added.
     let unchanged = mesh.triangles.len() == count && mesh.points.len() == vertices;
     let complete = !field.sides.unknown && octree.is_none() && unchanged;
     let mut extracted = Extracted { mesh, tags: tags(kinds, edges), counts };
@@ -293,7 +293,7 @@ fn hit_positions(field: &Directed) -> Vec<DVec3> {
     points
 }
 
-/// Leaves out vertices that no triangle uses: hits at the rim of what is known.
+/// Leaves out vertices that no triangle uses: hits at the boundary of what is known.
 fn drop_unused(extracted: &mut Extracted) {
     let mesh = &mut extracted.mesh;
     let mut used = vec![false; mesh.points.len()];

@@ -1,4 +1,6 @@
 //! From each kind of source to its mesh in one call: lattice, memory, field, extraction.
+//!
+//! See `docs/methods/fields.md` for the sources.
 
 use super::{ContourError, ContourParams, Extracted, FieldCreases, extract};
 use crate::field::{

@@ -43,7 +43,7 @@ const HIGH: f64 = 0.95;
 const EAGER: f64 = 0.7;
 
 impl Magnet {
-    /// Drawn to the marked half-edges (feature lines, creases).
+    /// Drawn to the marked half-edges (sharp lines, creases).
     pub fn of_lines(mesh: &TriMesh, lines: &[bool]) -> Magnet {
         let mut pull = vec![0.0; mesh.points.len()];
         for h in (0..lines.len() as u32).filter(|&h| lines[h as usize]) {

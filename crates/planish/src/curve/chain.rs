@@ -1,4 +1,6 @@
-//! The surface curve itself.
+//! The surface curve: a chain of face points ([K98] §3.1).
+//!
+//! Departs from [K98]: two neighbours may lie any number of faces apart (`strip` finds the faces between).
 
 use super::CurveError;
 use super::strip::{connect, vertex_of};

@@ -1,9 +1,8 @@
 //! Painting: places picked one after the other become a curve.
 //!
 //! [K98] §3.2: between two picks a greedy chain of vertices, sampled to places and pulled straight towards the
-//! segment in space by CurveAttract.
-//! Departs from [K98]: where the greedy chain runs into a dead end the rest is a shortest chain (A*); a piece may
-//! also be a geodesic, or be drawn to lines or to a scalar.
+//! segment in space by CurveAttract. Departs from [K98]: where the greedy chain runs into a dead end the rest is a
+//! shortest chain (A*); a piece may also be a geodesic, or be drawn to lines or to a scalar.
 
 use super::canvas::{Canvas, Magnet};
 use super::chain::{SurfaceCurve, sample, without_repeats, without_spur};
@@ -22,7 +21,7 @@ pub enum PaintMode {
     Straight,
     /// A shortest way over the surface.
     Geodesic,
-    /// Drawn to feature lines, creases or a scalar.
+    /// Drawn to sharp lines, creases or a scalar.
     Magnetic,
 }
 
@@ -35,7 +34,7 @@ pub struct PaintParams {
     /// Distance of the places of a straight piece.
     #[schemars(range(min = 0.1, max = 100.0), extend("unit" = "mean edge"))]
     pub spacing: f64,
-    /// Picks nearer to a corner, another curve or a feature line than this go onto it; 0 turns that off.
+    /// Picks nearer to a corner, another curve or a sharp line than this go onto it; 0 turns that off.
     #[schemars(range(min = 0.0, max = 0.1), extend("unit" = "diagonal"))]
     pub snap: f64,
 }
@@ -56,7 +55,7 @@ pub enum Snap {
     Corner(u32),
     /// The curve with this number, at this place of its points.
     Curve(u32, u32),
-    /// A vertex of a feature line.
+    /// A vertex of a sharp line.
     Feature(u32),
 }
 
@@ -65,9 +64,9 @@ pub enum Snap {
 pub struct SnapTargets<'a> {
     /// Corners; they win over curves.
     pub corners: &'a [FacePoint],
-    /// Curves; they win over feature lines.
+    /// Curves; they win over sharp lines.
     pub curves: &'a [&'a [FacePoint]],
-    /// For each half-edge whether it is on a feature line; empty for none.
+    /// For each half-edge whether it is on a sharp line; empty for none.
     pub lines: &'a [bool],
 }
 
@@ -250,7 +249,7 @@ fn straight(
     SurfaceCurve::open(drawn).trace(mesh, adjacency)
 }
 
-/// The place that a pick goes onto: the nearest corner, curve or feature line within the distance of `params`.
+/// The place that a pick goes onto: the nearest corner, curve or sharp line within the distance of `params`.
 pub fn snap(canvas: &Canvas, pick: FacePoint, targets: &SnapTargets, params: &PaintParams) -> (FacePoint, Snap) {
     let mesh = canvas.mesh;
     let p = pick.position(mesh);
@@ -278,7 +277,7 @@ pub fn snap(canvas: &Canvas, pick: FacePoint, targets: &SnapTargets, params: &Pa
     (pick, Snap::Free)
 }
 
-/// The vertex of a feature line nearest to a pick, looked for among the vertices within `reach` only.
+/// The vertex of a sharp line nearest to a pick, looked for among the vertices within `reach` only.
 fn nearest_on_lines(canvas: &Canvas, pick: FacePoint, lines: &[bool], reach: f64) -> Option<u32> {
     if lines.len() != 3 * canvas.mesh.triangles.len() {
         return None;

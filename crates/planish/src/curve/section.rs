@@ -1,4 +1,4 @@
-//! Curves that are there without painting: cuts by a plane, projections, boundaries and feature lines.
+//! Curves that nobody paints: cuts by a plane, projections ([K98] §3.3.1 attracts a space curve), boundaries and sharp lines.
 
 use super::chain::{SurfaceCurve, without_repeats};
 use super::{CurveError, attract::sample_polyline};

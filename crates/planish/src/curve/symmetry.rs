@@ -3,6 +3,8 @@
 //! Finding: from every candidate (principal axes and even directions through the centroid) mirrored sample points
 //! are matched with the surface and the plane is fitted to the pairs, again and again (iterated closest points for
 //! mirrors); the one that misses least wins.
+//!
+//! Besl and McKay, *A Method for Registration of 3-D Shapes*, 1992, is the iteration; see `docs/methods/curves.md`.
 
 use super::{CurveError, SurfaceCurve};
 use crate::geom::Bvh;

@@ -1,4 +1,6 @@
 //! One edit made on a drawing, whole or not at all.
+//!
+//! See `docs/methods/curves.md`, "Networks", and `docs/guide/edit.md`.
 
 use super::work::{Ground, Work};
 use super::{ApplyError, Edit, Made, Others, keep};

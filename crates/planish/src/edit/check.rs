@@ -1,4 +1,4 @@
-//! What the checks of edits share: numbers that are none, or out of their range.
+//! Checks that edits share: numbers that are not finite, or out of their range (`docs/guide/edit.md`).
 //!
 //! All answer `NotFinite` or `OutOfRange` with what the number is of.
 

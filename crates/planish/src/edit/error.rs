@@ -1,4 +1,4 @@
-//! Why an edit was not made.
+//! Why an edit was not made: what is wrong, where, and what to do (`docs/guide/edit.md`).
 
 use super::network::EditError;
 use crate::curve::CurveError;

@@ -1,4 +1,4 @@
-//! Edits of the history: they go to the model, not to its drawing.
+//! Edits of the history, undo and redo: they go to the model, not to its drawing (`docs/guide/edit.md`).
 
 use super::work::Work;
 use super::{ApplyError, Command};

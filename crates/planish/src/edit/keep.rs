@@ -1,5 +1,6 @@
-//! What stays of patches and of what is drawn in them when the curves change: their numbers, their feature curves,
-//! their sections.
+//! What an edit keeps: numbers of patches, their feature curves and sections, where the curves around them change.
+//!
+//! See `docs/methods/curves.md`, "Mirroring" and "After an edit".
 
 use super::change::mirror::{self, ON_PLANE};
 use super::{Ground, Images};

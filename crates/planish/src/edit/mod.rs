@@ -5,6 +5,8 @@
 //! Places are world positions (taken to the nearest place of the mesh), places by face, or corners.
 //! One file per edit, with its check: `draw/`, `change/`, `feature/`. A new one is a file there, a variant of [`Edit`]
 //! and a line of `Edit::command`.
+//!
+//! See `docs/guide/edit.md` and, for why scripts are TOML, `docs/decisions/0011-toml-for-scripts.md`.
 
 mod apply;
 mod change;

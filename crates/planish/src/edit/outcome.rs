@@ -1,4 +1,4 @@
-//! What an edit did, for whoever made it.
+//! What an edit did: new and changed corners and curves, relaxations, what is left to put right (`docs/guide/edit.md`).
 
 use crate::curve::Relaxed;
 use crate::model::Drawing;

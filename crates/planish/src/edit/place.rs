@@ -1,4 +1,4 @@
-//! Places, corners and curves as a script names them.
+//! Places, corners and curves as a script names them (`docs/guide/edit.md`).
 
 use crate::mesh::FacePoint;
 use serde::{Deserialize, Serialize};

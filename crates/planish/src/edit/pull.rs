@@ -1,4 +1,4 @@
-//! What draws, holds and moves curves: scalars, forces, moves of a space curve.
+//! What draws, holds and moves curves: scalars ([K98] §3.8.2), weights of snakes (§3.6.2), moves of a space curve (§3.3.3).
 
 use crate::curve::{SnakeParams, Sweep};
 use schemars::JsonSchema;

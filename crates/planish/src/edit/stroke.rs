@@ -1,4 +1,4 @@
-//! Strokes of edits: picks brought onto what is there, and the way between them.
+//! Strokes of edits: picks brought onto corners, curves and sharp lines, and the way between them ([K98] §3.2).
 
 use super::work::Work;
 use super::{ApplyError, Magnetism, Scalar, Spot};

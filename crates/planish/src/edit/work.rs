@@ -1,4 +1,4 @@
-//! A drawing under an edit: the mesh made ready, and what the names and places of a script mean on it.
+//! A drawing under an edit: the mesh made ready, and what the names and places of a script mean on it (`docs/guide/edit.md`).
 
 use super::{ApplyError, Images, Name, Others, Pull, RelaxedCurve, Scalar, Spot};
 use crate::curve::symmetry::Plane;

@@ -3,6 +3,8 @@
 //! Two hits in a face and their tangents tell where a feature passes it to second order in the cell size, and not at all
 //! where it bends in between. A mesh knows its sharp edges: each is cut by the planes of nodes once, and the cuts are
 //! kept by plane and cell.
+//!
+//! See `docs/methods/fields.md`, "Creases of sources".
 
 use super::{Creases, Lattice};
 use crate::geom::{Bvh, KdTree};

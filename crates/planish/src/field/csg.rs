@@ -1,6 +1,6 @@
-//! Directed fields on one lattice, put together.
+//! Directed fields on one lattice, combined.
 //!
-//! [K01] §3, METHODS 2.2: the greatest or least of the directed distances, component by component; the normal travels
+//! [K01] §3: the greatest or least of the directed distances, component by component; the normal travels
 //! with the winner. On hits that reads: on an edge whose ends differ after the combination, from its inside end, an
 //! intersection is left at the first exit of either body and a union at the last. Where both ends of an edge come out
 //! alike its hits go. That is exact as long as each body passes an edge once.

@@ -1,7 +1,7 @@
 //! The directed distance field: sides of the nodes of a lattice, and a hit on every edge whose ends differ.
 //!
 //! [K01] §3: the distance along an axis is exact where the distance to the surface in any direction is not. Only
-//! edges between an inside and an outside node matter (METHODS 2.1), so those are all that is kept, row by row: a
+//! edges between an inside and an outside node matter, so those are all that is kept, row by row: a
 //! row is the line of nodes `(., j, k)` along x and owns the edges that leave its nodes along +x, +y and +z. Sides
 //! are kept as the nodes where they change. Memory grows with the surface (plus one word per row and table).
 

@@ -1,4 +1,6 @@
 //! The lattice on which fields are sampled, and what sampling on it costs.
+//!
+//! The uniform grid `g_ijk` of [K01] §3.
 
 use crate::geom::Aabb;
 use glam::DVec3;

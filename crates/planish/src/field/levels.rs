@@ -1,5 +1,7 @@
 //! What a scalar grid says at the nodes of its lattice: the distance of each number from the level, and the signs of whole
 //! rows as bits.
+//!
+//! Input of [K01] §4.1; see `docs/methods/fields.md`.
 
 use super::Lattice;
 use super::scalar_grid::{Body, GridParams, ScalarGrid};

@@ -1,6 +1,6 @@
 //! Triangle meshes as directed fields: every triangle is rasterised into the lattice lines of the three axes.
 //!
-//! METHODS 2.1 (after [K01] §3.1, which shoots rays): a triangle hits the lines whose nodes lie in its projection.
+//! [K01] §3.1 shoots rays; here a triangle hits the lines whose nodes lie in its projection (`docs/methods/fields.md`).
 //! Nodes on an edge of a projection, and hits on a node, are decided by one symbolic shift of all nodes
 //! (Edelsbrunner and Mücke 1990, *Simulation of Simplicity*): node + (e, e², e³) for an infinitely small e. With
 //! exact signs every line then crosses a closed surface consistently, and the three axes agree on every node.

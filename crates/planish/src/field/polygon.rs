@@ -1,4 +1,6 @@
 //! Simple polygons of the plane and the distance from them.
+//!
+//! Outlines of the solids of `docs/guide/solids.md`.
 
 use crate::geom::predicates::segments_meet;
 use glam::DVec2;

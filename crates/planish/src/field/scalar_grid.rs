@@ -1,4 +1,6 @@
 //! Scalar grids (volume images), and how they are read.
+//!
+//! Input of [K01] §4.1; see `docs/methods/fields.md`.
 
 use glam::DVec3;
 use schemars::JsonSchema;

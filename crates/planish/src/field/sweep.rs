@@ -1,6 +1,6 @@
 //! Milling: a stock box without the volumes that a tool sweeps.
 //!
-//! METHODS 2.1 ([K01] §5.1, milling): a tool is a convex body of revolution, so its sweep along a straight move is
+//! [K01] §5.1, milling: a tool is a convex body of revolution, so its sweep along a straight move is
 //! convex, and the distance from it is the least over the move of the distance from the tool. That is a convex function
 //! of the place on the move: closed forms where the move is level or upright or the tool is ball-ended, a search
 //! otherwise. Moves sit in a tree of boxes; in a small box of space only those are looked at that can be the nearest one

@@ -1,4 +1,6 @@
 //! How good a grid is.
+//!
+//! The criteria of [K98] §5.2: spacing along iso-curves, angles, folds.
 
 use super::Grid;
 use super::net::fold::Sheet;

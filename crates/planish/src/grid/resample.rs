@@ -1,4 +1,6 @@
 //! Grids of a whole network: sizes chosen, patches relaxed, and grids that miss detail made finer.
+//!
+//! [K98] §5.6 ends at a density; here misses decide (`docs/methods/grids.md`, step 8).
 
 use super::feature::FeatureError;
 use super::feature::network::{Drawn, give_sums, relax_some};

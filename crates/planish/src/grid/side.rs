@@ -2,6 +2,8 @@
 //!
 //! Two patches that share a curve hold the same points in opposite order and must get the same bits. Every sum
 //! therefore runs in one canonical direction, the lexicographically smaller reading of the chain.
+//!
+//! [K98] §5.4 and §5.6.
 
 use glam::DVec3;
 

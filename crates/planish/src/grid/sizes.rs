@@ -1,4 +1,9 @@
 //! How many points the grids get along every side.
+//!
+//! [K98] §5.4.
+//!
+//! Departs from [K98]: the aspect ratio is that of a chord of the network and not of each patch, since neighbours
+//! share the nodes of their curve; that is what makes seams exact.
 
 use super::{GridParams, side};
 use crate::network::{Network, PatchMesh};

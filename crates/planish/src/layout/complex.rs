@@ -1,6 +1,8 @@
 //! The cell complex of a layout: nodes, arcs and cells embedded in the working mesh.
 //!
-//! A half-arc is `2 arc + reversed`; the cell of a half-arc lies on its left. Cells are disks at all times.
+//! They become the corners, curves and patches of a network; a cell may have any number of sides until then.
+//! A half-arc is `2 arc + reversed`; the cell of a half-arc lies on its left. Cells are disks at all times:
+//! `docs/decisions/0005-spade-and-convex-maps.md`.
 
 use crate::mesh::NONE;
 use crate::network::CurveKind;
@@ -21,7 +23,7 @@ pub(super) struct Arc {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     pub vertex: u32,
-    /// It keeps its place: a corner of a feature line or of the boundary, or the tip of a limb.
+    /// It keeps its place: a corner of a sharp line or of the boundary, or the tip of a limb.
     pub stays: bool,
 }
 

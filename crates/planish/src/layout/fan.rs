@@ -1,9 +1,8 @@
-//! Nodes seen from near: within a small disc around a node its arcs are drawn anew, so that they leave it at even angles
-//! and without hooks.
+//! Fans: within a small disk around a node its arcs are drawn anew, so that they leave it at even angles and without hooks.
 //!
 //! Lines that are straight in the map of large cells can turn anywhere near its corners, where the map is that of single
-//! triangles. The disc is mapped to a circle; from even angles at the node the arcs go over smoothly to where they leave
-//! the disc. Angles keep their order all the way, so arcs do not cross.
+//! triangles. The disk is mapped to a circle; from even angles at the node the arcs go over smoothly to where they leave
+//! the disk. Angles keep their order all the way, so arcs do not cross. See `docs/methods/layout.md`, step 8.
 
 use super::complex::Complex;
 use super::improve::star_change;
@@ -17,13 +16,13 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::f64::consts::{PI, TAU};
 
-/// Radii of the discs that are tried, in parts of the shortest arc at the node: discs of neighbours stay apart.
+/// Radii of the disks that are tried, in parts of the shortest arc at the node: disks of neighbours stay apart.
 const RADII: [f64; 3] = [0.3, 0.2, 0.12];
 
-/// Fewest faces of a disc: with less than three rings of them there is no smooth way to turn.
+/// Fewest faces of a disk: with less than three rings of them there is no smooth way to turn.
 const FEWEST: usize = 60;
 
-/// How far from where it leaves the disc an arc may leave its node, radians.
+/// How far from where it leaves the disk an arc may leave its node, radians.
 const GREATEST_TURN: f64 = 0.9;
 
 /// Parts of the radius at which the way of an arc is given.
@@ -74,7 +73,7 @@ fn fan(bench: &Bench, star: &[u32]) -> Option<Fan> {
     RADII.into_iter().find_map(|part| within(bench, star, &chains, part * shortest))
 }
 
-/// The same within a disc of `radius`.
+/// The same within a disk of `radius`.
 fn within(bench: &Bench, star: &[u32], chains: &[Vec<u32>], radius: f64) -> Option<Fan> {
     let embedding = &bench.embedding;
     let disk = disc(embedding, star, chains[0][0], radius)?;
@@ -82,7 +81,7 @@ fn within(bench: &Bench, star: &[u32], chains: &[Vec<u32>], radius: f64) -> Opti
     let mut rim = vec![NONE; disk.vertices.len()];
     disk.boundary.iter().enumerate().for_each(|(i, &v)| rim[v as usize] = i as u32);
     let center = *local.get(&chains[0][0])?;
-    // Where each arc leaves the disc for good: its rim is ragged.
+    // Where each arc leaves the disk for good: its boundary is ragged.
     let exits: Vec<usize> =
         chains.iter().map(|chain| chain.iter().rposition(|v| local.contains_key(v))).collect::<Option<Vec<_>>>()?;
     let on_rim = |v: u32| rim[local[&v] as usize] != NONE;
@@ -122,7 +121,7 @@ fn within(bench: &Bench, star: &[u32], chains: &[Vec<u32>], radius: f64) -> Opti
     Some(fan)
 }
 
-/// The disc around a node: `None` if it is none, or other arcs than those of `star` run in it.
+/// The disk around a node: `None` if it is none, or other arcs than those of `star` run in it.
 fn disc(embedding: &Embedding, star: &[u32], node: u32, radius: f64) -> Option<Disk> {
     let (cut, adjacency) = (&embedding.cut, &embedding.adjacency);
     let mut distance: BTreeMap<u32, f64> = BTreeMap::from([(node, 0.0)]);

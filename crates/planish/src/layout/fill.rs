@@ -1,5 +1,7 @@
 //! The best way to fill the union of a few cells with quads: every filling is drawn in the map of the union, and
 //! what its cells cost is measured there.
+//!
+//! See `docs/methods/layout.md`, step 6.
 
 use super::polygon::{self, Sectors, VALENCE_COST};
 use super::recut::{Bench, Change, Union, outline_with_cells};

@@ -1,8 +1,8 @@
 //! Making a layout good: quads, relaxed nodes and arcs, regular nodes, even sizes.
 //!
-//! The connectivity changes where that lowers an energy: squareness and size of every cell, and the number of
+//! The connectivity changes where that lowers an energy: squareness and size of every cell ([`super::shape`]), and the number of
 //! cells in every sector. A change refills the union of two cells or of the cells around a node; drawn lines
-//! stay inside it.
+//! stay inside it. See `docs/methods/layout.md`, steps 6 and 7.
 
 use super::complex::{Complex, Node};
 use super::fill::{Gain, Scale};

@@ -1,8 +1,8 @@
-//! Feature lines: the sharp edges that bound patches.
+//! Fixed lines: the sharp edges that bound patches.
 //!
 //! An edge of a machined part is sharp at every scale; a wrinkle, a scale or a scanner's noise is sharp from one
 //! face to the next and flat a few faces further out. So an edge has to be sharp twice: between its two faces,
-//! and between the mean normals of the surface to its left and right.
+//! and between the mean normals of the surface to its left and right. See `docs/methods/layout.md`, step 1.
 
 use super::LayoutParams;
 use crate::mesh::sets::Sets;
@@ -155,7 +155,7 @@ fn drop_loose(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut 
     }
 }
 
-/// Joins every region between lines that is smaller than `smallest` to the neighbour it shares most of its rim with.
+/// Joins every region between lines that is smaller than `smallest` to the neighbour it shares most of its boundary with.
 /// True if there were any.
 fn drop_regions(mesh: &TriMesh, adjacency: &Adjacency, smallest: f64, sharp: &mut [bool]) -> bool {
     let faces = mesh.triangles.len();

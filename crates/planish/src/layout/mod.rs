@@ -1,12 +1,15 @@
 //! Automatic layout: a network of four-sided patches on any manifold mesh.
 //!
-//! 1. feature lines and boundaries are fixed; long edges are split ([`refine`]);
+//! 1. sharp lines and boundaries are fixed; long edges are split ([`refine`]);
 //! 2. a centroidal partition into disks between the fixed lines ([`partition`], [`outline`]);
 //! 3. all cells are made even and parted into quads ([`polygon`]);
 //! 4. nodes, arcs and connectivity are improved by changes inside the union of a few cells, each drawn in a one-to-one
 //!    map of that union ([`recut`]), so that nothing ever crosses or gets lost; this happens on a coarser mesh of the
 //!    same surface, and the arcs are carried back ([`coarse`]);
 //! 5. near every node its arcs are spread to even angles ([`fan`]).
+//!
+//! The papers have no automatic layout; the method with its energy is in `docs/methods/layout.md`, the choice of maps in
+//! `docs/decisions/0005-spade-and-convex-maps.md`.
 
 mod coarse;
 mod complex;
@@ -61,7 +64,7 @@ const SETTLING: usize = 8;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LayoutParams {
-    /// Number of patches to aim at. Feature lines may force more.
+    /// Number of patches to aim at. Sharp lines may force more.
     #[schemars(range(min = 1, max = 100_000))]
     pub patches: usize,
     /// Edges whose faces meet at more than this angle are sharp and become patch boundaries.
@@ -127,7 +130,7 @@ pub fn layout_tagged(
     layout_around(mesh, &[], &[], tagged, params, observer)
 }
 
-/// As [`layout`], around lines that are given: the half-edges `lines` become patch boundaries like feature lines,
+/// As [`layout`], around lines that are given: the half-edges `lines` become patch boundaries like sharp lines,
 /// the vertices `corners` of them corners; `tagged` as in [`layout_tagged`]. All may be empty.
 /// # Errors
 /// As [`layout`].

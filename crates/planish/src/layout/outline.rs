@@ -1,4 +1,6 @@
 //! From labelled faces to the complex: where nodes lie and how arcs run.
+//!
+//! See `docs/methods/layout.md`, step 2.
 
 use super::complex::{Arc, Complex, Node};
 use super::partition::{Ground, next_around};
@@ -7,7 +9,7 @@ use crate::network::CurveKind;
 use crate::network::imprint::Place;
 use std::collections::HashMap;
 
-/// A feature line or boundary that turns by more than this over a quarter of a patch side has a corner there.
+/// A sharp line or boundary that turns by more than this over a quarter of a patch side has a corner there.
 const CORNER_TURN_DEG: f64 = 50.0;
 
 /// One that turns by more than this has a corner there however near others end: no side of a patch follows it back.
@@ -16,7 +18,7 @@ const SHARP_TURN_DEG: f64 = 100.0;
 /// Nodes put on a closed line that meets no other.
 const LOOP_NODES: usize = 4;
 
-/// Vertices where a feature line or the boundary has a corner. `reach` is the length over which the turn is
+/// Vertices where a sharp line or the boundary has a corner. `reach` is the length over which the turn is
 /// measured.
 pub(super) fn corners(ground: &Ground, reach: f64) -> Vec<bool> {
     let mesh = ground.mesh;

@@ -1,9 +1,12 @@
-//! The first cells of a layout: a centroidal partition of the faces into disks that respects feature lines.
+//! The first cells of a layout: a centroidal partition of the faces into disks that respects sharp lines.
 //!
-//! 1. sites by farthest-point sampling, at least one per region between feature lines;
-//! 2. Lloyd: grow all cells from their sites, move every site to the middle of its cell;
-//! 3. wherever a cell is no disk, or meets itself across a feature line, add sites there and grow again; also where
+//! 1. sites by farthest-point sampling, at least one per region between sharp lines;
+//! 2. Lloyd's iteration: grow all cells from their sites, move every site to the middle of its cell;
+//! 3. wherever a cell is no disk, or meets itself across a sharp line, add sites there and grow again; also where
 //!    its front first closes around the hole or handle.
+//!
+//! Eck and Hoppe, *Automatic Reconstruction of B-Spline Surfaces of Arbitrary Topological Type*, 1996, start from such
+//! cells, too.
 
 use super::LayoutError;
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
@@ -26,7 +29,7 @@ const CLOSED_CELLS: usize = 6;
 pub(super) struct Ground<'a> {
     pub mesh: &'a TriMesh,
     pub adjacency: &'a Adjacency,
-    /// Half-edges on feature lines.
+    /// Half-edges on sharp lines.
     pub sharp: &'a [bool],
     centroid: Vec<DVec3>,
     area: Vec<f64>,
@@ -66,7 +69,7 @@ impl<'a> Ground<'a> {
         self.adjacency.fan(v).flat_map(|h| [self.mesh.origin(next(h)), self.mesh.origin(previous(h))])
     }
 
-    /// True for a vertex on a feature line or on the boundary.
+    /// True for a vertex on a sharp line or on the boundary.
     pub fn is_fixed(&self, v: u32) -> bool {
         self.adjacency.is_boundary_vertex(v) || self.adjacency.fan(v).any(|h| self.sharp[h as usize])
     }
@@ -187,7 +190,7 @@ impl<'a> Ground<'a> {
         sites
     }
 
-    /// True for half-edges between two cells, on feature lines and on the boundary.
+    /// True for half-edges between two cells, on sharp lines and on the boundary.
     pub fn barriers(&self, label: &[u32]) -> Vec<bool> {
         (0..self.sharp.len())
             .map(|h| {
@@ -217,7 +220,7 @@ impl<'a> Ground<'a> {
         for (i, &h) in cut.iter().enumerate() {
             ends(h).iter().for_each(|&v| at.entry(v).or_default().push(i));
         }
-        // The rim of a cell holds what ends there.
+        // The boundary of a cell holds what ends there.
         let rim = |v: u32| self.adjacency.fan(v).any(|h| barrier[h as usize] || barrier[previous(h) as usize]);
         let mut loose: Vec<u32> =
             at.iter().filter(|(v, edges)| edges.len() == 1 && !rim(**v)).map(|(&v, _)| v).collect();
@@ -255,7 +258,7 @@ impl<'a> Ground<'a> {
             .unwrap_or(NONE)
     }
 
-    /// Faces where a site is wanted because their cell is no disk or meets itself across a feature line.
+    /// Faces where a site is wanted because their cell is no disk or meets itself across a sharp line.
     fn wanted(&self, label: &[u32], distance: &[f64], count: usize, eager: bool) -> Vec<u32> {
         let barrier = self.barriers(label);
         // Euler characteristic of the cell cut open along its barriers: inner vertices - inner edges + faces.

@@ -5,6 +5,8 @@
 //!    its middle: both its cells change parity, so only the ends of the path do in the end.
 //! 2. Each even cell is parted by the cheapest set of lines, found by dynamic programming; cheap are square
 //!    corners and nodes where four cells meet.
+//!
+//! See `docs/methods/layout.md`, step 3.
 
 use super::complex::Complex;
 use super::recut::Change;

@@ -1,5 +1,7 @@
 //! Changes of the complex inside a few cells: their union, a disk, is mapped to a circle and cut again along
 //! straight lines of the map. New arcs can therefore neither cross nor leave the union.
+//!
+//! Tutte, *How to Draw a Graph*, 1963; `docs/decisions/0005-spade-and-convex-maps.md`.
 
 use super::complex::{Arc, Complex, Node};
 use super::shape::{Shape, Trace};
@@ -408,7 +410,7 @@ impl<'a> Bench<'a> {
         self.embedding.shapes(&self.complex)
     }
 
-    /// The half-edges of the mesh on feature lines.
+    /// The half-edges of the mesh on sharp lines.
     pub fn lines(&self) -> Vec<bool> {
         let mut lines = vec![false; self.adjacency.opposite.len()];
         for a in self.complex.live_arcs() {

@@ -1,4 +1,6 @@
 //! The working mesh of a layout: the input with long edges split, so that curves have room to move.
+//!
+//! See `docs/methods/layout.md`, step 1.
 
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
 use std::collections::HashMap;

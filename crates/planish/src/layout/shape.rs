@@ -1,4 +1,6 @@
 //! The shape of a cell and what it costs.
+//!
+//! The energy of `docs/methods/layout.md`, with its formula there.
 
 use glam::DVec3;
 

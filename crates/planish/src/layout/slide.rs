@@ -1,5 +1,5 @@
-//! Sliding nodes along feature lines and boundaries: the line is fixed, the places where smooth arcs end on it
-//! are not.
+//! Sliding nodes along sharp lines and boundaries: the line is fixed, the places where smooth arcs end on it
+//! are not. See `docs/methods/layout.md`, step 7.
 
 use super::complex::Complex;
 use super::recut::{Bench, Change, outline};

@@ -3,6 +3,8 @@
 //! Taking a vertex out of a mesh changes the faces of one polygon only, and so does putting it back. What runs
 //! through the polygon is drawn again in its other faces. Where it enters and leaves and on which side it passes the
 //! vertex decides which edges it meets and in which order, so nothing ever crosses, whatever the rounding.
+//!
+//! See `docs/methods/layout.md`, step 5.
 
 use super::complex::Complex;
 use super::recut::keep_apart;

@@ -1,8 +1,8 @@
 //! Tips of limbs: places where a patch would have to swallow a whole finger, unless a node stands there.
 //!
 //! Around a tip the surface has far less area than a plane has within the same distance. Candidates with a small
-//! disc climb to the place furthest from the rim of their disc; a rim in two pieces belongs to the middle of a
-//! limb, not to its end.
+//! disk climb to the place furthest from the boundary of their disk; a boundary in two pieces belongs to the middle of a
+//! limb, not to its end. See `docs/methods/layout.md`, step 4.
 
 use super::fill::{Gain, Scale};
 use super::partition::Ground;
@@ -13,23 +13,23 @@ use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Radii of the discs, in sides of a patch: fingers and limbs.
+/// Radii of the disks, in sides of a patch: fingers and limbs.
 const RADII: [f64; 2] = [0.5, 1.0];
 
-/// Greatest area of a disc, against the flat one of its radius: that of a cone with an angle of 70 degrees.
+/// Greatest area of a disk, against the flat one of its radius: that of a cone with an angle of 70 degrees.
 const SLENDER: f64 = 0.55;
 
-/// The outer part of the disc that is its rim.
+/// The outer part of the disk that is its boundary.
 const RIM: f64 = 0.8;
 
 /// Candidates lie this far apart, in radii, and tips that far: a blunt end has one.
 const CANDIDATES_APART: f64 = 0.3;
 const TIPS_APART: f64 = 0.8;
 
-/// Vertices whose distance from the rim is this little less than the greatest are equally far out.
+/// Vertices whose distance from the boundary is this little less than the greatest are equally far out.
 const END: f64 = 0.1;
 
-/// Steps of climbing; two reach the end of any limb within the disc.
+/// Steps of climbing; two reach the end of any limb within the disk.
 const CLIMBS: usize = 3;
 
 /// Vertices with their distances from a start, in rising order.
@@ -60,7 +60,7 @@ fn disc(ground: &Ground, starts: &[u32], radius: f64, inside: Option<&BTreeMap<u
     found
 }
 
-/// Area of a disc over that of the flat one; `None` if it meets a fixed line or its rim is in several pieces.
+/// Area of a disk over that of the flat one; `None` if it meets a fixed line or its boundary is in several pieces.
 fn slenderness(ground: &Ground, disc: &Disc, radius: f64) -> Option<f64> {
     if disc.iter().any(|&(v, _)| ground.is_fixed(v)) {
         return None;

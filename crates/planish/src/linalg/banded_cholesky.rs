@@ -1,4 +1,6 @@
-//! Banded symmetric positive definite systems, for right-hand sides of numbers or of points.
+//! Cholesky factorisation of banded symmetric positive definite systems, for right-hand sides of numbers or of points.
+//!
+//! Golub and Van Loan, *Matrix Computations*, §4.3.
 
 use std::ops::{Mul, MulAssign, SubAssign};
 

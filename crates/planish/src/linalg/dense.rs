@@ -1,4 +1,4 @@
-//! Small dense systems.
+//! Small dense systems by Gaussian elimination with pivots (Golub and Van Loan, *Matrix Computations*, §3.4).
 
 /// Pivots below this share of the largest entry count as zero: the rest of the digits are rounding.
 const PIVOT: f64 = 1e-13;

@@ -1,4 +1,4 @@
-//! Cholesky for small systems whose size is known when compiling.
+//! Cholesky factorisation for small systems whose size is known when compiling (Golub and Van Loan, *Matrix Computations*, §4.2).
 
 /// Solves `a x = b` for a symmetric positive definite `a`, whose lower triangle is used and overwritten.
 /// Returns false if a pivot is not positive.

@@ -6,7 +6,7 @@
 //! 2. in such a piece shortest paths from one vertex make a tree; a spanning tree of the dual graph takes of the other
 //!    edges those that close the longest loops, and the shortest loop of those left over goes around a handle (Erickson
 //!    and Whittlesey 2005, *Greedy Optimal Homotopy and Homology Generators*)
-//! 3. the surface is cut along it, and both rims are filled with the triangles of least area (`lids`)
+//! 3. the surface is cut along it, and both boundaries are filled with the triangles of least area (`lids`)
 
 use crate::geom::Aabb;
 use crate::mesh::sets::Sets;
@@ -139,13 +139,13 @@ impl Search<'_> {
         g == NONE || self.local[g as usize / 3] == NONE
     }
 
-    /// For every half-edge of the rim, in the order of the piece, the place of the least one of its loop.
+    /// For every half-edge of the boundary, in the order of the piece, the place of the least one of its loop.
     fn rim_loops(&self, piece: &[u32]) -> (Vec<u32>, Vec<u32>) {
         let mut rim: Vec<u32> = piece.iter().flat_map(|&t| 3 * t..3 * t + 3).filter(|&h| self.rim(h)).collect();
         rim.sort_unstable();
         let mut sets = Sets::new(rim.len());
         for k in 0..rim.len() {
-            // Turn around the end until the rim goes on.
+            // Turn around the end until the boundary goes on.
             let mut g = next(rim[k]);
             while !self.rim(g) {
                 g = next(self.adjacency.opposite[g as usize]);
@@ -156,7 +156,7 @@ impl Search<'_> {
         (rim, roots)
     }
 
-    /// Handles of a piece, all its rims filled.
+    /// Handles of a piece, all its boundaries filled.
     fn genus(&mut self, piece: &[u32]) -> usize {
         self.enter(piece);
         let (rim, roots) = self.rim_loops(piece);
@@ -177,7 +177,7 @@ impl Search<'_> {
         inner.dedup();
         inner.retain(|v| on_rim.binary_search(v).is_err());
         let loops = (0..roots.len()).filter(|&k| roots[k] == k as u32).count();
-        // Where the piece touches itself at a vertex of its rim, that vertex counts once for each time.
+        // Where the piece touches itself at a vertex of its boundary, that vertex counts once for each time.
         let vertices = inner.len() + rim.len();
         let edges = (3 * piece.len() + rim.len()) / 2;
         (2 * components + edges).saturating_sub(vertices + piece.len() + loops) / 2
@@ -335,7 +335,7 @@ fn cap(around: &[u32], search: &Search) -> Option<Vec<[usize; 3]>> {
     super::lids::least_area(&points, taken)
 }
 
-/// Parts the surface along a loop and fills both rims.
+/// Parts the surface along a loop and fills both boundaries.
 fn cut(
     around: &[u32],
     cap: &[[usize; 3]],

@@ -1,14 +1,15 @@
 //! Small holes of a surface, closed with lids that go on as the surface does.
 //!
-//! A hole is told from the rim of a piece by what lies around it: more surface than fits within its rim, and a surface that
-//! looks the way a lid would. The end of a pipe is no hole, for its sides look away from its axis.
+//! A hole is told from the boundary of a piece by what lies around it: more surface than fits within it, and a surface that
+//! looks the way a lid would. The end of a pipe is no hole, for its sides look away from its axis. See
+//! `docs/methods/mend.md`, "Lids".
 
 use super::lids::{Lid, least_area, lid};
 use crate::mesh::{Adjacency, FeatureKind, FeatureTags, TriMesh, boundary_loops, components, next};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// A piece has at least this many times the area of a disk with the rim of its hole.
+/// A piece has at least this many times the area of a disk with the boundary of its hole.
 const PIECE: f64 = 4.0;
 /// Area vector of a lid, along the mean of the normals around, over the area of the lid; one for a hole in a plane.
 const FACING: f64 = 0.3;
@@ -63,7 +64,7 @@ fn step(mesh: &TriMesh, h: u32) -> DVec3 {
     mesh.points[mesh.origin(next(h)) as usize] - mesh.points[mesh.origin(h) as usize]
 }
 
-/// The lid over a rim, if that is a hole of the surface around.
+/// The lid over a boundary, if that is a hole of the surface around.
 fn lid_over(mesh: &TriMesh, adjacency: &Adjacency, around: &[u32], rim: &[u32]) -> Option<Lid> {
     let n = rim.len();
     let points: Vec<DVec3> = rim.iter().map(|&v| mesh.points[v as usize]).collect();

@@ -1,13 +1,14 @@
-//! Lids over loops of a surface.
+//! Lids over boundary loops of a surface.
 //!
 //! 1. triangles of least area (Barequet and Sharir 1995, *Filling Gaps in the Boundary of a Polyhedron*)
-//! 2. edges longer than those around are split, and edges flipped to Delaunay's, until the lid is as fine as the surface
-//!    (Liepa 2003, *Filling Holes in Meshes*, §4)
-//! 3. new vertices go where the surface bends least (the same, §5): least squares of the umbrellas of all vertices of the
-//!    lid, those of the rim with their neighbours in the surface, so that the lid goes on as the surface comes in
+//! 2. edges longer than those around are split, and edges flipped to Delaunay's, until the lid is as fine as the
+//!    surface (Liepa 2003, *Filling Holes in Meshes*, §4)
+//! 3. new vertices go where the surface bends least (the same, §5): least squares of the umbrella operators of all
+//!    vertices of the lid, those of the boundary with their neighbours in the surface, so that the lid goes on as the
+//!    surface comes in
 //!
 //! Departs from Liepa: edges are split in their middles, which needs no test of triangles; neighbours weigh by the inverse
-//! of their distance, as rims of scans have short and long edges.
+//! of their distance, as boundaries of scans have short and long edges.
 
 use crate::linalg::SparseCholesky;
 use crate::mesh::{Adjacency, NONE, next, previous};
@@ -59,14 +60,14 @@ pub(super) fn least_area(points: &[DVec3], taken: impl Fn(usize, usize) -> bool)
     Some(out)
 }
 
-/// A lid: the points of its rim, then its own, and triangles over both.
+/// A lid: the points of its boundary, then its own, and triangles over both.
 pub(super) struct Lid {
     pub points: Vec<DVec3>,
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// The lid of the triangles `flat` over a rim, as fine and as smooth as the surface around.
-/// * `beside` - for each point of the rim its neighbours in the surface, without those of the rim
+/// The lid of the triangles `flat` over a boundary, as fine and as smooth as the surface around.
+/// * `beside` - for each point of the boundary its neighbours in the surface, without those of the boundary
 pub(super) fn lid(rim: &[DVec3], beside: &[Vec<DVec3>], flat: &[[usize; 3]]) -> Lid {
     let n = rim.len();
     let mut lid = Lid { points: rim.to_vec(), triangles: flat.iter().map(|t| t.map(|v| v as u32)).collect() };
@@ -124,7 +125,7 @@ fn split(lid: &mut Lid, longest: f64) -> usize {
 }
 
 /// Flips inner edges whose opposite angles are more than two right ones, at most one of each triangle; returns their
-/// number. No edge joins two of the first `n` points, the rim: the surface may have it.
+/// number. No edge joins two of the first `n` points, the boundary: the surface may have it.
 fn flip(lid: &mut Lid, n: u32) -> usize {
     let adjacency = Adjacency::of(&lid.triangles, lid.points.len());
     let Lid { points, triangles } = lid;
@@ -151,7 +152,7 @@ fn flip(lid: &mut Lid, n: u32) -> usize {
     count
 }
 
-/// Moves the points of a lid behind its first `n`, its rim, where the umbrellas of all are least. They stay where they are
+/// Moves the points of a lid behind its first `n`, its boundary, where the umbrellas of all are least. They stay where they are
 /// if that is not decided.
 fn smooth(lid: &mut Lid, n: usize, beside: &[Vec<DVec3>], length: f64) {
     let free = lid.points.len() - n;

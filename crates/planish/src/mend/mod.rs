@@ -1,4 +1,6 @@
-//! Meshes made fit for use: one manifold surface without slivers, tiny handles, holes or ragged rims.
+//! Meshes made fit for use: one manifold surface without slivers, tiny handles, holes or ragged boundaries.
+//!
+//! See `docs/methods/mend.md`.
 
 mod handles;
 mod holes;

@@ -104,7 +104,7 @@ fn coincident(points: &[DVec3]) -> (Vec<u32>, usize) {
 
 /// Triangles lower than this share of their edge do not tell to which side of it they lie.
 const THIN: f64 = 0.1;
-/// Open edges this nearly folded onto each other (cosine between their triangles) are the rim of a two-sided
+/// Open edges this nearly folded onto each other (cosine between their triangles) are the boundary of a two-sided
 /// sheet, not a crack.
 const FOLDED: f64 = 0.999;
 

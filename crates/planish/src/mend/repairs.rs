@@ -1,4 +1,4 @@
-//! What a repair did, counted.
+//! Counts of what a repair did (`docs/methods/mend.md`, "Repair").
 
 use serde::{Deserialize, Serialize};
 

@@ -1,10 +1,10 @@
-//! The mesh of an open scan, finished: without what no point stands for, without specks, its rims smooth and its small
-//! holes closed.
+//! The mesh of an open scan, finished: ragged boundaries and what lies far from all points cut off, small holes closed.
 //!
 //! A field is known as far as the widest support reaches, so the mesh of an open scan hangs over its data by several
-//! spacings and ends in the steps of cells.
-//! 1. cold comes in from the rim and from where no raw point is near, along the surface and for a while; what gets cold is cut
-//!    off along a line of one temperature ([`mend::trim`]): the steps of the rim, its tongues and spikes
+//! spacings and ends in the steps of cells. See `docs/methods/mend.md`, "Open scans".
+//! 1. a function is zero on the boundary and where no raw point is near, one elsewhere, and is smoothed over the
+//!    surface by means of neighbours; the mesh is cut along one of its level lines ([`mend::trim`]), which takes
+//!    steps, tongues and spikes
 //! 2. small holes are closed before, so that they do not grow, and after ([`mend::close_holes`])
 
 use super::part_fans;
@@ -25,7 +25,7 @@ const CELLS: f64 = 1.5;
 const NEIGHBOURS: usize = 9;
 /// Rounds of warming each vertex by its neighbours: cold gets 2.8 cells far, and steps of cells are gone.
 const ROUNDS: usize = 32;
-/// What is colder than this is cut off, the surface being at one and the rim at zero: a cell of a straight rim, strips
+/// What is colder than this is cut off, the surface being at one and the boundary at zero: a cell of a straight boundary, strips
 /// narrower than five.
 const COLD: f64 = 0.3;
 

@@ -1,4 +1,6 @@
 //! Triangles without height: removed by collapsing or flipping edges, so that the surface stays whole.
+//!
+//! See `docs/methods/mend.md`, "Repair", step 6.
 
 use super::repairs::Repairs;
 use crate::geom::{Aabb, tolerance};

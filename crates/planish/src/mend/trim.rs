@@ -1,4 +1,4 @@
-//! Cuts a mesh along a line where a function on its vertices is zero.
+//! Cuts a mesh along the line where a function on its vertices is zero (`docs/methods/mend.md`, "Open scans").
 
 use crate::mesh::{Attribute, FeatureKind, FeatureTags, NONE, TriMesh};
 use std::collections::BTreeMap;

@@ -1,6 +1,7 @@
-//! Who touches whom in a manifold triangle mesh.
+//! Half-edges of a manifold triangle mesh: opposites, and one that leaves each vertex.
 //!
-//! Half-edge `h = 3 t + k` runs from corner `k` to corner `k + 1` of triangle `t`.
+//! Half-edge `h = 3 t + k` runs from corner `k` to corner `k + 1` of triangle `t` (Campagna, Kobbelt, Seidel, *Directed
+//! Edges*, 1998).
 
 use super::TriMesh;
 

@@ -1,9 +1,9 @@
 //! Fewer triangles: edges collapsed in the order of their quadric error, features kept.
 //!
-//! Garland and Heckbert 1997, *Surface Simplification Using Quadric Error Metrics* (area-weighted planes, the best place
-//! of the merged vertex), of the planes that are there now and not those of the input, as Lindstrom and Turk 1998, *Fast and
-//! Memory Efficient Polygonal Simplification*: a fifth less error; features as in Kobbelt et al. 2001, §5.3: a vertex on a feature line collapses along the line
-//! only, a corner stays.
+//! Garland and Heckbert 1997, *Surface Simplification Using Quadric Error Metrics* (area-weighted planes, the best
+//! place of the merged vertex), of the planes that are there now and not those of the input, as Lindstrom and Turk
+//! 1998, *Fast and Memory Efficient Polygonal Simplification*: a fifth less error; features as in Kobbelt et al.
+//! 2001, §5.3: a vertex on a sharp line collapses along the line only, a corner stays.
 //!
 //! Refuses what would change the topology (link condition), turn a triangle, or leave a sliver; and as that does not
 //! yet rule out that two sheets touch, the result is checked by exact signs, and made again with the neighbourhood of

@@ -1,4 +1,4 @@
-//! What is in a mesh and what is wrong with it; takes any triangle soup.
+//! What is in a mesh and what is wrong with it; takes any triangle soup. What repair does about it: `docs/methods/mend.md`.
 
 use super::soup::{fans, keyed_edges, mates, orient, origin, repeats};
 use super::{NONE, TriMesh};

@@ -1,4 +1,4 @@
-//! Places on a mesh.
+//! Places on a mesh: a face and barycentric coordinates, the face points of [K98] §3.1.
 
 use super::TriMesh;
 use glam::DVec3;

@@ -1,4 +1,6 @@
-//! Feature edges, boundary loops and connected pieces.
+//! Sharp edges by their angle, boundary loops and connected pieces.
+//!
+//! The choice of those that bound patches is `crate::layout`'s: `docs/methods/layout.md`, step 1.
 
 use super::{Adjacency, NONE, TriMesh, next};
 use rayon::prelude::*;

@@ -2,6 +2,8 @@
 //!
 //! Triangles are sorted into the cells of a grid; pairs that share a cell and whose boxes meet are asked
 //! ([`triangles_meet`]). Triangles with common vertices count if they meet in more than those.
+//!
+//! Exact signs as in `geom::predicates`; `docs/decisions/0006-certified-cells.md` says why zero is promised.
 
 use super::TriMesh;
 use crate::geom::predicates::triangles_meet;

@@ -1,6 +1,6 @@
 //! Paths along the edges of a mesh.
 //!
-//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §3.3: a painted curve begins as a
+//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §3.2: a painted curve begins as a
 //! greedy path that always steps to the neighbour nearest to the target.
 //! Departs from [K98]: where the greedy path runs into a dead end, A* takes over.
 

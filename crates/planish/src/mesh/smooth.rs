@@ -198,7 +198,7 @@ impl<'a> Filter<'a> {
                     for n in first..end {
                         let s = found[n];
                         for corner in 3 * s..3 * s + 3 {
-                            // Turn around the corner both ways until a feature or a rim.
+                            // Turn around the corner both ways until a feature or a boundary.
                             for back in [false, true] {
                                 let mut h = corner;
                                 for _ in 0..32 {

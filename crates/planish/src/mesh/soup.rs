@@ -1,4 +1,4 @@
-//! Edges of any triangle soup: what repair and diagnosis stand on, where half-edge adjacency does not exist yet.
+//! Edges of any triangle soup, for repair and diagnosis: half-edge adjacency does not exist yet (`docs/methods/mend.md`).
 
 use super::{MeshError, NONE, TriMesh};
 use rayon::prelude::*;

@@ -1,4 +1,5 @@
-//! Which vertices and edges of a mesh are features.
+//! Tags: which vertices and edges of a mesh are sharp. Extraction sets them ([K01] §4.2), smoothing and decimation keep
+//! them (§5.2, 5.3).
 
 use super::{Attribute, TriMesh};
 use glam::DVec3;

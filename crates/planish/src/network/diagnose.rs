@@ -4,6 +4,8 @@
 //! regions between them can be walked. [`glance`] imprints only the faces that the curves touch and tells by the
 //! loops alone: its time depends on the curves, not on the mesh. [`diagnose`] imprints the whole mesh and also looks
 //! whether every region is a disk.
+//!
+//! See `docs/methods/curves.md`, "Regions"; patches are the faces of the graph of curves.
 
 use super::disk::Disk;
 use super::imprint::{self, Cut, ImprintError, Place};

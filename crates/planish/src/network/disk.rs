@@ -2,6 +2,9 @@
 //!
 //! The map is Tutte's: boundary on a circle, every inner vertex a positive average of its neighbours, which is
 //! one to one whatever the shape. The weights are cotangents kept positive, so it is nearly harmonic.
+//!
+//! Tutte, *How to Draw a Graph*, 1963; Floater, *Parametrization and smooth approximation of surface triangulations*, 1997;
+//! `docs/decisions/0005-spade-and-convex-maps.md`.
 
 use crate::linalg::SparseCholesky;
 use crate::mesh::{Adjacency, NONE, next, previous};

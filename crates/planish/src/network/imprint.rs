@@ -5,6 +5,8 @@
 //! 2. every face with new vertices or a curve through it is triangulated again, alone, with the pieces of the
 //!    curves as constraints; points of an edge are sorted along it, so both faces agree;
 //! 3. the faces on both sides of the curves are flooded and named after the patch they belong to.
+//!
+//! See `docs/decisions/0005-spade-and-convex-maps.md`.
 
 use super::disk::{self, Disk};
 use super::{Network, PatchMesh};
@@ -537,7 +539,7 @@ fn split_face(
     segments: &HashMap<u32, Vec<Segment>>,
     points: &[DVec3],
 ) -> Result<Vec<[u32; 3]>, ImprintError> {
-    // Vertices with their places in the flat picture; those of the rim, in order; and the sides that each lies on.
+    // Vertices with their places in the flat picture; those of the boundary, in order; and the sides that each lies on.
     let (mut names, mut flat, mut ring, mut sides) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for k in 0..3 {
         ring.push(names.len());

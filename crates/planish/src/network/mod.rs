@@ -1,4 +1,6 @@
-//! Networks: corners, curves and four-sided patches on a mesh.
+//! Networks: corners, curves and four-sided patches on a mesh ([K98] fig. 1.3: boundary curves).
+//!
+//! See `docs/methods/curves.md`, "Networks", and `docs/guide/formats.md` for the file.
 
 pub(crate) mod diagnose;
 pub(crate) mod disk;

@@ -3,6 +3,8 @@
 //! Patches that an edit changes cover together what they covered before, so the faces of the old ones hold the new
 //! ones; a ring of faces more holds every place of their curves, in whatever face it is given. Chains of all curves
 //! over these faces are cut in the same order as [`imprint`] would, and the patches come out the same, bit for bit.
+//!
+//! See `docs/methods/curves.md`, "After an edit".
 
 use super::imprint::{Chain, cut_out, place_of};
 use super::{ImprintError, Network, PatchMesh, imprint};

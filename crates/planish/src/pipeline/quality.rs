@@ -1,4 +1,6 @@
 //! Figures of quality of a model against its mesh, and what a user should know about them.
+//!
+//! See `docs/methods/measuring.md`; the keys are in `docs/guide/report.md`.
 
 use super::{Figure, PipelineError, Quality, Warning};
 use crate::mend::Repairs;

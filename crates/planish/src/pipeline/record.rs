@@ -1,4 +1,6 @@
 //! What a run tells of itself: stages with their times, figures of quality, warnings.
+//!
+//! The keys are in `docs/guide/report.md`.
 
 use crate::observe::Observer;
 use serde::{Deserialize, Serialize};

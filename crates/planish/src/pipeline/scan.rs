@@ -1,4 +1,6 @@
 //! From a scan to a mesh: samples, their field, its surface.
+//!
+//! See `docs/methods/samples.md`, section 9, and `docs/methods/sharp.md`.
 
 use super::record::Figure;
 use super::{PipelineParams, Quality, Warning};

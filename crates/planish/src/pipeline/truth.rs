@@ -1,4 +1,6 @@
 //! A result against a truth that is known: distances, normals, and what became of the sharp edges.
+//!
+//! See `docs/methods/measuring.md`, "Truth".
 
 use super::record::Figure;
 use super::{PipelineError, Quality, quality};

@@ -1,4 +1,4 @@
-//! From a grid and its surface to a relief, and back.
+//! From a grid and its surface to a relief, and back: [K98] §7.1 and 7.2, eq. 7.1 in an orthonormal frame.
 
 use super::frame::at_nodes;
 use super::{Relief, ReliefError};

@@ -1,4 +1,4 @@
-//! The orthonormal frame that displacements are meant in.
+//! The orthonormal frame of displacements, in place of the one of [K98] eq. 7.1: `docs/methods/relief.md`.
 
 use crate::surface::basis::{BasisRows, uniform_parameters};
 use crate::surface::{Jet, RowSampler, Surface};

@@ -3,7 +3,8 @@
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §8.2.
 //!
 //! Departs from [K98]: no averaging of boundary rows. A node on a curve or corner is one vertex because the network
-//! says so, whatever its distance; its position is that of the first patch that has it.
+//! says so, whatever its distance; its position is that of the first patch that has it. Both patches have the same grid nodes and
+//! control points there, so baked maps agree; rows of maps that were edited need not (`docs/methods/relief.md`).
 
 use super::{Relief, ReliefError, displace};
 use crate::grid::Grid;

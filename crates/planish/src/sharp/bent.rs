@@ -1,12 +1,12 @@
 //! Edges beside which the surface bends are split.
 //!
 //! The vertices of a mesh that was made of a field lie on its surface, the faces do not: along an edge of length l on which
-//! the surface turns by t it is l t / 8 aside. What is fitted to the faces of a bore, whose rims are lines, is a barrel.
+//! the surface turns by t the surface is l t / 8 away. What is fitted to the faces of a bore, whose ends are lines, is a barrel.
 //!
-//! The way from the middle of an edge e to the surface is that of a parabola,
-//! `(e across the surface at one end - e across the surface at the other) / 8`: Vlachos, Peters, Boyd, Mitchell, *Curved PN
-//! Triangles*, 2001, has cubics of the same normals. On a line what is across its tangent takes the place of what is across
-//! the surface.
+//! The way from the middle of an edge e to the surface is that of a parabola, `(n_b (e . n_b) - n_a (e . n_a)) / 8`
+//! with the normals `n_a` and `n_b` at its ends: Vlachos, Peters, Boyd, Mitchell, *Curved PN Triangles*, 2001, has
+//! cubics of the same normals. On a sharp line the parts of e across its tangents at both ends take the place of the
+//! parts along the normals. See `docs/methods/sharp.md`, step 6.
 
 use super::lines::Lines;
 use crate::mesh::intersect::intersections_of;

@@ -1,7 +1,8 @@
-//! Sharp lines that noise broke: gaps are bridged, spurs, spikes and jogs are cut.
+//! Sharp lines that noise broke: gaps are bridged; spurs, spikes and jogs are cut.
 //!
 //! Noise hides a few edges of a line, or shifts it by an edge. A gap costs more than its length: a line with a loose end is
-//! taken for surface detail, or two patches run into one another there.
+//! taken for surface detail, or two patches run into one another there. Four greedy repairs, each to its fixed point:
+//! `docs/methods/sharp.md`, step 1.
 
 use crate::mesh::{Adjacency, FeatureTags, NONE, TriMesh, next, path, previous};
 use glam::DVec3;
@@ -85,8 +86,8 @@ fn mark(mesh: &TriMesh, adjacency: &Adjacency, chain: &[u32], sharp: &mut [bool]
     }
 }
 
-/// Clears what leaves a line and ends at once, the shortest at each fork first: what it leaves is one line, whose end may be
-/// led on. So are last edges that are next to nothing.
+/// Clears spurs, the shortest at each fork first: without it the fork is one line again, and the other end of a gap may be led on
+/// to it. Clears last edges of loose ends that are far shorter than the mean edge, too.
 fn cut_spurs(mesh: &TriMesh, adjacency: &Adjacency, edge: f64, sharp: &mut [bool]) {
     loop {
         let (lines, ends) = loose_ends(mesh, adjacency, sharp, edge);

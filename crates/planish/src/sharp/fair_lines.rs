@@ -1,12 +1,16 @@
 //! Sharp lines of a mesh made of a noisy scan, moved to where their flanks meet.
 //!
-//! Where two sheets of a scan meet, each has the points of one side only, so the surface is least sure right beside a sharp line,
-//! and the line itself is where two unsure sheets meet. But most flanks go on smoothly for many cells. So
-//! 1. each side of each vertex of a line gets an estimate from far around ([`flanks`](super::flanks)); lines that these tell
-//!    to be rounded edges are no lines ([`rounded`](super::rounded));
-//! 2. the vertex goes to where its flanks meet, those within some cells of the line towards the flanks beside them;
-//! 3. who turns a triangle over, or makes two meet, goes back half of the way, or all of it;
-//! 4. vertices in the way are merged into their neighbours ([`merging`](super::merging)), and who went back tries again.
+//! Where two sheets of a scan meet, each has the points of one side only, so the surface is least sure right beside a
+//! sharp line, and the line itself is where two unsure sheets meet. But most flanks go on smoothly for many cells. So
+//! 1. each side of each vertex of a line gets an estimate from far around ([`flanks`](super::flanks)); lines whose
+//!    flanks tell of a rounded edge are dropped ([`rounded`](super::rounded));
+//! 2. the vertex goes to where its flanks meet; vertices within some cells of the line go towards the flanks beside
+//!    them;
+//! 3. a move that turns a triangle over is halved, one that makes two triangles meet is taken back;
+//! 4. vertices in the way are merged into their neighbours ([`merging`](super::merging)), and moves that were taken
+//!    back are tried again.
+//!
+//! See `docs/methods/sharp.md`, steps 2 to 5.
 
 use super::flanks::{Flank, Plane, ScanScale};
 use super::lines::{Lines, Seen};

@@ -1,9 +1,9 @@
-//! The flanks of sharp lines: the surface on each side, estimated from as wide a neighbourhood as is consistent.
+//! The flanks of sharp lines: the surface on each side, estimated from as wide a neighbourhood as is consistent (Lepski's rule).
 //!
 //! [GN97] A. Goldenshluger, A. Nemirovski, *On spatially adaptive estimation of nonparametric regression*, 1997: among
 //! estimates from nested windows the most precise one is taken with which all less precise ones agree as far as their
 //! noise allows. Where a flank goes on straight the window grows to ten cells; where it bends it stays small, and no
-//! threshold has to know which.
+//! threshold has to know which. See `docs/methods/sharp.md`, step 2.
 //!
 //! A flank is a polynomial over its tangent plane: a plane, one that bends along the line, or a quadric.
 

@@ -1,4 +1,4 @@
-//! A mesh of a scan with its sharp lines: what is around them, and between them.
+//! Sharp lines of the mesh of a scan: what is around them, and between them (`docs/methods/sharp.md`).
 
 use crate::mesh::{Adjacency, FeatureTags, NONE, TriMesh, next};
 use glam::DVec3;

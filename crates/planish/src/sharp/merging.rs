@@ -1,4 +1,6 @@
-//! Triangles that are not as they should be: vertices merged into neighbours and edges flipped, one disk at a time.
+//! Triangles that are too small or look the wrong way: vertices merged into neighbours and edges flipped, one disk at a time.
+//!
+//! See `docs/methods/sharp.md`, step 5.
 
 use crate::mesh::intersect::intersections_of;
 use crate::mesh::{FeatureKind, TriMesh};
@@ -55,8 +57,8 @@ impl<'a> Merging<'a> {
         }
     }
 
-    /// Changes what is around faulty triangles where that leaves fewer faults; no triangle comes to meet another. Returns
-    /// triangles that may be faulty still; empty if nothing changed.
+    /// Changes what is around faulty triangles where that leaves fewer faults; no triangle comes to meet another.
+    /// Returns triangles that may be faulty still; empty if nothing changed.
     /// * `fault` - of a triangle with these corners
     /// * `longest` - vertices are merged over edges that are at most so long
     pub fn round(&mut self, faulty: &[u32], fault: impl Fn(u32, [DVec3; 3]) -> Fault, longest: f64) -> Vec<u32> {

@@ -1,8 +1,8 @@
-//! Lines of a scan's mesh that are no edges: a rounding a cell or two wide that the mesh makes sharp.
+//! Roundings: lines of a scan's mesh along a fillet a cell or two wide, which the mesh makes sharp.
 //!
 //! The mesh says nothing of what is finer than its cells, so a fillet of that size gets a line along it that looks as sharp as
-//! an edge. But its flanks meet elsewhere: at an edge the surface reaches the place where they meet, at a rounding it stays
-//! short of it.
+//! an edge. But its flanks meet elsewhere: at an edge the surface reaches the place where they meet, at a rounding it stops
+//! short of it. See `docs/methods/sharp.md`, step 3.
 
 use super::flanks::{Flank, Moments, Plane, ScanScale};
 use super::lines::{Lines, Seen};

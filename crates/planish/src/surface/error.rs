@@ -1,4 +1,4 @@
-//! Why a fit is not possible.
+//! Why a fit is not possible: what is wrong, by how much, and the way out (`docs/guide/fit.md`).
 
 /// Errors of the surface stage.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

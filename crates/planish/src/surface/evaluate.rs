@@ -1,4 +1,6 @@
 //! Points and derivatives of a surface: one place at a time, or a whole grid separably.
+//!
+//! Tensor-product B-splines of [K98] §4.2.2; derivatives by the rows of `basis`.
 
 use super::basis::{BasisRows, basis_at};
 use super::{FitError, Surface};

@@ -24,8 +24,8 @@ const BLOCK: usize = 128;
 
 /// Fits a clamped uniform bicubic B-spline to a grid of points.
 ///
-/// * `points` - `rows * cols` of them, row-major, world units; node `(i, j)` has the parameters
-///   `(i / (cols - 1), j / (rows - 1))`
+/// * `points` - `rows * cols` of them, row-major, world units; node `(i, j)` has the parameters `(i / (cols - 1), j /
+///   (rows - 1))`
 /// * `control` - control points along `v` and along `u`: `[rows, cols]`, each `4..=` the grid's count
 ///
 /// # Errors

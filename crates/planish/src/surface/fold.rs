@@ -2,6 +2,8 @@
 //!
 //! A spline fitted to rough data may swing back on itself between its nodes. That shows in its normal,
 //! which there points against the mean normal of the grid around.
+//!
+//! See `docs/methods/surfaces.md`, "Folds".
 
 use super::Surface;
 use super::basis::{basis_at, uniform_parameters};

@@ -2,11 +2,13 @@
 //!
 //! 1. corners and patches are matched with their images; nothing is done unless every patch has one
 //! 2. before the plane, boundaries in it are put into it exactly, and where that is asked for the control points next
-//!    to them level with them: what their steps from the boundary have along its normal in the plane is taken away, and
-//!    the surface has one tangent plane there
+//!    to them level with them: what their steps from the boundary have along its normal in the plane is taken away,
+//!    and the surface has one tangent plane there
 //! 3. every patch behind the plane gets the mirror image of its mate, and a patch that crosses the plane becomes its
 //!    own: its control points behind the plane are images of those before it. What the shape itself lacks of symmetry
 //!    goes to the reliefs.
+//!
+//! See `docs/methods/surfaces.md`, "Planes of symmetry".
 
 use super::Surface;
 use super::basis::{is_uniform, uniform_knots};

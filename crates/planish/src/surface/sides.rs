@@ -1,4 +1,6 @@
 //! The sides of patches in their row-major arrays, be they nodes or control points.
+//!
+//! Layout of the control net as in [K98] fig. 8.2.
 
 use super::FitError;
 use crate::geom::{Aabb, tolerance};

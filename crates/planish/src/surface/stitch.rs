@@ -1,18 +1,20 @@
-//! Makes smooth seams smooth, neighbours get one tangent plane along them, and gives those on sharp edges their angle.
+//! Seams smoothed: patches on both sides of a smooth seam get one tangent plane along it, those on a sharp edge the angle of
+//! their grids.
 //!
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §8.1.3.
 //! 1. a plane for each corner - `corner`      2. curves that respect it, a normal along each - `seam_curve`
 //! 3. the ring of control points inside a patch's boundary turned into those normals
 //! 4. everything further inside fitted again for that
 //!
-//! On a sharp edge each patch has normals of its own, those of its grid within a knot span: the fit swings there, by what
+//! On a sharp edge each patch has normals of its own, those of its grid within a knot span: a fit swings there, by what
 //! bends further inside and by the noise of the edge.
 //!
 //! Departs from [K98]: there the seam's control point is moved onto the line between its two neighbours at equal
-//! spacing, which asks every seam to leave a corner as the continuation of another; around corners of valence 3, 5 or
-//! more it cannot. Here both patches are fitted to one field of normals instead: least squares over the ring, whose
-//! miss falls with the fourth power of the knot spacing. With simple knots it does not vanish around corners of
-//! valence other than 4 (Peters and Fan): the seams are smooth within the angle that `measure_seams` tells.
+//! spacing, which is exact, but asks every seam to leave a corner as the continuation of another; around corners of
+//! valence 3, 5 or more it cannot. Here both patches are fitted to one field of normals instead: least squares over
+//! the ring, whose miss falls with the fourth power of the knot spacing. With simple knots it does not vanish around
+//! corners of valence other than 4 (Peters and Fan): the seams are smooth within the angle that `measure_seams`
+//! tells.
 
 use super::basis::{basis_at, is_uniform, uniform_knots, uniform_parameters};
 use super::corner::{Plane, Planes, planes};

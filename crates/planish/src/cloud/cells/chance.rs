@@ -1,9 +1,10 @@
-//! Of which sheet of a nesting a noisy point is.
+//! The chance that a noisy point is of each sheet of a nesting.
 //!
-//! A point of the surface with normal noise in all directions lies around a half-plane of it with density
-//! `phi(d) Phi(t)`: `d` the distance across the sheet, `t` that of its foot from where the sheet ends, both in noise levels. Which
-//! sheet decides at the noisy point is another question: beside an edge noise brings the points of one face that lie high to the
-//! other, and the faces, each fitted to what is left, meet at too sharp an angle.
+//! A point of the surface with normal noise in all directions lies around a half-plane of it with density `phi(d)
+//! Phi(t)`: `d` the distance across the sheet, `t` that of its foot from where the sheet ends, both in noise levels.
+//! Which sheet decides at the noisy point is another question: beside an edge noise moves the points of one face that
+//! lie high to the other, and the faces, each fitted to what is left, meet at too sharp an angle. See
+//! `docs/methods/samples.md`, section 6.
 
 use crate::cloud::local::joints::LIMIT;
 use crate::cloud::local::nest::{self, MOST};

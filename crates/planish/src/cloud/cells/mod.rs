@@ -1,9 +1,13 @@
-//! What the surface looks like around every site: one sheet, or a body cut out of several.
+//! The surface around every site: one sheet, or a body cut out of several.
 //!
-//! Every site asks which nested maxima and minima (`nest`) of the oriented samples around explain its points. The blend of
-//! these functions keeps edges sharp, and where one site errs its neighbours outvote it. A plate ends where its points do
-//! (`rim`), a step has a wall where they change over (`step`), and a cell that faces the wrong way beside cells of several
-//! sheets is left hardly a say.
+//! Ohtake, Belyaev, Alexa, Turk, Seidel, *Multi-level Partition of Unity Implicits*, 2003, §4, with likelihoods in
+//! place of angles; `docs/methods/samples.md`, section 6.
+//! 1. every site asks which nested maxima and minima (`nest`) of the oriented samples around explain its points; the
+//!    sheets are fitted again to their shares of the points (`refine`, `chance`)
+//! 2. a plate ends where its points do (`rim`); a step gets a wall where the points change over (`step`)
+//! 3. a cell that neighbours of several sheets contradict loses nearly all of its weight
+//!
+//! The blend of these functions keeps edges sharp, and where one site errs its neighbours outvote it.
 
 mod chance;
 mod refine;

@@ -3,6 +3,8 @@
 //! Expectation and maximization (Dempster, Laird, Rubin 1977): every point tells of each sheet as far as it may be of it
 //! ([`Chances`]). The wider the ball the less luck has a say, as long as the points around the site agree: Akaike's
 //! criterion, here with points of which some are not asked.
+//!
+//! See `docs/methods/samples.md`, section 6.
 
 use super::chance::Chances;
 use super::{Place, Sheet};

@@ -1,11 +1,9 @@
-//! Where the two sides of a plate, or of a groove, end.
+//! Rims: where the two sides of a plate, or of a groove, end.
 //!
-//! METHODS 1.2: a cell is a body cut out of its sheets. Two sheets that face away from each other go on to the end of their
-//! supports, although the points stop: the face between them is as narrow as the noise, and no fit stands on it. The
-//! plane across both beyond which no point lies takes its place, if many points are missing there.
-//!
-//! The plane stands where as much of the two sheets lies beyond a place well inside as the points beyond that place need
-//! at the density inside.
+//! Two sheets of a cell that face away from each other go on to the end of their supports, although the points stop: the face
+//! between them is as narrow as the noise, and no fit stands on it. The plane across both beyond which no point lies takes its
+//! place, if many points are missing there. It stands where as much of the two sheets lies beyond a place well inside as the
+//! points beyond that place need at the density inside. See `docs/methods/samples.md`, section 6.
 
 use crate::cloud::Quadric;
 use crate::cloud::local::nest;

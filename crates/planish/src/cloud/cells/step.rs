@@ -1,7 +1,7 @@
 //! Steps whose wall is too narrow for a fit: a shallow pocket, an embossed letter, a wall that no scanner saw.
 //!
-//! METHODS 1.2: a cell is a body cut out of its sheets. Two sheets at different heights, each with its points on one side of a
-//! line, have a wall between them, though hardly a point lies on it: the plane through that line upright on both.
+//! Two sheets of a cell at different heights, each with its points on one side of a line, have a wall between them, though hardly
+//! a point lies on it: the plane through that line upright on both. See `docs/methods/samples.md`, section 6.
 
 use crate::cloud::Quadric;
 use crate::cloud::local::joints::LIMIT;
@@ -15,7 +15,7 @@ const ALIKE: f64 = 0.5;
 const OWN: usize = 12;
 /// The wall is so many noise levels high: less is no step.
 const HIGH: f64 = 4.0;
-/// Middles of the points of the two are this far from each other, as a share of the ball: .85 for the halves of a disc.
+/// Middles of the points of the two are this far from each other, as a share of the ball: .85 for the halves of a disk.
 const ASIDE: f64 = 0.4;
 /// Share of the points that lie on the wrong side of the wall at most, and of each side that does not say where it is.
 const ASTRAY: f64 = 0.04;

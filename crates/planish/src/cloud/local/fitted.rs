@@ -1,4 +1,4 @@
-//! A fitted place of the surface.
+//! A fitted place of the surface: what [X03] §5 calls a CLOSED point. See `docs/methods/samples.md`, section 4.
 
 use crate::cloud::Quadric;
 use glam::DVec3;

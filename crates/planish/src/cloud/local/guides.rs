@@ -1,9 +1,10 @@
-//! Fitted neighbours inside a fit: what [X03] calls CLOSED samples, and the Hermite term of METHODS 1.1.
+//! Fitted neighbours inside a fit: the CLOSED points of [X03] §5, which weigh more than others, with their normals.
 //!
-//! A neighbour counts as a few points at its place, and its normal as what that many points tell of a slope.
-//! Departs from METHODS 1.1: only what a gradient has across the normal is penalised and not its length, since the length
-//! of the gradient of a general quadric differs from place to place: with it exact points would no longer give exact
-//! quadrics. The length stays with Taubin's constraint.
+//! A neighbour counts as a few points at its place, and its unit normal `n` as what that many points tell of a slope: the Hermite
+//! term `w |g - (g . n) n|²` of the gradient `g` joins the squared values of the quadric (`docs/methods/samples.md`, section 3).
+//!
+//! Only what a gradient has across the normal is penalised and not its length: the length of the gradient of a general quadric
+//! differs from place to place, and with it exact points would no longer give exact quadrics. It stays with Taubin's constraint.
 
 use super::fitted::{Fit, SURE};
 use super::height::Frame;

@@ -1,4 +1,4 @@
-//! Height fields: a sheet as a quadratic function over its tangent plane.
+//! Height fields `z = a u² + b uv + c v² + d u + e v + f` over a tangent plane: family A of [X03] §4.1 and §6.2.
 
 use super::moments::Moments;
 use crate::linalg::{eigen3, small_cholesky};

@@ -1,6 +1,7 @@
-//! What points cost if sheets are joined to a surface, many points at once.
+//! What points cost under a surface joined of sheets, many points at once.
 //!
-//! Sums have a fixed number of lanes, as in `points`. What is above a limit is known to be so before the sum is complete.
+//! Sums have a fixed number of lanes, as in `points` (`docs/decisions/0014-pulp.md`). A sum that passes a limit is
+//! given up before it is complete.
 
 use super::points::{BLOCK, LANES, lanes};
 use pulp::{Arch, Simd, WithSimd};
@@ -32,15 +33,15 @@ pub(crate) enum Join {
     Greatest(f64),
 }
 
-/// Sum over all points of the squares of joined distances, each at most the square of [`LIMIT`]; or something above `limit`,
-/// if it is.
+/// Sum over all points of the squares of joined distances, each at most the square of [`LIMIT`]; or something above
+/// `limit`, if it is.
 /// * `rows` - distances to each sheet in noise levels; how the first is joined is of no meaning
 pub(crate) fn joined_cost(rows: &[(&[f64], Join)], limit: f64) -> f64 {
     Arch::new().dispatch(Joined { rows, limit })
 }
 
-/// Sum over all points of the squares of joined distances, each at most the square of [`LIMIT`], and of what belongs to the
-/// sheets that decide at them.
+/// Sum over all points of the squares of joined distances, each at most the square of [`LIMIT`], and of what belongs
+/// to the sheets that decide at them.
 /// * `rows` - distances to each sheet in noise levels, and what belongs to it
 /// * `concave` - bit k: sheet k is joined by the minimum, else by the maximum
 pub(crate) fn decided_cost(rows: &[(&[f64], f64)], concave: u8) -> (f64, f64) {
@@ -149,8 +150,8 @@ impl WithSimd for Decided<'_> {
     }
 }
 
-/// How many points lie above both of two sheets: their feet on the farther one are part of the surface, or no more than `on`
-/// off it.
+/// How many points lie above both of two sheets: their feet on the farther one are part of the surface, or no more
+/// than `on` off it.
 /// * `rows` - distances to each sheet in noise levels, and its sign
 /// * `turn` - cosine between the normals
 /// * `least` - the sheets are joined by the minimum, else by the maximum

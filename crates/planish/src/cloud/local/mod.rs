@@ -1,4 +1,4 @@
-//! Local fits: quadrics to the points of a ball, and what two or more of them say together about a place.
+//! Local fits: quadrics to the points of a ball ([X03] §4.1, §6.2), and what two or more of them say together about a place.
 
 pub(crate) mod fit;
 pub(crate) mod fitted;

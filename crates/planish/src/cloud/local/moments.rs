@@ -3,6 +3,8 @@
 //! The monomials of degree up to four in local coordinates hold the normal equations of both families of quadrics in
 //! any frame: the height-field fit is the minimum of the same quadratic form over seven of its ten directions. One
 //! pass over the points serves every frame and both families.
+//!
+//! Normal equations of [X03] §4.1 and §6.2.
 
 use glam::DVec3;
 

@@ -1,7 +1,7 @@
 //! Which nested maxima and minima of sheets explain points.
 //!
-//! METHODS 1.2 after Ohtake, Belyaev, Alexa, Turk, Seidel, *Multi-level Partition of Unity Implicits*, 2003, §4: near an
-//! edge a quadric is no model, but the maximum or minimum of two is; a corner nests them.
+//! Ohtake, Belyaev, Alexa, Turk, Seidel, *Multi-level Partition of Unity Implicits*, 2003, §4: near an edge a quadric
+//! is no model, but the maximum or minimum of two is; a corner nests them.
 //!
 //! Departs from the source: sheets are not told by the angle of normals but by the likelihood of the points under the
 //! zero set of the nesting, so the faces of a wedge are found as well as the two sides of a plate. A union of sheets

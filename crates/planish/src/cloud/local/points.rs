@@ -1,6 +1,8 @@
 //! Many points at once: coordinates side by side, so that the processor works on several of them in one instruction.
 //!
 //! Every sum has a fixed number of lanes, so its bits do not depend on how wide the instructions are.
+//!
+//! See `docs/decisions/0014-pulp.md`.
 
 use super::height::{Frame, Height};
 use super::moments::{COUNT, Moments, PARENTS};

@@ -1,4 +1,5 @@
-//! Weights of points in a fit: by their distance from the middle of the support, and by their residual.
+//! Weights of points in a fit: by their distance from the middle of the support ([X03] §4.1, theta), and by their
+//! residual (Tukey).
 
 /// Points closer to zero than this many noise levels keep their weight (Tukey's biweight, 95 % efficiency).
 const TUKEY: f64 = 4.685;

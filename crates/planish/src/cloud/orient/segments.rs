@@ -1,6 +1,6 @@
-//! Which samples are one body.
+//! Bodies: connected sets of samples whose votes agree ([X03] §7 merges patches), where two spheres that touch come apart.
 //!
-//! METHODS 1.8: connected sets of merged patches, where two spheres that touch come apart.
+//! See `docs/methods/samples.md`, section 5.
 
 use super::link::{Vote, components, middle};
 use crate::cloud::local::fitted::Fit;

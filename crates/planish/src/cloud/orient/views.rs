@@ -1,8 +1,8 @@
-//! Views of one surface that lie aside of each other by more than their noise.
+//! Misaligned views: one surface, scanned twice, with an offset above the noise.
 //!
-//! Two sheets side by side are a plate, a gap, or one surface that was measured twice. Of a plate the rest of the scan sees
-//! nothing: the winding number of all else is the same on both sides. Where a surface is seen twice it is not: the rest
-//! leaves a hole there, and the number goes from outside to inside through it.
+//! Two sheets side by side are a plate, a gap, or one surface that was measured twice. The rest of the scan tells: its winding
+//! number is the same on both sides of a plate; a surface that was seen twice leaves a hole in the rest, through which the number
+//! steps from outside to inside. See `docs/methods/samples.md`, section 5.
 
 use super::Hints;
 use crate::cloud::Dipoles;

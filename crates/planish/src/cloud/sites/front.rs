@@ -1,16 +1,17 @@
 //! The prioritised front: regular places first, each class leaning on what is fitted already.
 //!
-//! [X03] §5, fig. 7.
+//! [X03] §5, fig. 7; `docs/methods/samples.md`, section 4.
 //! 1. irregularity of every site from its survey, classes by quantiles
 //! 2. class by class, in rounds: a site takes its own fit or, where they explain its points better, the sheets of
-//!    fitted neighbours carried on to here: one, two at a crease, three or four at a corner
-//!    (these also have a say inside the fits: `guides`)
+//!    fitted neighbours carried on to here (these also have a say inside the fits: `guides`)
 //! 3. every sheet grows: the ball widens by steps, points that do not belong to the sheet lose their weight, and the
 //!    widest ball stays in which the points that do belong show noise and no bias
 //!
-//! Departs from [X03]: a class is worked off in one round; its sites see only what was fitted before the round, so they
-//! are fitted in parallel and the result is that of any number of threads. Where nothing fitted is near, a site stands
-//! on its own fit, which is the seed jump of [X03]. Supports follow from the data and not from factors c_i.
+//! Departs from [X03]: classes are fixed by the survey, so no point goes back to a later class (fig. 7, lines 7 to
+//! 10), and the front does not grow from neighbour to neighbour: a class is worked off in one round, whose sites see
+//! only what was fitted before it. So they are fitted in parallel, and the result is the same on any number of
+//! threads. Where nothing fitted is near, a site stands on its own fit, which is the seed of [X03] (lines 14 to 16).
+//! Supports follow from the data and not from factors c_i (§6.1).
 
 use super::survey::{PLENTY, WIDE_ENOUGH};
 use super::{APART, Sites, in_pieces, layers};
@@ -254,7 +255,7 @@ fn fit_site(
 const SIDE_BY_SIDE: f64 = 0.866;
 
 /// Middles of the points of two sheets are at most this far from each other along them, as a share of the ball, where the
-/// sheets lie above each other. Side by side, halves of a disc have .85.
+/// sheets lie above each other. Side by side, halves of a disk have .85.
 const MIXED: f64 = 0.4;
 
 /// The sheets that explain the points around a site, each with the middle of the points that are nearest to it there.

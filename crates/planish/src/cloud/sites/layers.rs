@@ -3,6 +3,8 @@
 //! One quadric through both calls their distance noise; its residuals have a dip in the middle, which noise has not.
 //! 1. two means of the residuals; a dip between them, and both sides present all around (at a crease they are not)
 //! 2. a height field for each side, points to the nearer one, and once more
+//!
+//! See `docs/methods/samples.md`, section 2.
 
 use crate::cloud::local::height::{Frame, Height, framed_height};
 use crate::cloud::local::moments::Moments;

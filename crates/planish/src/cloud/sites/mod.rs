@@ -2,6 +2,8 @@
 //!
 //! A fit of radius R says the same a little aside, so fits stand a fixed share of R apart. Every point belongs to the
 //! nearest site; together the sites own all points.
+//!
+//! Departs from [X03] §5, which fits at every point: `docs/decisions/0008-fits-at-sites.md`.
 
 pub(crate) mod front;
 mod layers;

@@ -6,7 +6,8 @@
 //!    beyond noise is bias, what is left inside the sectors is noise
 //! 3. two sheets close together where the residuals have a dip (`layers`)
 //! 4. the ball of least variance plus squared bias
-//! 5. the scatter is the noise for sure where nothing speaks of more: no bias, and fourth moments as of a normal spread
+//! 5. the scatter is the noise for sure where nothing speaks of more: no bias, and fourth moments as of a normal
+//!    spread
 //!
 //! Departs from [X03]: no feature size is set by hand, and the noise is measured in every place by itself.
 
@@ -31,8 +32,9 @@ const BALLS: usize = 12;
 const STRIDE: usize = 3;
 /// A ball must be this many noise levels wide: below it the points fill a volume.
 const NOISE_RADII: f64 = 4.0;
-/// Where the noise is known the search begins with this many: what scatters more in such a ball is its shape. So do those
-/// who go first, and who of them is sure of the noise is asked afterwards.
+/// Noise levels that a ball must be wide where the noise of the region is known: scatter above it then is shape. The
+/// scouts, which go first and know nothing, begin with as many; afterwards those among them that are sure of their
+/// noise tell it to the others.
 const KNOWN_RADII: f64 = 3.0;
 /// But a ball is this many times as wide as its own scatter: one full of points is sqrt(5) times.
 const NO_VOLUME: f64 = 2.6;
@@ -42,9 +44,9 @@ const HOPELESS: f64 = 6.0;
 const KNOWN: f64 = 0.8;
 /// Scatter above this many times the usual noise is more than noise: another sheet, or relief finer than the sectors.
 const THICKER: f64 = 1.15;
-/// The scatter of a place is noise for sure if the ball has this many points, the averages of its sectors hold less than so
-/// much beyond noise, and its fourth moment is that of a normal distribution within so many standard deviations, and within
-/// half of what two sheets three levels apart lack.
+/// A place is sure that its scatter is noise if its ball has `MANY` points, the averages of its sectors hold less
+/// than `UNBIASED` squared noise levels beyond noise, and its fourth moment is that of a normal distribution within
+/// `NORMAL` standard deviations and within `LACK`, half of what two sheets three levels apart lack.
 const MANY: f64 = 100.0;
 const UNBIASED: f64 = 6.0;
 const NORMAL: f64 = 2.0;

@@ -6,6 +6,8 @@
 //! within caps shrink less. All these patches are embedded and disjoint whatever the loops are: rays from the middle
 //! meet each at most once, in the order of their depths. Two loops that a tunnel joins are spanned by the region
 //! between them in the same way. The result is coarse but right, and rarely needed.
+//!
+//! See `docs/decisions/0006-certified-cells.md`.
 
 use super::{FACE_EDGES, FACES};
 use crate::geom::predicates::orient2d;
@@ -26,7 +28,7 @@ pub struct Corner {
     pub edge: u8,
     /// Face in which the segment to the next vertex lies.
     pub face: u8,
-    /// True for a face point on a feature line; others are bends that are no features.
+    /// True for a face point on a sharp line; others are bends that are no features.
     pub tagged: bool,
 }
 

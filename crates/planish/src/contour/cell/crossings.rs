@@ -1,5 +1,7 @@
 //! What a directed field says of one cell: its values at the corners, where its edges are crossed, and which inside corners
 //! of an ambiguous face are joined.
+//!
+//! See `docs/methods/contour.md`, steps 1 and 6.
 
 use super::{EDGES, joined_by_hits, joined_by_values};
 use crate::contour::walk::Cell;

@@ -1,8 +1,9 @@
 //! Face points: where a feature passes a face between two cells.
 //!
-//! METHODS 2.3: a face whose segment joins two hits of different surfaces carries one point, where the tangents of the
-//! two meet in the plane of the face. It is made from the face's own hits alone and shared by both cells, so feature
-//! lines run from cell to cell without the flips of [K01] §4 (fig. 9).
+//! A face whose segment joins two hits of different surfaces carries one point, where the tangents of the two meet in
+//! the plane of the face. It is made from the face's own hits alone and shared by both cells, so sharp lines run from
+//! cell to cell without the flips of [K01] §4 (fig. 9), which can fold the mesh:
+//! `docs/decisions/0006-certified-cells.md`.
 
 use super::caps::FACE_POINT;
 use super::crossings::{edge_point, joined};

@@ -5,6 +5,8 @@
 //! they are one-to-one seen along their normal and no diagonal lies in a face. Different patches of one cell must be
 //! disjoint by exact signs; else they are made anew without features, and as [`super::caps`] in the last resort. As
 //! cells are convex and meet in shared polylines, the whole mesh is then manifold and free of self-intersections.
+//!
+//! See `docs/decisions/0006-certified-cells.md`; [K01] §4.3 makes the fan and does not test it.
 
 use super::caps::{self, Corner, FACE_POINT};
 use super::crossings::{joined, values};
@@ -281,7 +283,7 @@ impl Patcher<'_> {
         fan(l, id, &mut scratch.local);
     }
 
-    /// The patch of a loop that is smooth by its hits, but that bends or feature lines pass of which the source knows.
+    /// The patch of a loop that is smooth by its hits, but that bends or sharp lines pass of which the source knows.
     fn bend(&self, l: &[Corner], scratch: &mut Scratch, sheet: &mut Sheet, [low, high]: [DVec3; 2]) {
         let points: Vec<DVec3> = l.iter().filter(|c| c.edge == FACE_POINT).map(|c| c.p).collect();
         let middle = points.iter().sum::<DVec3>() / points.len() as f64;
@@ -345,7 +347,7 @@ impl Patcher<'_> {
             first = end;
         }
         let region = caps::regions_of(&cell_corners(low, high), &loops);
-        // Euler number of the part of the boundary below: each region is a sphere with a hole per loop on its rim.
+        // Euler number of the part of the boundary below: each region is a sphere with a hole per loop on its boundary.
         let below = boundary_euler(cell.config, &region, loops.len());
         if 2 * trilinear.euler_below() - below >= loops.len() as i32 {
             return None;

@@ -1,4 +1,6 @@
-//! Where lines of features run in an extracted mesh, and how their ends come together.
+//! Sharp lines of an extracted mesh: where they run, and how their ends are joined along the lines of the source.
+//!
+//! See `docs/methods/contour.md`, step 7.
 
 use super::local::Local;
 use crate::field::Creases;

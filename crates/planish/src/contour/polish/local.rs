@@ -3,6 +3,8 @@
 //! A change is allowed if no triangle that it touches then meets any other triangle in more than they share, by exact
 //! signs; so the certificate of the extraction holds after every step. What may be near is known from the cells: a
 //! triangle that was never touched lies in its cell.
+//!
+//! See `docs/methods/contour.md`, step 7.
 
 mod insert;
 
@@ -312,8 +314,8 @@ impl<'a> Local<'a> {
         self.flip_if(v, w, true).is_some()
     }
 
-    /// [`Local::shift`] of `v` over triangles that are in its way: a vertex may have to reach over the next ones to find
-    /// its place. All or nothing.
+    /// [`Local::shift`] of `v` over triangles that are in its way: a vertex may have to reach over the next ones to
+    /// find its place. All or nothing.
     /// * `fixed` - edges that may not be flipped
     pub fn flip_and_shift(&mut self, v: u32, to: DVec3, fixed: impl Fn(u32, u32) -> bool) -> bool {
         self.reach_over(v, to, &fixed) || {
@@ -325,8 +327,8 @@ impl<'a> Local<'a> {
         }
     }
 
-    /// Makes `v` and `w` neighbours by one flip or two, if the mesh stays embedded and no more triangles lean than before;
-    /// returns whether.
+    /// Makes `v` and `w` neighbours by one flip or two, if the mesh stays embedded and no more triangles lean than
+    /// before; returns whether.
     /// * `fixed` - edges that may not be flipped
     pub fn connect(&mut self, v: u32, w: u32, fixed: impl Fn(u32, u32) -> bool) -> bool {
         let at = self.position(v);

@@ -2,6 +2,8 @@
 //!
 //! The tangents at two hits meet within second order of the cell size of the feature. Asked again close to that place,
 //! the same two surfaces have tangents that meet much nearer to it: each round gains the square of the last.
+//!
+//! See `docs/methods/fields.md`, "Creases of sources"; [K01] §4.3 takes the tangents of the hits once.
 
 use crate::contour::cell::feature::{Shape, classify, solve};
 use crate::field::sample::root;

@@ -1,4 +1,4 @@
-//! A corner more.
+//! Adds a corner; on a curve it divides it. Corners and curves are those of [K98] §3 and fig. 1.3.
 
 use crate::edit::check::{self, Range, within};
 use crate::edit::place::usual_snap;

@@ -1,4 +1,4 @@
-//! An empty drawing.
+//! Deletes all corners and curves of a drawing (`docs/guide/edit.md`).
 
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command};

@@ -1,4 +1,4 @@
-//! A corner less.
+//! Deletes a corner without curves, or joins the two curves at it (`docs/guide/edit.md`).
 
 use crate::edit::check;
 use crate::edit::work::Work;

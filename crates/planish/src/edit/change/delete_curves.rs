@@ -1,4 +1,4 @@
-//! Curves less.
+//! Deletes curves; regions on both sides become one (`docs/guide/edit.md`).
 
 use crate::edit::check;
 use crate::edit::work::Work;

@@ -1,4 +1,6 @@
-//! A corner dragged.
+//! Drags a corner; its curves follow as snakes, and on a boundary or sharp line it slides.
+//!
+//! [K98] §3.8.1; `docs/methods/curves.md`, "Sliding corners".
 
 use crate::edit::check::{self, Range, within};
 use crate::edit::work::Work;

@@ -1,4 +1,4 @@
-//! A curve pulled.
+//! Pulls an edit point of a curve; the edit section around it relaxes ([K98] §3.8.1).
 
 use crate::edit::check::{self, Range, within};
 use crate::edit::network::{Holds, Stretch};

@@ -1,4 +1,4 @@
-//! Two curves joined.
+//! Joins the two curves at a corner into one (`docs/guide/edit.md`).
 
 use crate::edit::check;
 use crate::edit::work::Work;

@@ -1,4 +1,6 @@
-//! One side of a plane of symmetry replaced by the image of the other.
+//! Replaces one side of a plane of symmetry by the image of the other.
+//!
+//! See `docs/methods/curves.md`, "Mirroring".
 
 use crate::curve::symmetry::Plane;
 use crate::curve::{SurfaceCurve, between, slide_to};

@@ -1,4 +1,4 @@
-//! Edits that change, move and delete what is drawn.
+//! Edits that change, move and delete what is drawn: one file each, with its check (`docs/guide/edit.md`).
 
 mod add_corner;
 mod clear;

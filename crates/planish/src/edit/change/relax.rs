@@ -1,4 +1,4 @@
-//! Curves relaxed as snakes.
+//! Relaxes curves as snakes ([K98] §3.5 to 3.8): one, a section of it, or all.
 
 use crate::curve::SnakeParams;
 use crate::curve::symmetry::Plane;

@@ -1,4 +1,4 @@
-//! A curve drawn through a space curve.
+//! Edits a curve through the control vertices of a space curve ([K98] §3.3.2 and 3.3.3).
 
 use crate::curve::SplineEdit;
 use crate::edit::check::{self, Range, within};

@@ -1,4 +1,4 @@
-//! A curve divided.
+//! Divides a curve at a share of its length (`docs/guide/edit.md`).
 
 use crate::edit::check::{self, Range, within};
 use crate::edit::work::Work;

@@ -1,4 +1,4 @@
-//! A region split into patches.
+//! Splits a region of three, five or six sides into four-sided patches (`docs/methods/curves.md`, "Regions").
 
 use crate::edit::check;
 use crate::edit::work::Work;

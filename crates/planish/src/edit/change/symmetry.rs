@@ -1,4 +1,4 @@
-//! The plane of symmetry.
+//! Sets the plane of symmetry of a drawing, or finds it (`docs/methods/curves.md`, "Mirroring").
 
 use crate::curve::symmetry::{self, Plane};
 use crate::edit::check;

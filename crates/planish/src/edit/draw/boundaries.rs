@@ -1,4 +1,4 @@
-//! The boundaries of the mesh.
+//! Draws the boundaries of the mesh as curves, where there are none yet (`docs/guide/edit.md`).
 
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command};

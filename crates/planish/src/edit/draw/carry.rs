@@ -1,4 +1,6 @@
-//! A network carried over from another shape.
+//! Carries the network of another shape over, by landmarks on both.
+//!
+//! `crate::curve::carry` after Duchon 1977; corners go to the nearest places, curves relax between them ([K98] §3.5).
 
 use crate::curve::SurfaceCurve;
 use crate::curve::carry::{LandmarkMap, carry_curve, carry_place};

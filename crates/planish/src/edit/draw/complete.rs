@@ -1,4 +1,4 @@
-//! The rest laid out by the program.
+//! Lays out every region that is no patch yet (`docs/methods/curves.md`, "Completing").
 
 use crate::edit::check::{Range, count, within};
 use crate::edit::work::Work;

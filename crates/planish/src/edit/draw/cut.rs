@@ -1,4 +1,4 @@
-//! The cut by a plane.
+//! Draws the cut of the mesh by a plane as a curve (`docs/guide/edit.md`).
 
 use crate::curve::section;
 use crate::edit::check::{self, Range, within};

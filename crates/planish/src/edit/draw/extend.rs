@@ -1,4 +1,4 @@
-//! A curve led on from its free end.
+//! Leads a curve on from its free end through more picks ([K98] §3.2).
 
 use crate::curve::{PaintMode, SurfaceCurve};
 use crate::edit::check::{self, Range, within};

@@ -1,4 +1,4 @@
-//! Sharp edges as curves.
+//! Draws edges sharper than an angle as curves (`docs/methods/layout.md`, step 1, has the automatic choice).
 
 use crate::curve::{SurfaceCurve, section};
 use crate::edit::check::{Range, within};

@@ -1,4 +1,4 @@
-//! Edits that draw curves.
+//! Edits that draw curves: one file each, with its check (`docs/guide/edit.md`).
 
 mod boundaries;
 mod carry;

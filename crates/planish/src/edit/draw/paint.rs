@@ -1,4 +1,4 @@
-//! A stroke through picks.
+//! Paints a curve through picks ([K98] §3.2).
 
 use crate::curve::PaintMode;
 use crate::edit::check::{self, Range, within};

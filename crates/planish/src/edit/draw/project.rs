@@ -1,4 +1,4 @@
-//! A polyline brought onto the mesh.
+//! Brings a polyline onto the mesh ([K98] §3.3.1, CurveAttract).
 
 use crate::curve::section;
 use crate::edit::check::{self, Range, within};

@@ -1,4 +1,4 @@
-//! A feature curve less.
+//! Deletes a feature curve ([K98] §5.10).
 
 use super::forget_cells;
 use crate::edit::check;

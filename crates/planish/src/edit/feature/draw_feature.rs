@@ -1,4 +1,4 @@
-//! A feature curve painted.
+//! Paints a feature curve of a patch ([K98] §5.10.1).
 
 use super::forget_cells;
 use crate::curve::PaintMode;

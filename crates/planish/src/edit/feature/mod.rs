@@ -1,4 +1,4 @@
-//! Edits of feature curves and of the cells between them.
+//! Edits of feature curves and of the sections between them ([K98] §5.10, §5.11.4).
 
 mod delete_feature;
 mod draw_feature;

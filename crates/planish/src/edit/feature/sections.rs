@@ -1,4 +1,4 @@
-//! Cells between feature curves.
+//! Sets the numbers of cells between the feature curves of a patch ([K98] §5.11.4: a section refined alone).
 
 use crate::edit::check;
 use crate::edit::work::Work;

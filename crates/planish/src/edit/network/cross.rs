@@ -2,6 +2,8 @@
 //!
 //! Both are chains whose neighbours share a face, so they meet where two pieces in one face do, or in a vertex that both
 //! pass. What is met within the snap distance of a corner goes through that corner.
+//!
+//! See `docs/methods/curves.md`, "Meetings".
 
 use super::{EditError, Editor};
 use crate::curve::{CurveError, SurfaceCurve, between};
@@ -38,7 +40,8 @@ struct Stop {
 
 impl Editor<'_> {
     /// As [`Editor::add_curve`]; where the curve crosses or touches others, corners divide both, and where it runs along
-    /// the edges of another it is left out. A closed curve that meets others starts at a meeting. Returns the new curves in their order along it.
+    /// the edges of another it is left out. A closed curve that meets others starts at a meeting. Returns the new curves
+    /// in their order along it.
     /// # Errors
     /// `Curve` if it does not lie on the mesh or has no length.
     pub fn draw_curve(&mut self, curve: &SurfaceCurve, kind: CurveKind, snap: f64) -> Result<Vec<u32>, EditError> {

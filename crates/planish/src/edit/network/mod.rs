@@ -1,8 +1,8 @@
 //! Editing a network: corners and curves added, split, joined, deleted and dragged.
 //!
-//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §3.8 (edit points and edit sections) and
-//! METHODS of ch. 5: patches are the faces of the graph of curves, so an edit changes curves alone and the patches
-//! follow ([`crate::network::diagnose`]). A network may be unfinished between edits; nothing is refused that can be put right.
+//! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §3.8.1 (edit points and edit sections). Patches are
+//! the faces of the graph of curves, so an edit changes curves alone and the patches follow ([`crate::network::diagnose`]). A
+//! network may be unfinished between edits; nothing is refused that can be put right.
 
 mod cross;
 mod relax;

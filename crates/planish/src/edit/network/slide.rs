@@ -2,6 +2,8 @@
 //!
 //! The two curves that follow the line at the corner are one chain; the corner goes to the place of the chain that is
 //! nearest to where it is dragged and divides it there. So the line stays covered, and nothing leaves it.
+//!
+//! See `docs/methods/curves.md`, "Sliding corners".
 
 use super::{EditError, Editor, feet};
 use crate::curve::between;

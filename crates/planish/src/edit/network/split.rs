@@ -4,6 +4,9 @@
 //! between boundary points lie inside and cross at most once: new curves can neither leave the region nor touch its
 //! sides. Where a split puts a corner into the side of a neighbour of four sides, the split goes on through that
 //! neighbour to its opposite side, and so on, until it ends in another split region or at the boundary.
+//!
+//! See `docs/methods/curves.md`, "Regions" and "Completing"; the convex map is that of
+//! `docs/decisions/0005-spade-and-convex-maps.md`.
 
 use super::{EditError, Editor};
 use crate::curve::without_repeats;

@@ -1,4 +1,6 @@
 //! Which triangle of a chart holds a point: a visibility walk with exact orientations.
+//!
+//! Devillers, Pion, Teillaud, *Walking in a Triangulation*, 2002.
 
 use super::Chart;
 use crate::mesh::NONE;

@@ -1,7 +1,7 @@
 //! Triangles that a chart squeezes flat, opened again.
 //!
 //! Tutte's map leaves no triangle turned over, but it may leave one that is wide on the surface a thousand times as
-//! thin in the square: beside slivers of a rim, and where single vertices had to be mended. Whatever is drawn straight
+//! thin in the square: beside slivers of a boundary, and where single vertices had to be mended. Whatever is drawn straight
 //! in the square then bends sharply on the surface. Here single vertices move, one after the other, to where the
 //! triangles around them keep their shapes better (MIPS: Hormann and Greiner 2000, the sum of the squared stretches
 //! over twice their product), which is without bound where a triangle turns over.

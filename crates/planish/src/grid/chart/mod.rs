@@ -97,7 +97,7 @@ pub fn flatten(
     Ok(chart)
 }
 
-/// Looks whether the patch is a disk whose rim is its four sides; returns its adjacency.
+/// Looks whether the patch is a disk whose boundary is its four sides; returns its adjacency.
 fn check(patch: &PatchMesh) -> Result<Adjacency, Fault> {
     let mesh = &patch.mesh;
     let n = mesh.points.len();

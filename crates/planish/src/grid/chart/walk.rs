@@ -1,4 +1,6 @@
 //! Walks over a chart: straight in the square, to measure curves, and straight on the surface, to move points.
+//!
+//! MovePointOnSurface of [K98] appendix A, within the chart of a patch.
 
 use super::Chart;
 use super::locate::{Spot, orientation};
@@ -58,7 +60,7 @@ impl Chart {
     }
 
     /// Moves from `from` straight over the surface by `step`, a vector near the tangent plane: laid into the
-    /// triangle with its length kept and unfolded over every edge (MovePointOnSurface of [K98]). Ends at the rim.
+    /// triangle with its length kept and unfolded over every edge (MovePointOnSurface of [K98]). Ends at the boundary.
     pub fn advance(&self, from: Spot, step: DVec3) -> Spot {
         let mut spot = from;
         let mut left = step.length();

@@ -179,7 +179,7 @@ pub(crate) fn relax_along(
             }
         }
     }
-    // The rim as the neighbours have it, bit for bit.
+    // The boundary as the neighbours have it, bit for bit.
     for (k, chain) in patch.sides.iter().enumerate() {
         let count = if k % 2 == 0 { cols } else { rows };
         let points: Vec<DVec3> = chain.iter().map(|&v| mesh.points[v as usize]).collect();

@@ -1,4 +1,6 @@
 //! Feature curves: curves inside a patch that must become iso-curves of its grid.
+//!
+//! [K98] §5.9 to 5.11; `docs/methods/curves.md`, "Feature curves".
 
 pub(crate) mod curve;
 pub(crate) mod network;

@@ -2,6 +2,8 @@
 //!
 //! A feature curve ends on curves of the network; the grids on both sides of such a curve share their nodes, so the
 //! curve gets a stop there and the grid beyond it follows ([`crate::grid::side`]). Numbers of cells go along chords.
+//!
+//! See `docs/methods/curves.md`, "Feature curves".
 
 use super::curve::{FEWEST_CELLS, Sections, cells_between, check_count, relax_along, weave};
 use super::strand::Strands;

@@ -3,10 +3,12 @@
 //! [K98] §5.11.3, eq. 5.15 to 5.17: a curve point moves along its curve under the part of the fairness of the curve
 //! of the other family that crosses there, and under the arc length of its own.
 //!
-//! Departs from [K98]: points do not slide while the grid relaxes. The sub-patches are relaxed twice at a fixed small
-//! size; the shift of every point towards the straight way between the nodes a few cells off on both
-//! sides gives a map of even shares to slid ones, one for every section, in which fairness and even spacing are
-//! balanced. The map does not depend on the numbers of cells, so a section can be refined alone.
+//! Departs from [K98]: points do not slide while the grid relaxes, and the weights of eq. 5.17 are constants. The
+//! sub-patches are relaxed twice at a fixed small size; the shift of every point towards the straight way between the
+//! nodes a few cells off on both sides gives a map of even shares to slid ones, one for every section, in which
+//! fairness and even spacing are balanced. The map does not depend on the numbers of cells, so a section can be
+//! refined alone. As sub-patches are relaxed one by one, there is no common relaxation along which weights could
+//! change.
 
 use crate::grid::side::{Stops, stop_share, turned};
 use crate::grid::{Grid, GridError, GridParams, SideStops, relax_at, rim_node};
@@ -50,7 +52,7 @@ impl Slide {
     }
 }
 
-/// For every sub-patch and side the slide of the feature curve there, nothing at the rim of the patch.
+/// For every sub-patch and side the slide of the feature curve there, nothing at the boundary of the patch.
 /// * `sub` - the sub-patches between the curves, `nu` of them in a row
 /// # Errors
 /// As [`crate::grid::relax`].

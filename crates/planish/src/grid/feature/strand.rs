@@ -1,5 +1,7 @@
 //! Feature curves brought onto the mesh of their patch: places found again on cut triangles, ends led to the sides,
 //! curves of one family cut in together.
+//!
+//! See `docs/methods/curves.md`, "Feature curves"; [K98] §5.10.1 paints them on the patch.
 
 use super::{Family, FeatureCurve, FeatureError};
 use crate::curve::SurfaceCurve;

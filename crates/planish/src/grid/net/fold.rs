@@ -4,6 +4,9 @@
 //! the mean normal of the surface at its corners. Rough relief tilts single cells against their neighbours, and the
 //! cells around the tip of a limb point in all directions; only a fold turns a corner over against both. The corner
 //! of a cell at a corner of the patch is left out, for its angle is that of the patch's curves, be it 180 degrees.
+//!
+//! Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov, *Foldover-free maps in 50 lines of code*, 2021, is the energy.
+//! See `docs/methods/grids.md`, step 7.
 
 use super::{Net, cell_corners, turns_over};
 use crate::grid::Fault;

@@ -1,4 +1,6 @@
 //! A grid of points in a chart at one resolution, and the moves that keep it free of folds.
+//!
+//! [K98] §5.5, spring points; here they move in a chart (`docs/methods/grids.md`).
 
 pub(crate) mod catch;
 pub(crate) mod even;
@@ -17,7 +19,7 @@ const HALVINGS: usize = 4;
 /// Points that one task looks after at least.
 pub const PARALLEL_LENGTH: usize = 2048;
 
-/// `cols x rows` points of a chart, row-major; the rim is fixed.
+/// `cols x rows` points of a chart, row-major; the boundary is fixed.
 #[derive(Clone)]
 pub struct Net<'a> {
     pub chart: &'a Chart,

@@ -1,10 +1,13 @@
 //! Gauss-Newton on a net: even spacing along every iso-curve against square cells.
 //!
-//! Energy: for every edge `(l / m - 1)²` with `m` the mean of its curve, what F_arc of [K98] eq. 5.1 strives for.
-//! In place of F_fair, which shortens curves and so pulls them off protruding parts: for every cell a penalty of its
-//! angle off square that is mild up to about 45 degrees and steep beyond, and for every node one of the sideways
-//! bend of both curves. Unknowns are moves `(a, b)` in cells along the net's own tangents; points then walk over
-//! the surface (MovePointOnSurface), and a move that would turn a cell over is shortened.
+//! Energy: for every edge `(l / m - 1)²` with `m` the mean of its curve, whose rest is that of F_arc in [K98] eq.
+//! 5.1; for every cell a penalty of its angle off square that is mild up to about 45 degrees and steep beyond; for
+//! every node one of the sideways bend of both curves. Unknowns are moves `(a, b)` in cells along the net's own
+//! tangents; points then walk over the surface (MovePointOnSurface), and a move that would turn a cell over is
+//! shortened.
+//!
+//! Departs from [K98] §5.5: its fairness force (eq. 5.3) shortens curves and so pulls them off protruding parts; angle and bend
+//! take its place. Its weights change over the relaxation (eq. 5.4); one energy needs no schedule.
 
 use super::{Net, PARALLEL_LENGTH};
 use crate::grid::{Fault, GridParams};
@@ -110,7 +113,7 @@ fn bend(net: &Net, k: usize, stride: usize, weight: f64) -> (f64, DVec3) {
 }
 
 /// What belongs to a node, for the curve along u through it and the one along v: the edges that leave it, the cell
-/// between them, and the bends in it. Zero where there is none; edges and bends of the rim do not count.
+/// between them, and the bends in it. Zero where there is none; edges and bends of the boundary do not count.
 #[derive(Clone, Copy, Default)]
 struct AtNode<T, C> {
     edges: [T; 2],
@@ -219,7 +222,7 @@ impl<'a> Terms<'a> {
 struct System {
     cols: usize,
     rows: usize,
-    /// Tangents of every node, one cell long; zero on the rim, which thereby stays.
+    /// Tangents of every node, one cell long; zero on the boundary, which thereby stays.
     tangents: Vec<[DVec3; 2]>,
     residuals: Vec<Residuals>,
     gradients: Vec<Gradients>,

@@ -57,7 +57,7 @@ pub fn relax(
     Ok(net.spots)
 }
 
-/// The settled coarsest grid. Drawing it out fully suits protruding parts; where the rim of the patch runs in deep
+/// The settled coarsest grid. Drawing it out fully suits protruding parts; where the boundary of the patch runs in deep
 /// bays it can crumple the grid, and less of it is better: the best of several is taken.
 fn coarsest<'a>(
     chart: &'a Chart,

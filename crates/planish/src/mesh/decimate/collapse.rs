@@ -1,4 +1,6 @@
 //! The collapsing itself, on half-edges.
+//!
+//! Garland and Heckbert 1997; Lindstrom and Turk 1998; `docs/methods/contour.md`, "Decimation".
 
 use super::DecimateError;
 use super::queue::{Entry, Queue};
@@ -70,7 +72,7 @@ impl Quadric {
 
 /// Pull towards the edge, relative to the quadric: keeps places on flat and straight parts evenly spread.
 const PULL: f64 = 1e-4;
-/// Weight of the planes that hold a feature line in place, relative to those of the surface.
+/// Weight of the planes that hold a sharp line in place, relative to those of the surface.
 const LINE: f64 = 4.0;
 /// A triangle may turn so far (cosine), and its height shrink to this share of its longest edge.
 const TURN: f64 = 0.2;
@@ -452,7 +454,7 @@ impl<'a> Collapse<'a> {
         let on_rim = |v: u32| {
             self.fan(v).any(|h| self.opposite[h as usize] == NONE || self.opposite[previous(h) as usize] == NONE)
         };
-        // Two places of the rim that are joined across the mesh must stay apart.
+        // Two places of the boundary that are joined across the mesh must stay apart.
         if g != NONE && on_rim(a) && on_rim(b) {
             return false;
         }
@@ -468,7 +470,7 @@ impl<'a> Collapse<'a> {
         }
         for side in sides.into_iter().flatten() {
             let (x, y) = (next(side), previous(side));
-            // Two feature lines, or two rims, would fall together.
+            // Two sharp lines, or two boundaries, would fall together.
             if self.feature[x as usize] && self.feature[y as usize] {
                 return false;
             }
@@ -571,7 +573,7 @@ impl<'a> Collapse<'a> {
             let g = self.opposite[f as usize];
             self.stamp[f as usize] = self.changes;
             self.stamp[if g == NONE { f } else { g } as usize] = self.changes;
-            // The other edge at `b`, which has no other triangle at the rim.
+            // The other edge at `b`, which has no other triangle at the boundary.
             self.stamp[previous(f) as usize] = self.changes;
         }
         self.spokes = spokes;
@@ -601,7 +603,7 @@ impl<'a> Collapse<'a> {
         (first..first + 3).find(|&h| self.from(h) == v).unwrap_or(h)
     }
 
-    /// Turns back around the start of `h` to the rim, so that a fan sees all triangles.
+    /// Turns back around the start of `h` to the boundary, so that a fan sees all triangles.
     fn settled(&self, h: u32) -> u32 {
         let mut at = h;
         loop {

@@ -2,6 +2,8 @@
 //!
 //! Costs fall into buckets of a sixty-fourth of an octave; within a bucket the last comes first. A heap of a million
 //! entries costs more than everything else that a collapse does, and so small a disorder changes nothing that counts.
+//!
+//! See `docs/methods/contour.md`, "Decimation".
 
 /// Bits of the mantissa that tell buckets apart.
 const MANTISSA: u32 = 6;

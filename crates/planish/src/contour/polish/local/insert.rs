@@ -1,4 +1,6 @@
-//! New vertices where the mesh passes by a line: triangles are divided around them, under the conditions of all changes.
+//! New vertices where the mesh passes by a line: triangles are divided around them, under the conditions of all local changes.
+//!
+//! See `docs/methods/contour.md`, step 7.
 
 use super::{FLIPS, GONE, LEAN, Local, Stray};
 use crate::geom::closest_in_triangle;
@@ -8,9 +10,9 @@ use glam::DVec3;
 const INNER: f64 = 0.2;
 
 impl Local<'_> {
-    /// Places a new vertex at `p` by dividing the nearest triangle, or two over one of its edges, if the mesh is farther
-    /// from there than `least` and nearer than `reach`, stays embedded, and no more triangles lean than before. Returns
-    /// its name.
+    /// Places a new vertex at `p` by dividing the nearest triangle, or two over one of its edges, if the mesh is
+    /// farther from there than `least` and nearer than `reach`, stays embedded, and no more triangles lean than
+    /// before. Returns its name.
     /// * `normals` - of the surfaces that meet there: what faces as one of them does not lean
     /// * `fixed` - edges that may not be divided
     pub fn insert(
