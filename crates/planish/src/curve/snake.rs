@@ -251,11 +251,6 @@ impl<'m> Snake<'m> {
         Ok(())
     }
 
-    /// Lets the whole curve move again.
-    pub fn edit_whole(&mut self) {
-        self.open = vec![true; self.points.len()];
-    }
-
     /// Gives a section its own weights.
     /// # Errors
     /// `NoSuchPart`.
