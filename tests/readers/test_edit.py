@@ -36,7 +36,7 @@ def test_a_picture_is_made_after_every_edit(head):
     script = (EXAMPLE / "head.toml").read_text()
     pictures = sorted(p.name for p in (head / "seen").iterdir())
     assert len(pictures) == script.count("[[step]]")
-    assert pictures[0] == "01-symmetry.png" and pictures[-1].endswith("-feature.png")
+    assert pictures[0] == "01-symmetry.png" and pictures[-1].endswith("-relax.png")
     assert all((head / "seen" / p).read_bytes().startswith(b"\x89PNG") for p in pictures)
 
 

@@ -498,7 +498,7 @@ fn wrong_scripts_are_told_with_file_line_and_hint_and_nothing_is_written() {
         ),
         (
             format!("{good}[[step]]\nedit = \"relax\"\ncurve = {{ close = [0, 0, 1] }}\n"),
-            "step 2: a number counted from 0, or { near = [x, y, z] }, is wanted (line 5)",
+            "step 2: a number counted from 0, { near = [x, y, z] } or { feature = .. } is wanted (line 5)",
         ),
         (
             format!("{good}[[step]]\nedit = \"spline\"\ncurve = 0\ncontrol = 100000\n"),

@@ -241,12 +241,12 @@ fn coarse_to_fine_needs_a_tenth_of_the_sweeps_of_single_level_at_1000_points() {
     }
     let away = |s: &Snake| s.positions().iter().map(|p| p.dot(normal).abs()).fold(0.0, f64::max);
     let goal = 0.1 * canvas.edge;
+    // Sweeps alone, no solve among them.
     let count = |sweep: Sweep, most: usize| {
         let mut snake = pulled.clone();
         let params = SnakeParams::default();
-        (1..=most).find(|&k| {
-            let kind = if sweep == Sweep::CoarseToFine && k > 24 { Sweep::Solve } else { sweep };
-            snake.step(&params, kind);
+        (1..=most).find(|_| {
+            snake.step(&params, sweep);
             away(&snake) < goal
         })
     };

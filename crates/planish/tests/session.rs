@@ -4,7 +4,7 @@
 use glam::DVec3;
 use planish::curve::Relaxed;
 use planish::edit::network::EditError;
-use planish::edit::{ApplyError, Edit, Ground, Made, apply};
+use planish::edit::{ApplyError, CurveNumber, Edit, Ground, Made, apply};
 use planish::geom::Bvh;
 use planish::grid::{self, Family};
 use planish::mesh::{Adjacency, Attribute, TriMesh};
@@ -181,7 +181,7 @@ fn energy_and_rest_are_told_pins_hold_and_a_stiff_stretch_bends_less() {
     let [told] = &made.relaxed[..] else { panic!("{made:?}") };
     let Relaxed { energy, settled, sweeps, last_move, .. } = told.relaxed;
     assert!(settled && sweeps <= 400 && last_move < 1e-5 && energy[1].total() < energy[0].total(), "{told:?}");
-    assert_eq!(told.curve, 0);
+    assert_eq!(told.curve, CurveNumber::Curve(0));
     let away = |curve: &[DVec3], p: DVec3| curve.iter().map(|q| q.distance(p)).fold(f64::INFINITY, f64::min);
     let old: Vec<DVec3> = start.network.curves[0].points.iter().map(|p| p.position(&mesh)).collect();
     let length: f64 = old.windows(2).map(|w| w[0].distance(w[1])).sum();

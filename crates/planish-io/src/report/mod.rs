@@ -9,6 +9,7 @@ mod words;
 pub use page::{Picture, Scale, html};
 pub use words::{count, distance, number, percent};
 
+use planish::edit::CurveNumber;
 use planish::pipeline::{Figure, Quality, StageRecord, Warning};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -60,10 +61,11 @@ pub struct EditRow {
 }
 
 /// How a curve relaxed.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RelaxedRow {
-    /// The curve.
-    pub curve: u32,
+    /// The curve: `curve` or `feature` with its number.
+    #[serde(flatten)]
+    pub curve: CurveNumber,
     /// Sweeps made.
     pub sweeps: usize,
     /// True if it came to rest.

@@ -46,13 +46,6 @@ impl From<LatticeError> for MeshingError {
     }
 }
 
-impl MeshingError {
-    /// True if the observer wanted no result any more.
-    pub fn is_cancelled(&self) -> bool {
-        matches!(self, MeshingError::Field(FieldError::Cancelled) | MeshingError::Contour(ContourError::Cancelled))
-    }
-}
-
 /// A mesh and the lattice it was extracted on.
 #[derive(Clone, Debug)]
 pub struct Meshed {

@@ -2,10 +2,11 @@
 //!
 //! [K98] §3.5 to 3.8, eq. 3.5 to 3.16. With `C_i = (v_{i-1} + v_{i+1}) / 2 - v_i`, all in the tangent plane:
 //!   F_fair = C_i     F_curv = 2 C_i - C_{i-1} - C_{i+1}     F_arc = (|t_max| - |t_other|) t_max / |t_max| / 2
-//! and the sum over the distances 2^r, weighted by 2^-r (eq. 3.16), lets every point feel the whole curve at once.
+//! and the sum over the distances 2^r (eq. 3.16) lets every point feel the whole curve at once.
 //!
 //! Departs from [K98]:
 //! - eq. 3.15 is taken with the absolute difference and half the step; as printed points run off or overshoot;
+//! - all distances 2^r count alike, not by 2^-r: with that a bend over m points goes by one part in m a sweep only;
 //! - the coarse forces rest where chords over many points balance, which on a curved surface is not where the fine
 //!   ones do. They bring the curve near; the last sweeps solve the fine forces together (Gauss-Newton on moves in
 //!   the tangent planes, a banded system), so the rest is that of the energy and takes a few sweeps;
@@ -251,11 +252,6 @@ impl<'m> Snake<'m> {
         Ok(())
     }
 
-    /// Lets the whole curve move again.
-    pub fn edit_whole(&mut self) {
-        self.open = vec![true; self.points.len()];
-    }
-
     /// Gives a section its own weights.
     /// # Errors
     /// `NoSuchPart`.
@@ -367,7 +363,7 @@ impl<'m> Snake<'m> {
                 continue;
             }
             let (kf, kc) = (params.fairness * self.factors[i][0], params.curvature * self.factors[i][1]);
-            let (mut force, mut weights) = (DVec3::ZERO, 0.0);
+            let (mut force, mut levels) = (DVec3::ZERO, 0.0);
             let flat = |v: DVec3, m: usize| v - normals[m] * v.dot(normals[m]);
             let mid = |a: usize, b: usize, m: usize| flat((self.at[a] + self.at[b]) / 2.0 - self.at[m], m);
             let mut step = 1usize;
@@ -377,13 +373,12 @@ impl<'m> Snake<'m> {
                     break;
                 }
                 let (Some(a), Some(b)) = (self.along(i, -s), self.along(i, s)) else { break };
-                let w = 1.0 / step as f64;
-                weights += w;
+                levels += 1.0;
                 let c = mid(a, b, i);
-                force += c * (kf * w);
+                force += c * kf;
                 if kc > 0.0 {
                     let side = |m: usize, t: isize| self.along(m, t).map_or(DVec3::ZERO, |far| mid(i, far, m));
-                    force += (c * 2.0 - side(a, -s) - side(b, s)) * (kc * w);
+                    force += (c * 2.0 - side(a, -s) - side(b, s)) * kc;
                 }
                 if !coarse {
                     break;
@@ -396,7 +391,7 @@ impl<'m> Snake<'m> {
                 let (far, near) = if t.length() > u.length() { (t, u) } else { (u, t) };
                 force += far.normalize_or_zero() * ((far.length() - near.length()) / 2.0 * params.arc_length);
             }
-            let bound = (kf + STIFFEST * kc) * weights.max(1.0) + params.arc_length;
+            let bound = (kf + STIFFEST * kc) * f64::max(levels, 1.0) + params.arc_length;
             if bound > 0.0 {
                 moves[i] = flat(force, i) * (2.0 * EXPLICIT_STEP / bound);
             }

@@ -3,7 +3,7 @@
 //! All answer `NotFinite` or `OutOfRange` with what the number is of.
 
 use super::network::Stretch;
-use super::{ApplyError, Forces, Magnetism, Name, Spot};
+use super::{ApplyError, CurveName, Forces, Magnetism, Name, Spot};
 use crate::curve::PaintMode;
 
 /// Weights of a place may leave 0 to 1 by this: rounding.
@@ -103,5 +103,11 @@ pub(super) fn name(name: &Name) -> Result<(), ApplyError> {
     match name {
         Name::Number(_) => Ok(()),
         Name::Near { near } => finite("near", near),
+    }
+}
+
+pub(super) fn curve(curve: &CurveName) -> Result<(), ApplyError> {
+    match curve {
+        CurveName::Network(of) | CurveName::Feature { feature: of } => name(of),
     }
 }

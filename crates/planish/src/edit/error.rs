@@ -64,6 +64,14 @@ pub enum ApplyError {
         /// The curve.
         curve: u32,
     },
+    /// A feature curve is not divided and not closed.
+    #[error(
+        "feature curve {feature} runs from side to side of its patch as one - hint: paint a curve along it to divide the patch"
+    )]
+    SideToSide {
+        /// The feature curve.
+        feature: u32,
+    },
     /// Feature curves or sections that do not suit their patch.
     #[error(transparent)]
     Feature(#[from] FeatureError),

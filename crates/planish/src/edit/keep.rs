@@ -93,7 +93,7 @@ pub(super) fn keep(moves_alone: bool, drawing: &mut Drawing, before: &Drawing) {
     };
     let numbers: BTreeMap<_, u32> = new.curves.iter().enumerate().map(|(k, c)| (key(&c.points), k as u32)).collect();
     let renamed = |c: u32| numbers.get(&key(&old.curves[c as usize].points)).copied();
-    let sketch = &before.sketch;
+    let sketch = drawing.sketch.clone();
     let onto = |p: u32| Onto::find(old.patches.get(p as usize)?, &renamed, &new.patches, false, 4);
     let features = sketch.features.iter().filter_map(|f| {
         onto(f.patch).map(|o| FeatureCurve { patch: o.patch, family: o.family(f.family), points: f.points.clone() })

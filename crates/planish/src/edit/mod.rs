@@ -33,7 +33,7 @@ pub use error::ApplyError;
 pub use feature::{DeleteFeature, Feature, Sections};
 pub use history::{Redo, Undo};
 pub use outcome::{Images, Made, RelaxedCurve};
-pub use place::{Name, Spot};
+pub use place::{CurveName, CurveNumber, Name, Spot};
 pub use pull::{Forces, Magnetism, Pull, Scalar, SplineMove};
 pub use work::Ground;
 

@@ -1,5 +1,6 @@
 //! What an edit did: new and changed corners and curves, relaxations, what is left to put right (`docs/guide/edit.md`).
 
+use super::CurveNumber;
 use crate::curve::Relaxed;
 use crate::model::Drawing;
 use crate::network::{Curve, Fault};
@@ -9,8 +10,9 @@ use std::collections::BTreeSet;
 /// A relaxation and the curve that it was of.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RelaxedCurve {
-    /// The curve.
-    pub curve: u32,
+    /// The curve: `curve` or `feature` with its number.
+    #[serde(flatten)]
+    pub curve: CurveNumber,
     /// Sweeps, energy and whether it came to rest.
     #[serde(flatten)]
     pub relaxed: Relaxed,
@@ -25,7 +27,7 @@ pub struct Made {
     pub corners: Vec<u32>,
     /// Curves that are new or have another course or another seam.
     pub curves: Vec<u32>,
-    /// Feature curves that are new.
+    /// Feature curves that are new or have another course.
     pub features: Vec<u32>,
     /// Curves that were relaxed.
     pub relaxed: Vec<RelaxedCurve>,

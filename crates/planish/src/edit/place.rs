@@ -22,7 +22,7 @@ pub enum Spot {
     },
 }
 
-/// A corner, a curve or a feature curve as a script names it.
+/// A corner, a curve of the network or a feature curve as a script names it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, deny_unknown_fields, expecting = "a number counted from 0, or { near = [x, y, z] }, is wanted")]
 pub enum Name {
@@ -33,6 +33,33 @@ pub enum Name {
         /// World units.
         near: [f64; 3],
     },
+}
+
+/// A curve as a script names it: one of the network, or a feature curve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "a number counted from 0, { near = [x, y, z] } or { feature = .. } is wanted"
+)]
+pub enum CurveName {
+    /// A curve of the network.
+    Network(Name),
+    /// A feature curve.
+    Feature {
+        /// Which one.
+        feature: Name,
+    },
+}
+
+/// A curve by its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CurveNumber {
+    /// One of the network.
+    Curve(u32),
+    /// A feature curve.
+    Feature(u32),
 }
 
 /// Share of the diagonal within which picks go to what is there.

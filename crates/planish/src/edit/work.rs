@@ -1,6 +1,6 @@
 //! A drawing under an edit: the mesh made ready, and what the names and places of a script mean on it (`docs/guide/edit.md`).
 
-use super::{ApplyError, Images, Name, Others, Pull, RelaxedCurve, Scalar, Spot};
+use super::{ApplyError, CurveName, CurveNumber, Images, Name, Others, Pull, RelaxedCurve, Scalar, Spot};
 use crate::curve::symmetry::Plane;
 use crate::curve::{Canvas, CurveError, ScalarField, SurfaceCurve};
 use crate::edit::network::{EditError, Editor};
@@ -8,7 +8,7 @@ use crate::geom::Bvh;
 use crate::grid::check_features;
 use crate::mesh::{FacePoint, TriMesh, sharp_edges};
 use crate::model::Drawing;
-use crate::network::{CurveKind, PatchMesh, imprint};
+use crate::network::{Corner, Curve, CurveKind, Network, PatchMesh, imprint};
 use crate::observe::Observer;
 use glam::DVec3;
 use std::sync::OnceLock;
@@ -122,7 +122,14 @@ impl Work<'_, '_> {
         }
     }
 
-    pub(super) fn curve(&self, name: &Name) -> Result<u32, ApplyError> {
+    pub(super) fn curve(&self, name: &CurveName) -> Result<CurveNumber, ApplyError> {
+        match name {
+            CurveName::Network(name) => self.network_curve(name).map(CurveNumber::Curve),
+            CurveName::Feature { feature } => self.feature(feature).map(CurveNumber::Feature),
+        }
+    }
+
+    pub(super) fn network_curve(&self, name: &Name) -> Result<u32, ApplyError> {
         let curves = &self.drawing.network.curves;
         let found = self.named(name, "curve", curves.iter().map(|c| &c.points[..]))?;
         match curves.len() {
@@ -156,6 +163,48 @@ impl Work<'_, '_> {
         let made = change(&mut editor, canvas.mesh.bounds().diagonal(), self.observer);
         self.drawing.network = editor.network;
         Ok(made?)
+    }
+
+    /// Lets `change` work on one curve. A feature curve is the only curve of a network for that time, and its patch
+    /// must be able to follow it afterwards.
+    pub(super) fn edit_curve<T, E>(
+        &mut self,
+        curve: CurveNumber,
+        change: impl FnOnce(&mut Editor, u32, &dyn Observer) -> Result<T, E>,
+    ) -> Result<T, ApplyError>
+    where
+        ApplyError: From<E>,
+    {
+        let feature = match curve {
+            CurveNumber::Curve(curve) => return self.edit(|e, _, observer| change(e, curve, observer)),
+            CurveNumber::Feature(feature) => feature,
+        };
+        let canvas = &self.ground.canvas;
+        let points = self.drawing.sketch.features[feature as usize].points.clone();
+        let [first, .., last] = points[..] else {
+            return Err(CurveError::TooFewPoints { found: points.len(), needed: 2 }.into());
+        };
+        let alone = Network {
+            corners: [first, last].map(|place| Corner { place }).to_vec(),
+            curves: vec![Curve { corners: [0, 1], kind: CurveKind::Smooth, points }],
+            ..Network::default()
+        };
+        let mut editor = Editor::new(canvas.mesh, &canvas.adjacency, alone);
+        let made = change(&mut editor, 0, self.observer)?;
+        self.redraw_feature(feature, std::mem::take(&mut editor.network.curves[0].points))?;
+        Ok(made)
+    }
+
+    /// Gives a feature curve another course that its patch can follow.
+    pub(super) fn redraw_feature(&mut self, feature: u32, points: Vec<FacePoint>) -> Result<(), ApplyError> {
+        let changed = &mut self.drawing.sketch.features[feature as usize];
+        let mesh = self.ground.canvas.mesh;
+        let middle = points.get(points.len() / 2).map_or(DVec3::ZERO, |p| p.position(mesh));
+        changed.points = points;
+        let number = changed.patch;
+        let cut = imprint(mesh, &self.drawing.network).ok();
+        let patch = cut.as_ref().and_then(|patches| patches.get(number as usize));
+        self.check_features(number, patch.ok_or(ApplyError::NoPatch { place: middle.to_array() })?)
     }
 
     pub(super) fn add(&mut self, curve: &SurfaceCurve, kind: CurveKind, snap: f64) -> Result<(), ApplyError> {

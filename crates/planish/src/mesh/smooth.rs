@@ -8,7 +8,8 @@
 //!
 //! Volume is restored by a shift along the normals. What would turn a triangle or make two meet is taken back.
 
-use super::{Adjacency, FeatureKind, FeatureTags, MeshError, NONE, TriMesh, check, next, self_intersections};
+use super::intersect::intersections_of;
+use super::{Adjacency, FeatureKind, FeatureTags, MeshError, NONE, TriMesh, check, next, previous, self_intersections};
 use crate::observe::Observer;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -163,8 +164,7 @@ struct Filter<'a> {
     adjacency: &'a Adjacency,
     kinds: &'a [FeatureKind],
     /// Neighbours of each triangle that share a vertex with it, with no feature between, and their weights by place.
-    start: Vec<u32>,
-    around: Vec<(u32, f64)>,
+    around: Lists<(u32, f64)>,
     range: f64,
     /// The two neighbours on a line of its vertices.
     lines: Vec<[u32; 2]>,
@@ -180,65 +180,25 @@ impl<'a> Filter<'a> {
                 lines[v as usize] = [a, b];
             }
         }
-        let is_line = |h: u32| {
-            let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
-            tags.edges.binary_search(&[a.min(b), a.max(b)]).is_ok()
-        };
         let centers: Vec<DVec3> =
             (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.corners(t).iter().sum::<DVec3>() / 3.0).collect();
         let edge = mean_edge(mesh);
+        let first = first_rings(mesh, adjacency, tags);
         // Two rings: triangles around the triangles around.
-        let rings: Vec<Vec<(u32, f64)>> = (0..mesh.triangles.len())
-            .into_par_iter()
-            .map(|t| {
-                let mut found = vec![t as u32];
-                let mut first = 0;
-                for _ in 0..2 {
-                    let end = found.len();
-                    for n in first..end {
-                        let s = found[n];
-                        for corner in 3 * s..3 * s + 3 {
-                            // Turn around the corner both ways until a feature or a boundary.
-                            for back in [false, true] {
-                                let mut h = corner;
-                                for _ in 0..32 {
-                                    let across = if back { h } else { super::previous(h) };
-                                    let g = adjacency.opposite[across as usize];
-                                    if g == NONE || is_line(across) {
-                                        break;
-                                    }
-                                    h = if back { next(g) } else { g };
-                                    if h / 3 == s {
-                                        break;
-                                    }
-                                    if !found.contains(&(h / 3)) {
-                                        found.push(h / 3);
-                                    }
-                                }
-                            }
-                        }
-                    }
-                    first = end;
+        let around = Lists::new(mesh.triangles.len(), |t, marks, list| {
+            let mut add = |s: u32| {
+                if std::mem::replace(&mut marks[s as usize], t) != t {
+                    let d2 = centers[t as usize].distance_squared(centers[s as usize]);
+                    list.push((s, mesh.area(s as usize) * (-d2 / (2.0 * edge * edge)).exp()));
                 }
-                found[1..]
-                    .iter()
-                    .map(|&s| {
-                        let d2 = centers[t].distance_squared(centers[s as usize]);
-                        (s, mesh.area(s as usize) * (-d2 / (2.0 * edge * edge)).exp())
-                    })
-                    .collect()
-            })
-            .collect();
-        let mut start = vec![0u32];
-        let mut around = Vec::new();
-        for ring in rings {
-            around.extend(ring);
-            start.push(around.len() as u32);
-        }
+            };
+            first.of(t).iter().for_each(|&s| add(s));
+            first.of(t).iter().flat_map(|&s| first.of(s)).filter(|&&s| s != t).for_each(|&s| add(s));
+        });
         // A vertex that is off by the noise turns its triangles by about the noise over their height.
         let turn = 2.0 * size / (edge * 0.866);
         let range = (RANGE * turn).clamp(RANGE_LEAST, RANGE_MOST);
-        Filter { mesh, adjacency, kinds: &tags.vertices, start, around, range, lines }
+        Filter { mesh, adjacency, kinds: &tags.vertices, around, range, lines }
     }
 
     /// One round of the normal filter.
@@ -249,7 +209,7 @@ impl<'a> Filter<'a> {
             .map(|t| {
                 let n = normals[t];
                 let mut sum = n * self.mesh.area(t);
-                for &(s, weight) in &self.around[self.start[t] as usize..self.start[t + 1] as usize] {
+                for &(s, weight) in self.around.of(t as u32) {
                     let m = normals[s as usize];
                     sum += m * (weight * (-n.distance_squared(m) / two).exp());
                 }
@@ -294,6 +254,81 @@ impl<'a> Filter<'a> {
     }
 }
 
+/// A list for each triangle, one behind the other.
+struct Lists<T> {
+    start: Vec<usize>,
+    all: Vec<T>,
+}
+
+/// Triangles whose lists are made together: enough of them to be worth the marks of a thread.
+const TOGETHER: usize = 4096;
+
+impl<T: Copy + Send + Sync> Lists<T> {
+    /// Makes the lists of `count` triangles; `fill` is given marks of all triangles to tell by its own number what it
+    /// has met.
+    fn new(count: usize, fill: impl Fn(u32, &mut [u32], &mut Vec<T>) + Sync) -> Lists<T> {
+        let parts: Vec<(Vec<usize>, Vec<T>)> = (0..count.div_ceil(TOGETHER))
+            .into_par_iter()
+            .map_init(
+                || vec![NONE; count],
+                |marks, k| {
+                    let (mut ends, mut list) = (Vec::with_capacity(TOGETHER), Vec::new());
+                    for t in k * TOGETHER..((k + 1) * TOGETHER).min(count) {
+                        fill(t as u32, marks, &mut list);
+                        ends.push(list.len());
+                    }
+                    (ends, list)
+                },
+            )
+            .collect();
+        let mut lists = Lists { start: vec![0], all: Vec::with_capacity(parts.iter().map(|p| p.1.len()).sum()) };
+        for (ends, list) in parts {
+            let before = lists.all.len();
+            lists.start.extend(ends.into_iter().map(|end| before + end));
+            lists.all.extend(list);
+        }
+        lists
+    }
+
+    fn of(&self, t: u32) -> &[T] {
+        &self.all[self.start[t as usize]..self.start[t as usize + 1]]
+    }
+}
+
+/// Steps around a corner at most: more triangles around one than this are no surface to smooth over.
+const MOST_AROUND: usize = 32;
+
+/// For each triangle those that share a vertex with it, met by turning around its corners both ways until a feature or
+/// a rim.
+fn first_rings(mesh: &TriMesh, adjacency: &Adjacency, tags: &FeatureTags) -> Lists<u32> {
+    let is_line = |h: u32| {
+        let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
+        tags.edges.binary_search(&[a.min(b), a.max(b)]).is_ok()
+    };
+    Lists::new(mesh.triangles.len(), |t, marks, list| {
+        marks[t as usize] = t;
+        for corner in 3 * t..3 * t + 3 {
+            for back in [false, true] {
+                let mut h = corner;
+                for _ in 0..MOST_AROUND {
+                    let across = if back { h } else { previous(h) };
+                    let g = adjacency.opposite[across as usize];
+                    if g == NONE || is_line(across) {
+                        break;
+                    }
+                    h = if back { next(g) } else { g };
+                    if h / 3 == t {
+                        break;
+                    }
+                    if std::mem::replace(&mut marks[h as usize / 3], t) != t {
+                        list.push(h / 3);
+                    }
+                }
+            }
+        }
+    })
+}
+
 fn mean_edge(mesh: &TriMesh) -> f64 {
     let sum: f64 = (0..mesh.triangles.len())
         .map(|t| {
@@ -333,8 +368,11 @@ fn restore_volume(from: &TriMesh, to: &mut TriMesh, adjacency: &Adjacency, tags:
 
 /// Puts back vertices of triangles that turned over or that meet now and did not before; returns how many.
 fn guard(from: &TriMesh, to: &mut TriMesh) -> usize {
-    let own = self_intersections(from);
+    // What met before is asked for only when something meets.
+    let mut own: Option<Vec<[u32; 2]>> = None;
     let mut kept = vec![false; from.points.len()];
+    // Pairs that no round has moved since they were asked about are as they were.
+    let mut moved = vec![true; from.triangles.len()];
     for round in 0..GUARD_ROUNDS {
         let mut bad: Vec<u32> = (0..to.triangles.len() as u32)
             .into_par_iter()
@@ -343,7 +381,11 @@ fn guard(from: &TriMesh, to: &mut TriMesh) -> usize {
                 a.dot(b) <= 0.0 && a != DVec3::ZERO && !to.triangles[t as usize].iter().all(|&v| kept[v as usize])
             })
             .collect();
-        bad.extend(self_intersections(to).into_iter().filter(|p| own.binary_search(p).is_err()).flatten());
+        let meeting = intersections_of(to, |t| moved[t as usize]);
+        if !meeting.is_empty() {
+            let own = own.get_or_insert_with(|| self_intersections(from));
+            bad.extend(meeting.into_iter().filter(|p| own.binary_search(p).is_err()).flatten());
+        }
         if bad.is_empty() {
             break;
         }
@@ -362,6 +404,7 @@ fn guard(from: &TriMesh, to: &mut TriMesh) -> usize {
             kept[v] = true;
             to.points[v] = from.points[v];
         }
+        moved = to.triangles.iter().map(|t| t.iter().any(|&v| ring[v as usize])).collect();
         if round + 1 == GUARD_ROUNDS {
             to.points.clone_from(&from.points);
             kept.fill(true);

@@ -34,7 +34,7 @@ impl Command for Continuity {
 
     fn apply(&self, work: &mut Work) -> Result<(), ApplyError> {
         for name in &self.curves {
-            let curve = work.curve(name)?;
+            let curve = work.network_curve(name)?;
             let kind = &mut work.drawing.network.curves[curve as usize].kind;
             if *kind == CurveKind::Boundary {
                 return Err(ApplyError::NoSeam { curve });

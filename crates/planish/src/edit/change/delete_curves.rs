@@ -2,26 +2,32 @@
 
 use crate::edit::check;
 use crate::edit::work::Work;
-use crate::edit::{ApplyError, Command, Name};
+use crate::edit::{ApplyError, Command, CurveName, CurveNumber, feature};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 /// Deletes curves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DeleteCurves {
-    /// The curves, numbered as before the edit.
-    pub curves: Vec<Name>,
+    /// The curves, numbered as before the edit; feature curves among them.
+    pub curves: Vec<CurveName>,
 }
 
 impl Command for DeleteCurves {
     fn check(&self) -> Result<(), ApplyError> {
-        self.curves.iter().try_for_each(check::name)
+        self.curves.iter().try_for_each(check::curve)
     }
 
     fn apply(&self, work: &mut Work) -> Result<(), ApplyError> {
-        let mut curves = self.curves.iter().map(|c| work.curve(c)).collect::<Result<Vec<_>, _>>()?;
-        curves.sort_unstable();
-        curves.dedup();
+        let (mut curves, mut features) = (BTreeSet::new(), BTreeSet::new());
+        for name in &self.curves {
+            match work.curve(name)? {
+                CurveNumber::Curve(curve) => curves.insert(curve),
+                CurveNumber::Feature(feature) => features.insert(feature),
+            };
+        }
+        features.iter().rev().for_each(|&f| feature::delete(work, f));
         work.edit(|e, _, _| curves.iter().rev().try_for_each(|&c| e.delete_curve(c)))
     }
 }

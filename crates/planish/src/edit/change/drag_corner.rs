@@ -4,7 +4,7 @@
 
 use crate::edit::check::{self, Range, within};
 use crate::edit::work::Work;
-use crate::edit::{ApplyError, Command, Forces, Name, RelaxedCurve, Spot};
+use crate::edit::{ApplyError, Command, CurveNumber, Forces, Name, RelaxedCurve, Spot};
 use serde::{Deserialize, Serialize};
 
 /// Moves a corner; its curves follow.
@@ -39,7 +39,9 @@ impl Command for DragCorner {
         let (corner, to) = (work.corner(&self.corner)?, work.place(&self.to)?);
         let params = self.forces.params();
         let relaxed = work.edit(|e, _, observer| e.drag_corner(corner, to, self.reach, &params, observer))?;
-        work.relaxed.extend(relaxed.into_iter().map(|(curve, relaxed)| RelaxedCurve { curve, relaxed }));
+        work.relaxed.extend(
+            relaxed.into_iter().map(|(curve, relaxed)| RelaxedCurve { curve: CurveNumber::Curve(curve), relaxed }),
+        );
         Ok(())
     }
 

@@ -1,9 +1,11 @@
 //! Pulls an edit point of a curve; the edit section around it relaxes ([K98] §3.8.1).
 
 use crate::edit::check::{self, Range, within};
-use crate::edit::network::{Holds, Stretch};
+use crate::edit::network::{Editor, Holds, Stretch};
 use crate::edit::work::Work;
-use crate::edit::{ApplyError, Command, Forces, Name, RelaxedCurve};
+use crate::edit::{ApplyError, Command, CurveName, CurveNumber, Forces, RelaxedCurve};
+use crate::mesh::move_point_on_surface;
+use crate::observe::Observer;
 use serde::{Deserialize, Serialize};
 
 /// Pulls a point of a curve; a section around it relaxes.
@@ -11,8 +13,8 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct DragCurve {
     /// The curve.
-    pub curve: Name,
-    /// Share of its length.
+    pub curve: CurveName,
+    /// Share of its length; 0 or 1 for an end of a feature curve, which then goes along its side.
     pub at: f64,
     /// World units.
     pub by: [f64; 3],
@@ -36,7 +38,7 @@ fn usual_width() -> f64 {
 
 impl Command for DragCurve {
     fn check(&self) -> Result<(), ApplyError> {
-        check::name(&self.curve)?;
+        check::curve(&self.curve)?;
         within("at", self.at, Range::Share)?;
         check::finite("by", &self.by)?;
         within("width", self.width, Range::Positive)?;
@@ -49,8 +51,22 @@ impl Command for DragCurve {
         let section = Some((self.at, self.width));
         let holds = Holds { section, field: None, pins: &self.pins, stiffness: &self.stiffness };
         let params = self.forces.params();
-        let relaxed = work.edit(|e, _, observer| e.drag_curve(curve, self.at, by, &holds, &params, observer))?;
-        work.relaxed.push(RelaxedCurve { curve, relaxed });
+        let is_feature = matches!(curve, CurveNumber::Feature(_));
+        let change = |e: &mut Editor, curve: u32, observer: &dyn Observer| match [0.0, 1.0]
+            .iter()
+            .position(|&end| end == self.at)
+        {
+            // The ends of a feature curve are no corners that others share: they are dragged with it.
+            Some(end) if is_feature => {
+                let at = e.network.corners[end].place;
+                let to = move_point_on_surface(e.mesh, e.adjacency, at, by);
+                let all = e.drag_corner(end as u32, to, self.width, &params, observer)?;
+                Ok(all.first().map(|&(_, relaxed)| relaxed))
+            }
+            _ => e.drag_curve(curve, self.at, by, &holds, &params, observer).map(Some),
+        };
+        let relaxed = work.edit_curve(curve, change)?;
+        work.relaxed.extend(relaxed.map(|relaxed| RelaxedCurve { curve, relaxed }));
         Ok(())
     }
 

@@ -6,7 +6,7 @@ use crate::edit::change::mirror::ON_PLANE;
 use crate::edit::check::{self, Range, within};
 use crate::edit::network::{EditError, Holds, Stretch};
 use crate::edit::work::Work;
-use crate::edit::{ApplyError, Command, Forces, Name, Pull, RelaxedCurve};
+use crate::edit::{ApplyError, Command, CurveName, CurveNumber, Forces, Pull, RelaxedCurve};
 use crate::network::CurveKind;
 use serde::{Deserialize, Serialize};
 
@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Relax {
-    /// The curve; absent for all that are free to move and do not lie in the plane of symmetry. Of these one stays
-    /// as it is where it would run into another.
+    /// The curve; absent for all of the network that are free to move and do not lie in the plane of symmetry. Of
+    /// these one stays as it is where it would run into another.
     #[serde(default)]
-    pub curve: Option<Name>,
+    pub curve: Option<CurveName>,
     /// Middle and width of the section, shares of the length.
     #[serde(default)]
     pub section: Option<[f64; 2]>,
@@ -37,7 +37,7 @@ pub struct Relax {
 
 impl Command for Relax {
     fn check(&self) -> Result<(), ApplyError> {
-        self.curve.as_ref().map_or(Ok(()), check::name)?;
+        self.curve.as_ref().map_or(Ok(()), check::curve)?;
         if let Some([middle, width]) = self.section {
             within("the middle of the section", middle, Range::Share)?;
             within("the width of the section", width, Range::Positive)?;
@@ -57,7 +57,7 @@ impl Command for Relax {
         let holds = Holds { section, field: field.as_ref(), pins: &self.pins, stiffness: &self.stiffness };
         let Some(curve) = &self.curve else { return relax_all(work, &holds, &params) };
         let curve = work.curve(curve)?;
-        let relaxed = work.edit(|e, _, observer| e.relax_curve(curve, &holds, &params, observer))?;
+        let relaxed = work.edit_curve(curve, |e, curve, observer| e.relax_curve(curve, &holds, &params, observer))?;
         work.relaxed.push(RelaxedCurve { curve, relaxed });
         Ok(())
     }
@@ -97,7 +97,7 @@ fn relax_all(work: &mut Work, holds: &Holds, params: &SnakeParams) -> Result<(),
                 e.network.corners[corner as usize] = start;
             } else {
                 faults = after;
-                all.push(RelaxedCurve { curve: c as u32, relaxed });
+                all.push(RelaxedCurve { curve: CurveNumber::Curve(c as u32), relaxed });
             }
         }
         Ok(())

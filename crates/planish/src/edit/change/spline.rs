@@ -3,7 +3,7 @@
 use crate::curve::SplineEdit;
 use crate::edit::check::{self, Range, within};
 use crate::edit::work::Work;
-use crate::edit::{ApplyError, Command, Name, SplineMove};
+use crate::edit::{ApplyError, Command, CurveName, SplineMove};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ const MOST_CONTROL: usize = 1000;
 #[serde(deny_unknown_fields)]
 pub struct Spline {
     /// The curve.
-    pub curve: Name,
+    pub curve: CurveName,
     /// Control vertices.
     pub control: usize,
     /// Moves, one after the other.
@@ -27,7 +27,7 @@ pub struct Spline {
 
 impl Command for Spline {
     fn check(&self) -> Result<(), ApplyError> {
-        check::name(&self.curve)?;
+        check::curve(&self.curve)?;
         if !(FEWEST_CONTROL..=MOST_CONTROL).contains(&self.control) {
             let wanted = "between 4 and 1000";
             return Err(ApplyError::OutOfRange { what: "control", value: self.control as f64, wanted });
@@ -48,7 +48,7 @@ impl Command for Spline {
         })?;
         let canvas = &work.ground.canvas;
         let (mesh, adjacency) = (canvas.mesh, &canvas.adjacency);
-        work.edit(|e, _, _| -> Result<(), ApplyError> {
+        work.edit_curve(curve, |e, curve, _| -> Result<(), ApplyError> {
             let course = e.course(curve);
             let even = course.spaced(mesh, adjacency, canvas.edge)?;
             // A short curve still has as many places as its spline has vertices.

@@ -2,7 +2,7 @@
 
 use crate::edit::check::{self, Range, within};
 use crate::edit::work::Work;
-use crate::edit::{ApplyError, Command, Name};
+use crate::edit::{ApplyError, Command, CurveName, CurveNumber};
 use serde::{Deserialize, Serialize};
 
 /// Divides a curve at a share of its length.
@@ -10,19 +10,21 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct SplitCurve {
     /// The curve.
-    pub curve: Name,
+    pub curve: CurveName,
     /// 0 to 1.
     pub at: f64,
 }
 
 impl Command for SplitCurve {
     fn check(&self) -> Result<(), ApplyError> {
-        check::name(&self.curve)?;
+        check::curve(&self.curve)?;
         within("at", self.at, Range::Share)
     }
 
     fn apply(&self, work: &mut Work) -> Result<(), ApplyError> {
-        let curve = work.curve(&self.curve)?;
-        work.edit(|e, _, _| e.split_curve(curve, self.at)).map(drop)
+        match work.curve(&self.curve)? {
+            CurveNumber::Curve(curve) => work.edit(|e, _, _| e.split_curve(curve, self.at)).map(drop),
+            CurveNumber::Feature(feature) => Err(ApplyError::SideToSide { feature }),
+        }
     }
 }

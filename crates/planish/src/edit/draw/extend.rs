@@ -5,7 +5,7 @@ use crate::edit::check::{self, Range, within};
 use crate::edit::place::usual_snap;
 use crate::edit::stroke::Brush;
 use crate::edit::work::Work;
-use crate::edit::{ApplyError, Command, Magnetism, Name, Spot};
+use crate::edit::{ApplyError, Command, CurveName, CurveNumber, Magnetism, Spot};
 use crate::network::CurveKind;
 use serde::{Deserialize, Serialize};
 
@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Extend {
-    /// The curve; the end that it was painted towards is meant if both are free.
-    pub curve: Name,
+    /// The curve; the end that it was painted towards is meant if both are free, and of a feature curve always.
+    pub curve: CurveName,
     /// The picks, in order.
     #[serde(default)]
     pub picks: Vec<Spot>,
@@ -34,23 +34,39 @@ pub struct Extend {
 
 impl Command for Extend {
     fn check(&self) -> Result<(), ApplyError> {
-        check::name(&self.curve)?;
+        check::curve(&self.curve)?;
         check::picks(&self.picks)?;
         check::magnetism(self.magnet.as_ref(), self.mode)?;
         within("snap", self.snap, Range::NotNegative)
     }
 
     fn apply(&self, work: &mut Work) -> Result<(), ApplyError> {
-        let curve = work.curve(&self.curve)?;
+        let brush = Brush { mode: self.mode, magnet: self.magnet.as_ref(), snap: self.snap };
+        match work.curve(&self.curve)? {
+            CurveNumber::Curve(curve) => self.extend_curve(work, curve, &brush),
+            CurveNumber::Feature(feature) if self.closed => Err(ApplyError::SideToSide { feature }),
+            CurveNumber::Feature(feature) => {
+                let mut points = work.drawing.sketch.features[feature as usize].points.clone();
+                let brush = Brush { snap: 0.0, ..brush };
+                let way = work.stroke_between(points.last().copied(), &self.picks, None, false, &brush)?;
+                let known = points.len().min(1);
+                points.extend_from_slice(way.points.get(known..).unwrap_or_default());
+                work.redraw_feature(feature, points)
+            }
+        }
+    }
+}
+
+impl Extend {
+    fn extend_curve(&self, work: &mut Work, curve: u32, brush: &Brush) -> Result<(), ApplyError> {
         let network = &work.drawing.network;
         let [start, end] = network.curves[curve as usize].corners;
         let ends = |k: u32| network.curves.iter().flat_map(|c| c.corners).filter(|&c| c == k).count();
         let free = [end, start].into_iter().find(|&k| ends(k) == 1).ok_or(ApplyError::NotFree { curve })?;
         let place = |k: u32| network.corners[k as usize].place;
         let other = if free == end { start } else { end };
-        let brush = Brush { mode: self.mode, magnet: self.magnet.as_ref(), snap: self.snap };
         let to = self.closed.then(|| place(other));
-        let mut way = work.stroke_between(Some(place(free)), &self.picks, to, false, &brush)?;
+        let mut way = work.stroke_between(Some(place(free)), &self.picks, to, false, brush)?;
         take_back_spur(work, curve, free, &mut way);
         work.edit(|e, diagonal, _| -> Result<(), ApplyError> {
             e.draw_curve(&way, CurveKind::Smooth, self.snap * diagonal)?;

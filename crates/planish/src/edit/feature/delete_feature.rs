@@ -21,9 +21,14 @@ impl Command for DeleteFeature {
 
     fn apply(&self, work: &mut Work) -> Result<(), ApplyError> {
         let feature = work.feature(&self.feature)?;
-        let sketch = &mut work.drawing.sketch;
-        let gone = sketch.features.remove(feature as usize);
-        forget_cells(&mut sketch.sections, gone.patch, gone.family);
+        delete(work, feature);
         Ok(())
     }
+}
+
+/// Deletes a feature curve that is there.
+pub(in crate::edit) fn delete(work: &mut Work, feature: u32) {
+    let sketch = &mut work.drawing.sketch;
+    let gone = sketch.features.remove(feature as usize);
+    forget_cells(&mut sketch.sections, gone.patch, gone.family);
 }

@@ -5,6 +5,7 @@ mod draw_feature;
 mod sections;
 
 pub use delete_feature::DeleteFeature;
+pub(super) use delete_feature::delete;
 pub use draw_feature::Feature;
 pub use sections::Sections;
 
