@@ -17,17 +17,17 @@ const RADII: [f64; 5] = [2.0, 3.0, 4.5, 6.75, 10.0];
 /// Terms of the polynomials among `1, x, y, y², x², xy` with `y` along the line: a plane, one that bends along the line, and a
 /// quadric.
 const MODELS: [usize; 3] = [3, 4, 6];
-/// A window must stand for so many points of the scan.
+/// Least weight of a window, in points of the scan.
 const FEWEST: f64 = 8.0;
-/// Standard deviations within which estimates agree. Less follows the noise, more rounds off what bends: of 0.7 to 3 this kept
-/// most angles at noise of .1 and .25 % of the diagonal.
+/// Standard deviations of their difference within which two estimates agree. Less follows the noise, more rounds off what bends.
+/// Chosen among 0.7 to 3 by the angles that are kept at noise of .1 and .25 % of the diagonal; nothing derives it.
 const AGREE: f64 = 1.4;
 /// Least share of an estimate's own variance that counts as that of its difference to a more precise one.
 const SHARED: f64 = 0.25;
-/// Where what is right beside a line does not count, the first so many windows must have so many of these.
+/// Estimates from beyond a rounding need this weight in their first `CLOSE` windows: what is seen from afar alone may bend in between.
 const CLOSE: usize = 2;
 const SOME: f64 = 4.0;
-/// A first normal comes from within so many cells, as does the direction of the line.
+/// Radius of the first normal and of the direction of the line, cells.
 const NEAR: f64 = 3.0;
 /// What lies this near to a line, in cells, may be the rounding of an edge.
 const ROUNDING: f64 = 1.5;
