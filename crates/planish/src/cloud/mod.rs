@@ -2,13 +2,15 @@
 //!
 //! [X03] Xie, Wang, Hua, Qin, Kaufman, *Piecewise C1 Continuous Surface Reconstruction of Noisy Point Clouds via Local
 //! Implicit Quadric Regression*, 2003.
-//! 1. order, duplicates: [`Cloud`]                   2. noise and radius of the fits (§6.1): `survey`, `sites`
-//! 3. fits in rising irregularity (§5, fig. 7; §4.1, §6.2): `front`, `fit`
-//! 4. orientation (§7, fig. 12): `link`, `orient`, `wind`; bodies: `segments`; views that lie aside of each other are one
-//!    sheet: `views`
-//! 5. points on the surface, outliers: `project`
+//! 1. order, duplicates: [`Cloud`]; stray points: `sites::strays`
+//! 2. noise and radius of the fits (§6.1): `sites`, `sites::survey`
+//! 3. fits in rising irregularity (§5, fig. 7; §4.1, §6.2): `sites::front`, `local::fit`
+//! 4. orientation (§7, fig. 12): `orient`; bodies: `orient::segments`; misaligned views are one sheet: `orient::views`
+//! 5. how the sheets of a site join: `cells`
+//! 6. points on the surface, outliers: `project`
 //!
-//! The blend (§4.2, eq. 4) is `field::SampleField`. Where a step departs from the paper its file says so.
+//! The blend (§4.2, eq. 4) is `blend`, as a field `field::SampleField`. The equations and where each step departs from the
+//! paper are in `docs/methods/samples.md`.
 
 mod blend;
 mod cells;

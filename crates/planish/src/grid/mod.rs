@@ -3,15 +3,16 @@
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, ch. 5.
 //! 1. sides resampled by arc length      - §5.4, [`side`]
 //! 2. start grid                         - §5.4, [`chart`]: a convex map of the patch to the unit square
-//!    without the triangles that such a map squeezes flat - beyond the paper, [`loosen`]
-//! 3. relax, subdivide, relax            - §5.5 and 5.6, [`springs`]
-//! 4. points moved onto missed detail      - beyond the paper, [`catch`]
+//!    without the triangles that such a map squeezes flat - beyond the paper, `chart::loosen`
+//! 3. relax, subdivide, relax            - §5.5 and 5.6, `net::springs`, `net::settle`
+//! 4. points moved onto missed detail      - beyond the paper, `net::catch`
 //! 5. small edits of a patch's curves      - beyond the paper, [`follow`]
-//! 6. number of points along every side  - §5.6, [`sizes`], and more where detail is missed, [`resample`]
+//! 6. number of points along every side  - §5.4 and 5.6, [`sizes`], and more where detail is missed, [`resample`]
 //!
 //! Departs from [K98]: the start is a convex map instead of crossings of shortest paths (those cross twice or run
 //! along a side on curved patches and fold the grid), and points move in that chart, where every step can be
-//! checked exactly for folds, instead of walking over the triangles.
+//! checked exactly for folds, instead of walking over the triangles. The fairness force and its schedule of weights are
+//! replaced, and aspect ratios are those of chords: `docs/methods/grids.md`.
 
 mod chart;
 mod feature;

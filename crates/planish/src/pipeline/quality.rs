@@ -120,7 +120,7 @@ fn compare(input: &TriMesh, result: &TriMesh, observer: &dyn Observer) -> Result
     Ok(mesh::compare(input, result, &CompareParams::default(), observer)?)
 }
 
-/// A share of a stage's progress: it starts at `.1` and is `.2` long.
+/// A share of a stage's progress: the observer, where the share starts, and how long it is.
 struct Share<'a>(&'a dyn Observer, f64, f64);
 
 impl Observer for Share<'_> {

@@ -9,21 +9,21 @@ use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// A gap costs at most so many mean edges of the mesh; an edge costs its length, a flat one twice that.
+/// Greatest cost of a bridge over a gap, mean edges of the mesh: a sharp edge costs its length, a flat one twice that.
 const WIDEST: f64 = 8.0;
-/// An end that leads to the middle of a line, or to the boundary, counts so many times: it may as well end there.
+/// Factor on the cost of a bridge to the middle of a line or to the boundary: a line may as well end in the open there.
 const BESIDE: f64 = 2.0;
-/// A line is at least so many gaps long; and what lies within so many gaps along its own line is no target of an end.
+/// A line must be this many times as long as its bridge costs; nor does a bridge lead to a place on its own line nearer than that.
 const LONG: f64 = 3.0;
-/// The direction of a line at its end is that of so many mean edges.
+/// Length over which the direction of a line at its end is taken, mean edges.
 const LAST: f64 = 4.0;
-/// A bridge lies within this angle of the direction in which a line ends (cosine of 50 degrees), but for the shortest ones, of
-/// so many mean edges.
+/// Cosine of the greatest angle (50 degrees) between a bridge and the direction in which its line ends; bridges shorter than
+/// `SHORTEST` mean edges may have any.
 const AHEAD: f64 = 0.64;
 const SHORTEST: f64 = 1.5;
-/// A loose end that leaves a line after less than so many mean edges is a spur.
+/// A branch with a loose end shorter than this, mean edges, is a spur.
 const SPUR: f64 = 1.5;
-/// A last edge of a loose end that is shorter than this share of a mean edge is no way on: noise turns it anywhere.
+/// A last edge shorter than this share of the mean edge tells no direction: noise turns it anywhere.
 const STUB: f64 = 0.2;
 /// A line that comes back within this angle around a single face is a spike.
 const SPIKE_ANGLE: f64 = 80.0 / 180.0 * std::f64::consts::PI;
@@ -33,7 +33,7 @@ const SPIKE_ANGLE: f64 = 80.0 / 180.0 * std::f64::consts::PI;
 const JOG: usize = 3;
 const JOG_COST: f64 = 0.35;
 
-/// A spike of a tagged line is shorter around than so many mean edges.
+/// Greatest length around a spike of a tagged line, mean edges.
 const SPIKE: f64 = 6.0;
 
 /// Bridges the gaps of the tagged lines of a mesh, and cuts their spurs, spikes and jogs. Returns how many gaps were bridged.
@@ -288,7 +288,7 @@ pub fn cut_spikes(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &m
     }
 }
 
-/// Leads lines that run beside themselves for a few edges straight on, the dearest detours first.
+/// Cuts jogs: replaces detours of a few edges by the straight way, those first that cost most against it.
 fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bool]) {
     let cost = |h: u32| length(mesh, h) * (2.0 - bend(mesh, adjacency, h));
     loop {

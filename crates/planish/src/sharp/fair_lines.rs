@@ -45,8 +45,8 @@ const CRAMPED: f64 = 0.2;
 const MERGES: usize = 24;
 
 /// Moves the lines of `tags` to where the surfaces beside them meet, and what is within four cells of them onto these surfaces;
-/// vertices that are in the way are merged into others. Lines that are rounded edges are no lines afterwards, and the mesh is
-/// smooth there. Returns the number of vertices that moved.
+/// vertices that are in the way are merged into others. Lines along rounded edges are dropped, and the mesh is smooth
+/// there. Returns the number of vertices that moved.
 ///
 /// No triangle turns over, and none comes to meet another. A mesh without noise stays as it is.
 pub fn fair_lines(mesh: &mut TriMesh, tags: &mut FeatureTags, scale: &ScanScale) -> usize {

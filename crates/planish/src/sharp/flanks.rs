@@ -25,10 +25,10 @@ const FEWEST: f64 = 8.0;
 const AGREE_SQUARED: f64 = 2.0;
 /// Least share of an estimate's own variance that counts as that of its difference to a more precise one.
 const SHARED: f64 = 0.25;
-/// Where what is right beside a line does not count, the first so many windows must have so many of these.
+/// Estimates from beyond a rounding need this weight in their first `CLOSE` windows: what is seen from afar alone may bend in between.
 const CLOSE: usize = 2;
 const SOME: f64 = 4.0;
-/// A first normal comes from within so many cells, as does the direction of the line.
+/// Radius of the first normal and of the direction of the line, cells.
 const NEAR: f64 = 3.0;
 /// What lies this near to a line, in cells, may be the rounding of an edge.
 const ROUNDING: f64 = 1.5;
