@@ -2,6 +2,7 @@
 
 use super::CurveError;
 use super::strip::{connect, vertex_of};
+use crate::geom::polyline;
 use crate::mesh::{Adjacency, FacePoint, TriMesh};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -30,7 +31,7 @@ impl SurfaceCurve {
     pub fn length(&self, mesh: &TriMesh) -> f64 {
         let p = self.positions(mesh);
         let wrap = if self.closed && p.len() > 1 { p[p.len() - 1].distance(p[0]) } else { 0.0 };
-        p.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>() + wrap
+        polyline::length(p) + wrap
     }
 
     /// Checks that every place is on the mesh.

@@ -3,6 +3,7 @@
 use super::chain::{SurfaceCurve, without_repeats};
 use super::{CurveError, attract::sample_polyline};
 use crate::geom::Bvh;
+use crate::geom::polyline;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, boundary_loops, next, path, previous};
 use glam::DVec3;
 
@@ -100,7 +101,7 @@ pub fn project(
     if polyline.len() < 2 {
         return Err(CurveError::TooFewPoints { found: polyline.len(), needed: 2 });
     }
-    let length: f64 = polyline.windows(2).map(|w| w[0].distance(w[1])).sum();
+    let length = polyline::length(polyline.iter().copied());
     // Far more places than any curve has uses for.
     const MOST: f64 = 1e6;
     let count = if spacing > 0.0 { (length / spacing).ceil().clamp(1.0, MOST) as usize + 1 } else { polyline.len() };

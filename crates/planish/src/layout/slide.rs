@@ -3,6 +3,7 @@
 
 use super::complex::Complex;
 use super::recut::{Bench, Change, outline};
+use crate::geom::polyline;
 use crate::mesh::TriMesh;
 use crate::network::CurveKind;
 use crate::network::imprint::Place;
@@ -87,10 +88,7 @@ fn plan(mesh: &TriMesh, complex: &Complex, star: &[u32]) -> Option<Slide> {
     line.reverse();
     let old = line.len() - 1;
     line.extend_from_slice(&vertices(star[y])?[1..]);
-    let mut along = vec![0.0];
-    for w in line.windows(2) {
-        along.push(along[along.len() - 1] + mesh.points[w[0] as usize].distance(mesh.points[w[1] as usize]));
-    }
+    let along = polyline::arc_lengths(line.iter().map(|&v| mesh.points[v as usize]));
     let total = along[along.len() - 1];
     // Across from the other ends of the smooth arcs.
     let (mut sum, mut count) = (0.0, 0.0);

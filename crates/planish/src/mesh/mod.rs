@@ -87,6 +87,23 @@ impl TriMesh {
         self.triangles[h as usize / 3][h as usize % 3]
     }
 
+    /// Length of the edge of half-edge `h`.
+    pub fn edge_length(&self, h: u32) -> f64 {
+        let (t, k) = (h as usize / 3, h as usize % 3);
+        let [from, to] = [k, (k + 1) % 3].map(|k| self.points[self.triangles[t][k] as usize]);
+        from.distance(to)
+    }
+
+    /// Mean length of the edges, those of two triangles counted twice; 0 without triangles.
+    pub fn mean_edge(&self) -> f64 {
+        let around = |t: usize| {
+            let [a, b, c] = self.corners(t);
+            a.distance(b) + b.distance(c) + c.distance(a)
+        };
+        let count = self.triangles.len();
+        (0..count).map(around).sum::<f64>() / (3 * count).max(1) as f64
+    }
+
     /// Bounding box of all vertices.
     pub fn bounds(&self) -> Aabb {
         Aabb::of(&self.points)

@@ -186,7 +186,7 @@ impl<'a> Filter<'a> {
         };
         let centers: Vec<DVec3> =
             (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.corners(t).iter().sum::<DVec3>() / 3.0).collect();
-        let edge = mean_edge(mesh);
+        let edge = mesh.mean_edge();
         // Two rings: triangles around the triangles around.
         let rings: Vec<Vec<(u32, f64)>> = (0..mesh.triangles.len())
             .into_par_iter()
@@ -292,16 +292,6 @@ impl<'a> Filter<'a> {
             })
             .collect()
     }
-}
-
-fn mean_edge(mesh: &TriMesh) -> f64 {
-    let sum: f64 = (0..mesh.triangles.len())
-        .map(|t| {
-            let [a, b, c] = mesh.corners(t);
-            a.distance(b) + b.distance(c) + c.distance(a)
-        })
-        .sum();
-    sum / (3 * mesh.triangles.len()) as f64
 }
 
 /// Shifts a closed mesh along its normals to the volume of the other.

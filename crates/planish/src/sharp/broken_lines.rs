@@ -3,10 +3,10 @@
 //! Noise hides a few edges of a line, or shifts it by an edge. A gap costs more than its length: a line with a loose end is
 //! taken for surface detail, or two patches run into one another there.
 
+use crate::geom::graph::{Reached, Search};
 use crate::mesh::{Adjacency, FeatureTags, NONE, TriMesh, next, path, previous};
 use glam::DVec3;
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 
 /// A gap costs at most so many mean edges of the mesh; an edge costs its length, a flat one twice that.
 const WIDEST: f64 = 8.0;
@@ -41,7 +41,7 @@ pub fn mend_lines(mesh: &TriMesh, tags: &mut FeatureTags) -> usize {
     let mut sharp = tags.on(mesh);
     sharp.iter_mut().zip(&adjacency.opposite).for_each(|(s, &o)| *s &= o != NONE);
     let bridged = bridge_gaps(mesh, &adjacency, &mut sharp);
-    cut_spikes(mesh, &adjacency, SPIKE * mean_edge(mesh), &mut sharp);
+    cut_spikes(mesh, &adjacency, SPIKE * mesh.mean_edge(), &mut sharp);
     *tags = tags.with_edges((0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| ends(mesh, h)));
     bridged
 }
@@ -112,7 +112,7 @@ fn cut_spurs(mesh: &TriMesh, adjacency: &Adjacency, edge: f64, sharp: &mut [bool
 /// a few edges away; spurs are cut first. Returns how many gaps were bridged.
 /// * `sharp` - for each half-edge whether it is on a sharp line; both halves of an edge alike
 pub fn bridge_gaps(mesh: &TriMesh, adjacency: &Adjacency, sharp: &mut [bool]) -> usize {
-    let edge = mean_edge(mesh);
+    let edge = mesh.mean_edge();
     cut_spurs(mesh, adjacency, edge, sharp);
     let mut bridged = 0;
     loop {
@@ -142,7 +142,7 @@ impl End {
         let (mut h, mut along) = (lines[&v][0], 0.0);
         let mut from = None;
         loop {
-            along += length(mesh, h);
+            along += mesh.edge_length(h);
             let to = mesh.origin(next(h));
             tail.push((to, along));
             if from.is_none() && along >= LAST * edge {
@@ -181,16 +181,12 @@ fn bridge(
     let end = &ends[&v];
     let at = |v: u32| mesh.points[v as usize];
     let reach = (WIDEST * edge).min(end.length() / LONG);
-    let mut found: BTreeMap<u32, (f64, u32)> = BTreeMap::from([(v, (0.0, v))]);
-    let mut heap = BinaryHeap::from([Reverse((0, v))]);
+    let mut search = Search::sparse();
+    search.reach(v, 0.0, NONE);
     let mut best: Option<(f64, u32)> = None;
-    while let Some(Reverse((bits, w))) = heap.pop() {
-        let cost = f64::from_bits(bits);
+    while let Some((w, cost)) = search.settle() {
         if best.is_some_and(|b| b.0 <= cost) {
             break;
-        }
-        if cost > found[&w].0 {
-            continue;
         }
         if w != v && (lines.contains_key(&w) || adjacency.is_boundary_vertex(w)) {
             let near = end.tail.iter().any(|t| t.0 == w && t.1 < LONG * cost);
@@ -204,36 +200,20 @@ fn bridge(
             continue;
         }
         for (x, h) in path::neighbours(mesh, adjacency, w) {
-            let cost = cost + length(mesh, h) * (2.0 - bend(mesh, adjacency, h));
-            if cost <= reach && found.get(&x).is_none_or(|known| cost < known.0) {
-                found.insert(x, (cost, w));
-                heap.push(Reverse((cost.to_bits(), x)));
+            let cost = cost + mesh.edge_length(h) * (2.0 - bend(mesh, adjacency, h));
+            if cost <= reach {
+                search.reach(x, cost, w);
             }
         }
     }
     let (cost, target) = best?;
-    let mut vertices = vec![target];
-    while let Some(&w) = vertices.last()
-        && w != v
-    {
-        vertices.push(found[&w].1);
-    }
-    Some(Bridge { cost, vertices })
+    Some(Bridge { cost, vertices: search.reached.chain(target) })
 }
 
 /// The vertices of a half-edge, the lesser first.
 fn ends(mesh: &TriMesh, h: u32) -> [u32; 2] {
     let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
     [a.min(b), a.max(b)]
-}
-
-fn mean_edge(mesh: &TriMesh) -> f64 {
-    let count = 3 * mesh.triangles.len();
-    (0..count as u32).map(|h| length(mesh, h)).sum::<f64>() / count.max(1) as f64
-}
-
-fn length(mesh: &TriMesh, h: u32) -> f64 {
-    mesh.points[mesh.origin(h) as usize].distance(mesh.points[mesh.origin(next(h)) as usize])
 }
 
 /// How much the surface bends at an edge: the sine of the angle there, 1 beyond a right angle.
@@ -289,7 +269,7 @@ pub fn cut_spikes(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &m
 
 /// Leads lines that run beside themselves for a few edges straight on, the dearest detours first.
 fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bool]) {
-    let cost = |h: u32| length(mesh, h) * (2.0 - bend(mesh, adjacency, h));
+    let cost = |h: u32| mesh.edge_length(h) * (2.0 - bend(mesh, adjacency, h));
     loop {
         let mut lines: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
@@ -316,7 +296,7 @@ fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bo
                 for (to, h) in path::neighbours(mesh, adjacency, from) {
                     let Some(j) = legs[1].iter().position(|&b| mesh.origin(next(b)) == to) else { continue };
                     let detour = [&legs[0][..=i], &legs[1][..=j]].concat();
-                    let way: f64 = detour.iter().map(|&h| length(mesh, h)).sum::<f64>() + length(mesh, h);
+                    let way: f64 = detour.iter().map(|&h| mesh.edge_length(h)).sum::<f64>() + mesh.edge_length(h);
                     let saved = JOG_COST * detour.iter().map(|&h| cost(h)).sum::<f64>() - cost(h);
                     let is_free = !sharp[h as usize] && adjacency.opposite[h as usize] != NONE && to != *v;
                     if is_free && way < longest && saved > 0.0 {
