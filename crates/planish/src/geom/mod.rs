@@ -2,6 +2,7 @@
 
 mod aabb;
 mod bvh;
+mod face_point;
 pub mod graph;
 mod kd_tree;
 pub mod polyline;
@@ -11,7 +12,8 @@ pub mod tolerance;
 
 pub use aabb::Aabb;
 pub(crate) use bvh::closest_in_triangle;
-pub use bvh::{Bvh, RayHit, SurfaceHit};
+pub use bvh::{Bvh, RayHit, SurfaceHit, Triangles};
+pub use face_point::FacePoint;
 pub use kd_tree::{KdTree, nearest_distances};
 
 /// "No such": an index where there is nothing.

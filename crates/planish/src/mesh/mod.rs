@@ -4,7 +4,6 @@ mod adjacency;
 pub mod compare;
 pub mod decimate;
 pub(crate) mod diagnose;
-mod face_point;
 mod features;
 pub(crate) mod intersect;
 pub mod path;
@@ -18,7 +17,6 @@ pub use adjacency::{Adjacency, Fan, NONE, next, previous};
 pub use compare::{CompareError, CompareParams, Comparison, compare};
 pub use decimate::{DecimateError, DecimateParams, DecimateTarget, Decimated, decimate};
 pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
-pub use face_point::FacePoint;
 pub use features::{boundary_loops, components, sharp_edges};
 pub use intersect::self_intersections;
 pub use smooth::{SmoothError, SmoothParams, Smoothed, smooth};
@@ -26,7 +24,9 @@ pub use soup::check;
 pub use tags::{FEATURE, FeatureKind, FeatureTags};
 pub use walk::{CurvePlace, move_point_on_curve, move_point_on_surface};
 
-use crate::geom::Aabb;
+pub use crate::geom::FacePoint;
+
+use crate::geom::{Aabb, Triangles};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -144,5 +144,19 @@ impl TriMesh {
             }
         }
         sum.into_iter().map(DVec3::normalize_or_zero).collect()
+    }
+}
+
+impl FacePoint {
+    /// World position.
+    pub fn position(&self, mesh: &TriMesh) -> DVec3 {
+        let [a, b, c] = mesh.corners(self.face as usize);
+        a * self.bary[0] + b * self.bary[1] + c * self.bary[2]
+    }
+}
+
+impl<'a> From<&'a TriMesh> for Triangles<'a> {
+    fn from(mesh: &'a TriMesh) -> Triangles<'a> {
+        Triangles { points: &mesh.points, triangles: &mesh.triangles }
     }
 }
