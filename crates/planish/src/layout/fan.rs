@@ -11,6 +11,7 @@ use super::recut::{Bench, Embedding, tighten};
 use crate::geom::graph::Search;
 use crate::geom::polyline;
 use crate::mesh::NONE;
+use crate::mesh::disjoint::disjoint;
 use crate::network::disk::Disk;
 use crate::network::imprint::Place;
 use glam::DVec2;
@@ -38,13 +39,8 @@ pub(super) fn spread(bench: &mut Bench) {
     let mut waiting: Vec<Vec<u32>> =
         bench.complex.stars().into_iter().filter(|star| star_change(&bench.complex, star).is_some()).collect();
     while !waiting.is_empty() {
-        let mut taken = vec![false; bench.complex.arcs.len()];
-        let (mut now, mut later) = (Vec::new(), Vec::new());
-        for star in waiting {
-            let free = star.iter().all(|&h| !taken[h as usize / 2]);
-            star.iter().filter(|_| free).for_each(|&h| taken[h as usize / 2] = true);
-            if free { now.push(star) } else { later.push(star) }
-        }
+        let arcs = |star: &Vec<u32>| star.iter().map(|h| h / 2).collect();
+        let (now, later) = disjoint(waiting, arcs, Some);
         let fans: Vec<Fan> = now.par_iter().filter_map(|star| fan(bench, star)).collect();
         bench.commit(fans, put);
         waiting = later;

@@ -9,6 +9,7 @@ use super::partition::Ground;
 use super::recut::{Bench, Change};
 use crate::geom::graph::Search;
 use crate::mesh::NONE;
+use crate::mesh::disjoint::disjoint;
 use crate::network::CurveKind;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -127,20 +128,10 @@ pub(super) fn plant(bench: &mut Bench, tips: &[u32], patches: usize) {
     while !waiting.is_empty() {
         let scale = Scale::new(bench, patches);
         let best: Vec<Option<Gain>> = waiting.par_iter().map(|&tip| best(bench, &scale, tip)).collect();
-        let mut taken = vec![false; bench.complex.cells.len()];
-        let (mut now, mut later) = (Vec::new(), Vec::new());
-        for (&tip, best) in waiting.iter().zip(best) {
-            match best {
-                Some((_, change)) if change.cells.iter().any(|&c| taken[c as usize]) => later.push(tip),
-                Some((_, change)) => {
-                    change.cells.iter().for_each(|&c| taken[c as usize] = true);
-                    now.push(change);
-                }
-                None => {}
-            }
-        }
+        let planned = waiting.into_iter().zip(best).filter_map(|(tip, best)| Some((tip, best?.1)));
+        let (now, later) = disjoint(planned, |(_, change)| change.cells.clone(), |(_, change)| Some(change));
         bench.apply(&now);
-        waiting = later;
+        waiting = later.into_iter().map(|x| x.0).collect();
     }
 }
 

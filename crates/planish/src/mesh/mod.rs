@@ -4,6 +4,7 @@ mod adjacency;
 pub mod compare;
 pub mod decimate;
 pub(crate) mod diagnose;
+pub(crate) mod disjoint;
 mod features;
 pub(crate) mod intersect;
 pub mod path;

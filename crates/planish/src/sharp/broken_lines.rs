@@ -4,6 +4,7 @@
 //! taken for surface detail, or two patches run into one another there.
 
 use crate::geom::graph::{Reached, Search};
+use crate::mesh::disjoint::disjoint;
 use crate::mesh::{Adjacency, FeatureTags, NONE, TriMesh, next, path, previous};
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -59,6 +60,15 @@ struct Bridge {
     vertices: Vec<u32>,
 }
 
+/// The half-edges on sharp lines that leave each vertex.
+fn lines_at(mesh: &TriMesh, sharp: &[bool]) -> BTreeMap<u32, Vec<u32>> {
+    let mut lines: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
+        lines.entry(mesh.origin(h)).or_default().push(h);
+    }
+    lines
+}
+
 /// The half-edges on sharp lines that leave each vertex, and the loose ends of these lines.
 fn loose_ends(
     mesh: &TriMesh,
@@ -66,10 +76,7 @@ fn loose_ends(
     sharp: &[bool],
     edge: f64,
 ) -> (BTreeMap<u32, Vec<u32>>, BTreeMap<u32, End>) {
-    let mut lines: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
-        lines.entry(mesh.origin(h)).or_default().push(h);
-    }
+    let lines = lines_at(mesh, sharp);
     let loose = |v: &u32| lines[v].len() == 1 && !adjacency.is_boundary_vertex(*v);
     let ends = lines.keys().copied().filter(loose).map(|v| (v, End::new(mesh, &lines, v, edge))).collect();
     (lines, ends)
@@ -121,16 +128,10 @@ pub fn bridge_gaps(mesh: &TriMesh, adjacency: &Adjacency, sharp: &mut [bool]) ->
         let mut bridges: Vec<Bridge> = ends.keys().filter_map(search).collect();
         bridges.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.vertices.cmp(&b.vertices)));
         // One at each place and time: others may lead elsewhere after it.
-        let mut taken: Vec<u32> = Vec::new();
-        for bridge in &bridges {
-            if bridge.vertices.iter().any(|v| taken.contains(v)) {
-                continue;
-            }
-            taken.extend(&bridge.vertices);
-            mark(mesh, adjacency, &bridge.vertices, sharp, true);
-            bridged += 1;
-        }
-        if taken.is_empty() {
+        let (now, _) = disjoint(bridges, |bridge| bridge.vertices.clone(), Some);
+        now.iter().for_each(|bridge| mark(mesh, adjacency, &bridge.vertices, sharp, true));
+        bridged += now.len();
+        if now.is_empty() {
             return bridged;
         }
     }
@@ -267,14 +268,14 @@ pub fn cut_spikes(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &m
     }
 }
 
+/// A detour of a line: what going straight saves, its half-edges, and the half-edge that takes their place.
+type Jog = (f64, Vec<u32>, u32);
+
 /// Leads lines that run beside themselves for a few edges straight on, the dearest detours first.
 fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bool]) {
     let cost = |h: u32| mesh.edge_length(h) * (2.0 - bend(mesh, adjacency, h));
     loop {
-        let mut lines: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
-            lines.entry(mesh.origin(h)).or_default().push(h);
-        }
+        let lines = lines_at(mesh, sharp);
         // Half-edges from a vertex on, until the line ends or forks.
         let leg = |mut h: u32| {
             let mut leg = vec![h];
@@ -288,7 +289,7 @@ fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bo
             }
             leg
         };
-        let mut jogs: Vec<(f64, Vec<u32>, u32)> = Vec::new();
+        let mut jogs: Vec<Jog> = Vec::new();
         for (v, out) in lines.iter().filter(|l| l.1.len() == 2 && !adjacency.is_boundary_vertex(*l.0)) {
             let legs = [leg(out[0]), leg(out[1])];
             for (i, &a) in legs[0].iter().enumerate() {
@@ -306,19 +307,15 @@ fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bo
             }
         }
         jogs.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
-        let mut taken: Vec<u32> = Vec::new();
-        for (_, detour, short) in &jogs {
-            let around: Vec<u32> = detour.iter().flat_map(|&h| [mesh.origin(h), mesh.origin(next(h))]).collect();
-            if around.iter().any(|v| taken.contains(v)) {
-                continue;
-            }
-            taken.extend(around);
+        let around = |jog: &Jog| jog.1.iter().flat_map(|&h| [mesh.origin(h), mesh.origin(next(h))]).collect();
+        let (now, _) = disjoint(jogs, around, Some);
+        for (_, detour, short) in &now {
             for (&h, is_sharp) in detour.iter().map(|h| (h, false)).chain([(short, true)]) {
                 sharp[h as usize] = is_sharp;
                 sharp[adjacency.opposite[h as usize] as usize] = is_sharp;
             }
         }
-        if taken.is_empty() {
+        if now.is_empty() {
             return;
         }
     }

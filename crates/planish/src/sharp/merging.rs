@@ -1,5 +1,6 @@
 //! Triangles that are not as they should be: vertices merged into neighbours and edges flipped, one disk at a time.
 
+use crate::mesh::disjoint::Taken;
 use crate::mesh::intersect::intersections_of;
 use crate::mesh::{FeatureKind, TriMesh};
 use glam::DVec3;
@@ -60,20 +61,20 @@ impl<'a> Merging<'a> {
     /// * `fault` - of a triangle with these corners
     /// * `longest` - vertices are merged over edges that are at most so long
     pub fn round(&mut self, faulty: &[u32], fault: impl Fn(u32, [DVec3; 3]) -> Fault, longest: f64) -> Vec<u32> {
-        let mut taken = BTreeSet::new();
+        let mut taken = Taken::default();
         let mut changes: Vec<Change> = Vec::new();
         for &t in faulty {
             let Some(corners) = self.triangles[t as usize] else { continue };
             if fault(t, corners.map(|v| self.points[v as usize])) == Fault::None {
                 continue;
             }
-            let around: BTreeSet<u32> = corners.iter().flat_map(|&v| self.around(v)).chain(corners).collect();
-            if around.iter().any(|v| taken.contains(v)) {
+            let around: Vec<u32> = corners.iter().flat_map(|&v| self.around(v)).chain(corners).collect();
+            if !taken.spares(&around) {
                 continue;
             }
             let change = self.merge_any(corners, &fault, longest).or_else(|| self.flip_any(t, corners, &fault));
             if let Some(change) = change {
-                taken.extend(around);
+                taken.add(&around);
                 changes.push(change);
             }
         }
