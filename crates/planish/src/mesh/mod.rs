@@ -1,6 +1,7 @@
 //! Triangle meshes: flat arrays, adjacency, places on the surface.
 
 mod adjacency;
+pub(crate) mod change;
 pub mod compare;
 pub mod decimate;
 pub(crate) mod diagnose;
