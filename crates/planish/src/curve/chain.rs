@@ -3,6 +3,7 @@
 use super::CurveError;
 use super::strip::{connect, vertex_of};
 use crate::geom::polyline;
+use crate::geom::tolerance::ON_EDGE;
 use crate::mesh::{Adjacency, FacePoint, TriMesh};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -96,8 +97,6 @@ impl SurfaceCurve {
 
 /// Two places of one edge nearer than this share of it are the same: rounding, seen from its two faces.
 const SAME_ON_EDGE: f64 = 1e-10;
-/// Weights below this are zero, as where curves are imprinted.
-const ON_EDGE: f64 = 1e-12;
 
 /// A place by what it lies on: a vertex, an edge by its vertices (lower first) with the share of the way, or a face.
 #[derive(Clone, Copy, Debug)]

@@ -4,11 +4,9 @@ use super::chain::{SurfaceCurve, without_repeats};
 use super::{CurveError, attract::sample_polyline};
 use crate::geom::Bvh;
 use crate::geom::polyline;
+use crate::geom::tolerance::AT_VERTEX;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, boundary_loops, next, path, previous};
 use glam::DVec3;
-
-/// A cut nearer to the end of an edge than this share of it goes through the vertex.
-const AT_VERTEX: f64 = 1e-9;
 
 /// The cut of the surface by a plane through `point` with `normal`, followed from the face `start` (which the plane
 /// must meet or touch) both ways until it closes or ends at a boundary. Looks at the faces along the cut only; neighbours of

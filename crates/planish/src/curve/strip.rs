@@ -12,14 +12,12 @@
 use super::CurveError;
 use crate::geom::graph::{Reached, Search};
 use crate::geom::polyline;
+use crate::geom::tolerance::{AT_VERTEX, ON_EDGE};
 use crate::mesh::path::neighbours;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next, previous};
 use glam::DVec2;
 use std::collections::HashMap;
 
-/// A crossing nearer to the end of an edge than this share of it goes through the vertex: nearer ones would make
-/// triangles without area where the curve is imprinted.
-const AT_VERTEX: f64 = 1e-9;
 /// Slack on the angle of 180 degrees, radians: a way this straight is straight.
 const STRAIGHT: f64 = 1e-9;
 /// Rounds of turning per face of the strip before the way is taken as it is.
@@ -394,9 +392,6 @@ fn whole_angle(mesh: &TriMesh, adjacency: &Adjacency, w: u32) -> f64 {
     };
     adjacency.fan(w).map(corner).sum()
 }
-
-/// Weights below this are zero: the place lies on the edge.
-const ON_EDGE: f64 = 1e-12;
 
 /// Names ends of a strip that lie on the first (or last) edge crossed on the face beyond; such edges are no longer
 /// crossed then, or the way would name the place twice.
