@@ -4,12 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Rooms of the library and the floor each stands on; a room may use its own and lower floors. The ground floor also
-/// speaks of meshes in its queries, and those are plain types.
+/// Rooms of the library and the floor each stands on; a room may use its own and lower floors.
 const FLOORS: [(&str, u32); 20] = [
     ("observe", 0),
     ("linalg", 0),
-    ("geom", 1),
+    ("geom", 0),
     ("mesh", 1),
     ("mend", 2),
     ("sharp", 2),

@@ -4,13 +4,12 @@
 //! distances from a few far places, made once, bound the way ahead from below much better than the straight line
 //! where the surface bends, and the search stays near the path.
 
-use super::strip::Waiting;
 use super::{CurveError, ScalarField};
+use crate::geom::graph::Queue;
 use crate::mesh::path::neighbours;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::collections::BinaryHeap;
 use std::sync::Mutex;
 
 /// Landmarks: the two ends of the shape along each of these directions.
@@ -278,8 +277,9 @@ impl<'m> Canvas<'m> {
         };
         scratch.begin(points.len());
         scratch.shorten(from, 0.0, NONE, || first);
-        let mut heap = BinaryHeap::from([Waiting { estimate: first, distance: 0.0, vertex: from }]);
-        while let Some(Waiting { distance, vertex: v, .. }) = heap.pop() {
+        let mut queue = Queue::default();
+        queue.push(first, from, 0.0);
+        while let Some((v, distance)) = queue.pop() {
             if scratch.is_done(v) {
                 continue;
             }
@@ -293,7 +293,7 @@ impl<'m> Canvas<'m> {
                 }
                 let d = distance + length as f64 * magnet.map_or(1.0, |m| m.weight(v, w));
                 if let Some(estimate) = scratch.shorten(w, d, v, || ahead(w)) {
-                    heap.push(Waiting { estimate, distance: d, vertex: w });
+                    queue.push(estimate, w, d);
                 }
             }
         }

@@ -4,6 +4,8 @@
 
 use super::CurveError;
 use super::strip::{connect, vertex_of};
+use crate::geom::polyline;
+use crate::geom::tolerance::ON_EDGE;
 use crate::mesh::{Adjacency, FacePoint, TriMesh};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -32,7 +34,7 @@ impl SurfaceCurve {
     pub fn length(&self, mesh: &TriMesh) -> f64 {
         let p = self.positions(mesh);
         let wrap = if self.closed && p.len() > 1 { p[p.len() - 1].distance(p[0]) } else { 0.0 };
-        p.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>() + wrap
+        polyline::length(p) + wrap
     }
 
     /// Checks that every place is on the mesh.
@@ -97,8 +99,6 @@ impl SurfaceCurve {
 
 /// Two places of one edge nearer than this share of it are the same: rounding, seen from its two faces.
 const SAME_ON_EDGE: f64 = 1e-10;
-/// Weights below this are zero, as where curves are imprinted.
-const ON_EDGE: f64 = 1e-12;
 
 /// A place by what it lies on: a vertex, an edge by its vertices (lower first) with the share of the way, or a face.
 #[derive(Clone, Copy, Debug)]

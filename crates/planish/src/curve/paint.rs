@@ -8,6 +8,7 @@ use super::canvas::{Canvas, Magnet};
 use super::chain::{SurfaceCurve, sample, without_repeats, without_spur};
 use super::strip::{nearest_corner, no_way, straighten};
 use super::{CurveError, attract};
+use crate::geom::polyline;
 use crate::mesh::{FacePoint, path};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -215,7 +216,7 @@ fn straight(
     };
     let chain = greedy.as_deref().or(shortest.as_deref()).unwrap_or(&[]);
     let (p, q) = (from.position(mesh), to.position(mesh));
-    let length: f64 = chain.windows(2).map(|w| mesh.points[w[0] as usize].distance(mesh.points[w[1] as usize])).sum();
+    let length = polyline::length(chain.iter().map(|&v| mesh.points[v as usize]));
     let segment = p.distance(q);
     if length > BULGE * segment + 2.0 * canvas.edge {
         return geodesic();

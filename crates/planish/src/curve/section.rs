@@ -3,11 +3,10 @@
 use super::chain::{SurfaceCurve, without_repeats};
 use super::{CurveError, attract::sample_polyline};
 use crate::geom::Bvh;
+use crate::geom::polyline;
+use crate::geom::tolerance::AT_VERTEX;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, boundary_loops, next, path, previous};
 use glam::DVec3;
-
-/// A cut nearer to the end of an edge than this share of it goes through the vertex.
-const AT_VERTEX: f64 = 1e-9;
 
 /// The cut of the surface by a plane through `point` with `normal`, followed from the face `start` (which the plane
 /// must meet or touch) both ways until it closes or ends at a boundary. Looks at the faces along the cut only; neighbours of
@@ -100,7 +99,7 @@ pub fn project(
     if polyline.len() < 2 {
         return Err(CurveError::TooFewPoints { found: polyline.len(), needed: 2 });
     }
-    let length: f64 = polyline.windows(2).map(|w| w[0].distance(w[1])).sum();
+    let length = polyline::length(polyline.iter().copied());
     // Far more places than any curve has uses for.
     const MOST: f64 = 1e6;
     let count = if spacing > 0.0 { (length / spacing).ceil().clamp(1.0, MOST) as usize + 1 } else { polyline.len() };

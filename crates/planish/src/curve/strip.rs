@@ -10,15 +10,14 @@
 //! way crosses are looked at.
 
 use super::CurveError;
+use crate::geom::graph::{Reached, Search};
+use crate::geom::polyline;
+use crate::geom::tolerance::{AT_VERTEX, ON_EDGE};
 use crate::mesh::path::neighbours;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next, previous};
 use glam::DVec2;
-use std::cmp::Ordering;
-use std::collections::{BinaryHeap, HashMap};
+use std::collections::HashMap;
 
-/// A crossing nearer to the end of an edge than this share of it goes through the vertex: nearer ones would make
-/// triangles without area where the curve is imprinted.
-const AT_VERTEX: f64 = 1e-9;
 /// Slack on the angle of 180 degrees, radians: a way this straight is straight.
 const STRAIGHT: f64 = 1e-9;
 /// Rounds of turning per face of the strip before the way is taken as it is.
@@ -91,7 +90,7 @@ const BENT: f64 = 1.02;
 const NEAR: usize = 24;
 
 fn length(mesh: &TriMesh, places: &[FacePoint]) -> f64 {
-    places.windows(2).map(|w| w[0].position(mesh).distance(w[1].position(mesh))).sum()
+    polyline::length(places.iter().map(|p| p.position(mesh)))
 }
 
 pub(crate) fn no_way(mesh: &TriMesh, from: &FacePoint, to: &FacePoint) -> CurveError {
@@ -394,9 +393,6 @@ fn whole_angle(mesh: &TriMesh, adjacency: &Adjacency, w: u32) -> f64 {
     adjacency.fan(w).map(corner).sum()
 }
 
-/// Weights below this are zero: the place lies on the edge.
-const ON_EDGE: f64 = 1e-12;
-
 /// Names ends of a strip that lie on the first (or last) edge crossed on the face beyond; such edges are no longer
 /// crossed then, or the way would name the place twice.
 fn beyond_their_edges<G>(
@@ -527,57 +523,21 @@ fn places(
     out
 }
 
-/// A vertex waiting in the heap; the nearest comes out first, ties by index.
-pub(super) struct Waiting {
-    pub estimate: f64,
-    pub distance: f64,
-    pub vertex: u32,
-}
-
-impl PartialEq for Waiting {
-    fn eq(&self, other: &Waiting) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Waiting {}
-impl PartialOrd for Waiting {
-    fn partial_cmp(&self, other: &Waiting) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Waiting {
-    fn cmp(&self, other: &Waiting) -> Ordering {
-        other.estimate.total_cmp(&self.estimate).then(other.vertex.cmp(&self.vertex))
-    }
-}
-
 /// Shortest chain of edges between two vertices that lie near each other (A*); memory grows with what is visited.
 fn local_path(mesh: &TriMesh, adjacency: &Adjacency, from: u32, to: u32) -> Option<Vec<u32>> {
     let goal = mesh.points[to as usize];
-    let mut reached: HashMap<u32, (f64, u32)> = HashMap::from([(from, (0.0, NONE))]);
-    let mut heap = BinaryHeap::from([Waiting { estimate: 0.0, distance: 0.0, vertex: from }]);
-    while let Some(Waiting { distance, vertex: v, .. }) = heap.pop() {
-        if distance > reached[&v].0 {
-            continue;
-        }
+    let mut search = Search::sparse();
+    search.reach(from, 0.0, NONE);
+    while let Some((v, distance)) = search.settle() {
         if v == to {
-            let mut chain = vec![v];
-            let mut at = v;
-            while reached[&at].1 != NONE {
-                at = reached[&at].1;
-                chain.push(at);
-            }
+            let mut chain = search.reached.chain(to);
             chain.reverse();
             return Some(chain);
         }
         let p = mesh.points[v as usize];
         for (w, _) in neighbours(mesh, adjacency, v) {
             let q = mesh.points[w as usize];
-            let d = distance + p.distance(q);
-            if reached.get(&w).is_none_or(|x| d < x.0) {
-                reached.insert(w, (d, v));
-                heap.push(Waiting { estimate: d + q.distance(goal), distance: d, vertex: w });
-            }
+            search.reach_towards(w, distance + p.distance(q), v, q.distance(goal));
         }
     }
     None

@@ -8,6 +8,7 @@
 
 use super::{CurveError, SurfaceCurve};
 use crate::geom::Bvh;
+use crate::linalg::eigen3;
 use crate::mesh::{Adjacency, FacePoint, TriMesh};
 use crate::observe::Observer;
 use glam::{DMat3, DVec3};
@@ -143,9 +144,8 @@ fn refine(bvh: &Bvh, samples: &[DVec3], plane: Plane, rounds: usize) -> (Plane, 
             let (a, b) = (*p - cp, *q - cq);
             m += DMat3::from_cols(a * b.x + b * a.x, a * b.y + b * a.y, a * b.z + b * a.z);
         }
-        let (values, vectors) = eigen(m);
-        let k = (0..3).min_by(|&i, &j| values[i].total_cmp(&values[j])).unwrap_or(0);
-        let trial = Plane { point: (cp + cq) / 2.0, normal: vectors[k] };
+        let (_, vectors) = eigen3(m);
+        let trial = Plane { point: (cp + cq) / 2.0, normal: vectors[0] };
         let (miss, matched) = judge(&trial);
         if miss >= best * (1.0 - 1e-9) {
             break;
@@ -166,40 +166,7 @@ fn principal_axes(mesh: &TriMesh) -> (DVec3, [DVec3; 3]) {
         let d = *p - center;
         m += DMat3::from_cols(d * d.x, d * d.y, d * d.z) * *w;
     }
-    (center, eigen(m).1)
-}
-
-/// Eigenvalues and unit eigenvectors of a symmetric matrix (Jacobi rotations).
-fn eigen(m: DMat3) -> ([f64; 3], [DVec3; 3]) {
-    // Quadratic convergence: a handful of sweeps reaches rounding.
-    const SWEEPS: usize = 12;
-    let mut a = m.to_cols_array_2d();
-    let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    for _ in 0..SWEEPS {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q] == 0.0 {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = if theta == 0.0 { 1.0 } else { theta.signum() / (theta.abs() + theta.hypot(1.0)) };
-            let c = 1.0 / t.hypot(1.0);
-            let s = t * c;
-            for row in &mut a {
-                let (x, y) = (row[p], row[q]);
-                (row[p], row[q]) = (c * x - s * y, s * x + c * y);
-            }
-            for k in 0..3 {
-                let (x, y) = (a[p][k], a[q][k]);
-                (a[p][k], a[q][k]) = (c * x - s * y, s * x + c * y);
-            }
-            for row in &mut v {
-                let (x, y) = (row[p], row[q]);
-                (row[p], row[q]) = (c * x - s * y, s * x + c * y);
-            }
-        }
-    }
-    let column = |k: usize| DVec3::new(v[0][k], v[1][k], v[2][k]).normalize_or_zero();
-    ([a[0][0], a[1][1], a[2][2]], [column(0), column(1), column(2)])
+    (center, eigen3(m).1)
 }
 
 #[cfg(test)]

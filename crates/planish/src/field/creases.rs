@@ -7,7 +7,7 @@
 //! See `docs/methods/fields.md`, "Creases of sources".
 
 use super::{Creases, Lattice};
-use crate::geom::{Bvh, KdTree};
+use crate::geom::{Bvh, KdTree, Triangles};
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -113,9 +113,9 @@ impl MeshCreases {
         }
         let tree = |edges: &[[u32; 2]]| {
             (!edges.is_empty()).then(|| {
-                let points = edges.iter().flatten().map(|&v| mesh.points[v as usize]).collect();
-                let flat = (0..edges.len() as u32).map(|e| [2 * e, 2 * e + 1, 2 * e + 1]).collect();
-                Bvh::new(&TriMesh::new(points, flat))
+                let points: Vec<DVec3> = edges.iter().flatten().map(|&v| mesh.points[v as usize]).collect();
+                let flat: Vec<[u32; 3]> = (0..edges.len() as u32).map(|e| [2 * e, 2 * e + 1, 2 * e + 1]).collect();
+                Bvh::new(Triangles { points: &points, triangles: &flat })
             })
         };
         let by_cell = |points: Vec<DVec3>| {

@@ -9,10 +9,24 @@
 //! Boxes are `f32`, in units of half the diagonal around the middle of the mesh, and grown by more than the rounding
 //! ([`PAD`]); they only rule out. What counts, the distance to a triangle, is `f64` in world units.
 
-use super::Aabb;
-use crate::mesh::{FacePoint, TriMesh};
+use super::{Aabb, FacePoint};
 use glam::{DVec3, Vec3A, Vec4};
 use rayon::prelude::*;
+
+/// The triangles a tree is built over; a mesh is one of the things that turn into it.
+#[derive(Clone, Copy, Debug)]
+pub struct Triangles<'a> {
+    /// Positions of the vertices.
+    pub points: &'a [DVec3],
+    /// Vertices of each triangle.
+    pub triangles: &'a [[u32; 3]],
+}
+
+impl Triangles<'_> {
+    fn corners(&self, t: usize) -> [DVec3; 3] {
+        self.triangles[t].map(|v| self.points[v as usize])
+    }
+}
 
 /// A bounding volume hierarchy over the triangles of one mesh, with its own copy of their corners.
 pub struct Bvh {
@@ -116,8 +130,9 @@ const STACK: usize = (HALVE + 17) * (WIDE - 1) + 1;
 impl Bvh {
     /// Builds the tree.
     /// # Panics
-    /// If the mesh has no triangle.
-    pub fn new(mesh: &TriMesh) -> Bvh {
+    /// If there is no triangle.
+    pub fn new<'a>(surface: impl Into<Triangles<'a>>) -> Bvh {
+        let mesh = surface.into();
         assert!(!mesh.triangles.is_empty(), "a mesh with triangles");
         let unit = Unit::of(&Aabb::of(mesh.triangles.iter().flatten().map(|&v| &mesh.points[v as usize])));
         let mut items: Vec<Item> = (0..mesh.triangles.len())

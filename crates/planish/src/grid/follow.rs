@@ -16,6 +16,7 @@ use super::net::fold::{folded_cells, open_folds};
 use super::net::settle::settle;
 use super::net::{Net, smooth_turned, turns_over};
 use super::{CAUGHT, Fault, Grid, GridError, GridParams, SideStops, laid, relax_patch, rim_node, side};
+use crate::geom::polyline;
 use crate::mesh::{NONE, TriMesh};
 use crate::network::PatchMesh;
 use crate::observe::Observer;
@@ -246,7 +247,7 @@ impl<'a> Carry<'a> {
     fn new(chart: &'a Chart, old: &'a Grid) -> Carry<'a> {
         let owners = Owners::new(chart);
         let known = old.places.iter().map(|p| owners.spot(p.face, p.bary)).collect();
-        let length: f64 = old.points.windows(2).map(|w| w[0].distance(w[1])).sum();
+        let length = polyline::length(old.points.iter().copied());
         Carry { chart, map: Map(old), known, rest: NEAR_ENOUGH * length / old.points.len() as f64 }
     }
 

@@ -5,6 +5,7 @@
 //!
 //! [K98] §5.4 and §5.6.
 
+use crate::geom::polyline;
 use glam::DVec3;
 
 /// A segment shorter than this fraction of the mean one is taken as that long in the chart, so that the chart's
@@ -33,25 +34,12 @@ fn runs_backwards(chain: &[DVec3]) -> bool {
     false
 }
 
-/// Sums of segment lengths along `chain`, from 0 to its length.
-fn arc_lengths(chain: &[DVec3]) -> Vec<f64> {
-    let mut sums = Vec::with_capacity(chain.len());
-    let mut sum = 0.0;
-    sums.push(sum);
-    for pair in chain.windows(2) {
-        sum += pair[0].distance(pair[1]);
-        sums.push(sum);
-    }
-    sums
-}
-
 /// Length of a chain, the same bits for both directions.
 pub fn length(chain: &[DVec3]) -> f64 {
     if runs_backwards(chain) {
-        let turned: Vec<DVec3> = chain.iter().rev().copied().collect();
-        return arc_lengths(&turned).last().copied().unwrap_or(0.0);
+        return polyline::length(chain.iter().rev().copied());
     }
-    arc_lengths(chain).last().copied().unwrap_or(0.0)
+    polyline::length(chain.iter().copied())
 }
 
 /// Stops of a side: shares of its length, rising, with the node that lies there. Shares are multiples of
@@ -102,7 +90,7 @@ pub fn resample_at(chain: &[DVec3], count: usize, stops: &Stops) -> SideSamples 
     let backwards = runs_backwards(chain);
     let canonical: Vec<DVec3> = if backwards { chain.iter().rev().copied().collect() } else { chain.to_vec() };
     let stops = if backwards { turned(stops, count) } else { stops.clone() };
-    let sums = arc_lengths(&canonical);
+    let sums = polyline::arc_lengths(canonical.iter().copied());
     let total = sums[sums.len() - 1];
     let segments = canonical.len() - 1;
     let mut out = SideSamples { points: Vec::new(), segment: Vec::new(), fraction: Vec::new() };

@@ -7,13 +7,15 @@
 use super::complex::Complex;
 use super::improve::star_change;
 use super::recut::{Bench, Embedding, tighten};
+use crate::geom::graph::Search;
+use crate::geom::polyline;
 use crate::mesh::NONE;
+use crate::mesh::disjoint::disjoint;
 use crate::network::disk::Disk;
 use crate::network::imprint::Place;
 use glam::DVec2;
 use rayon::prelude::*;
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 /// Radii of the disks that are tried, in parts of the shortest arc at the node: disks of neighbours stay apart.
@@ -36,13 +38,8 @@ pub(super) fn spread(bench: &mut Bench) {
     let mut waiting: Vec<Vec<u32>> =
         bench.complex.stars().into_iter().filter(|star| star_change(&bench.complex, star).is_some()).collect();
     while !waiting.is_empty() {
-        let mut taken = vec![false; bench.complex.arcs.len()];
-        let (mut now, mut later) = (Vec::new(), Vec::new());
-        for star in waiting {
-            let free = star.iter().all(|&h| !taken[h as usize / 2]);
-            star.iter().filter(|_| free).for_each(|&h| taken[h as usize / 2] = true);
-            if free { now.push(star) } else { later.push(star) }
-        }
+        let arcs = |star: &Vec<u32>| star.iter().map(|h| h / 2).collect();
+        let (now, later) = disjoint(waiting, arcs, Some);
         let fans: Vec<Fan> = now.par_iter().filter_map(|star| fan(bench, star)).collect();
         bench.commit(fans, put);
         waiting = later;
@@ -64,10 +61,8 @@ fn put(complex: &mut Complex, fan: &Fan) -> Vec<u32> {
 /// The half-arcs of `star` drawn anew near their node.
 fn fan(bench: &Bench, star: &[u32]) -> Option<Fan> {
     let embedding = &bench.embedding;
-    let length = |chain: &[u32]| -> f64 {
-        let at = |v: u32| embedding.cut.mesh.points[v as usize];
-        chain.windows(2).map(|w| at(w[0]).distance(at(w[1]))).sum()
-    };
+    let length =
+        |chain: &[u32]| -> f64 { polyline::length(chain.iter().map(|&v| embedding.cut.mesh.points[v as usize])) };
     let chains: Vec<Vec<u32>> = star.iter().map(|&h| embedding.chain(h)).collect();
     let shortest = chains.iter().map(|c| length(c)).fold(f64::INFINITY, f64::min);
     RADII.into_iter().find_map(|part| within(bench, star, &chains, part * shortest))
@@ -124,26 +119,22 @@ fn within(bench: &Bench, star: &[u32], chains: &[Vec<u32>], radius: f64) -> Opti
 /// The disk around a node: `None` if it is none, or other arcs than those of `star` run in it.
 fn disc(embedding: &Embedding, star: &[u32], node: u32, radius: f64) -> Option<Disk> {
     let (cut, adjacency) = (&embedding.cut, &embedding.adjacency);
-    let mut distance: BTreeMap<u32, f64> = BTreeMap::from([(node, 0.0)]);
-    let mut heap = BinaryHeap::from([Reverse((0u64, node))]);
-    while let Some(Reverse((key, v))) = heap.pop() {
-        let d = f64::from_bits(key);
-        if d > distance[&v] {
-            continue;
-        }
+    let mut search = Search::sparse();
+    search.reach(node, 0.0, NONE);
+    while let Some((v, d)) = search.settle() {
         for h in adjacency.fan(v) {
             let t = cut.mesh.triangles[h as usize / 3];
             for w in t.into_iter().filter(|&w| w != v) {
                 let e = d + cut.mesh.points[v as usize].distance(cut.mesh.points[w as usize]);
-                if e <= radius && distance.get(&w).is_none_or(|&known| e < known) {
-                    distance.insert(w, e);
-                    heap.push(Reverse((e.to_bits(), w)));
+                if e <= radius {
+                    search.reach(w, e, v);
                 }
             }
         }
     }
-    let whole = |f: &u32| cut.mesh.triangles[*f as usize].iter().all(|v| distance.contains_key(v));
-    let mut faces: Vec<u32> = distance.keys().flat_map(|&v| adjacency.fan(v).map(|h| h / 3)).filter(whole).collect();
+    let near = search.reached;
+    let whole = |f: &u32| cut.mesh.triangles[*f as usize].iter().all(|v| near.contains_key(v));
+    let mut faces: Vec<u32> = near.keys().flat_map(|&v| adjacency.fan(v).map(|h| h / 3)).filter(whole).collect();
     faces.sort_unstable();
     faces.dedup();
     if faces.len() < FEWEST {

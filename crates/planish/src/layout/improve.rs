@@ -8,10 +8,11 @@ use super::complex::{Complex, Node};
 use super::fill::{Gain, Scale};
 use super::recut::{Bench, Change, outline};
 use super::{LayoutError, polygon, slide};
+use crate::mesh::disjoint::disjoint;
 use crate::network::CurveKind;
 use crate::observe::Observer;
 use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// A change must lower the energy by this, so that none is made for rounding; and by this factor more in every
 /// round, for what relaxing undoes would otherwise go back and forth.
@@ -179,16 +180,7 @@ fn choose(
     let mut found: Vec<Gain> = gains.into_iter().flatten().filter(|g| g.0 > least).collect();
     // Ties by the cells, so that the order does not depend on how candidates were found.
     found.sort_by(|x, y| y.0.total_cmp(&x.0).then_with(|| x.1.cells.cmp(&y.1.cells)));
-    let mut taken = BTreeSet::new();
-    let mut chosen = Vec::new();
-    for (_, change) in found {
-        let touched = touches(&change);
-        if !touched.iter().any(|t| taken.contains(t)) {
-            taken.extend(touched);
-            chosen.push(change);
-        }
-    }
-    chosen
+    disjoint(found, |gain| touches(&gain.1), |gain| Some(gain.1)).0
 }
 
 /// The change that places the node of `star` anew and redraws its arcs; `None` for a fixed node.

@@ -41,7 +41,7 @@ pub(super) fn feature_lines(
         return kept;
     }
     let sharp = sharp_edges(mesh, adjacency, params.sharp_angle_deg);
-    let edges: f64 = (0..sharp.len() as u32).map(|h| length(mesh, h)).sum();
+    let edges: f64 = (0..sharp.len() as u32).map(|h| mesh.edge_length(h)).sum();
     let reach = REACH * edges / sharp.len().max(1) as f64;
     let least = (WIDE_ANGLE * params.sharp_angle_deg).to_radians().cos();
     let mut kept: Vec<bool> = (0..sharp.len() as u32)
@@ -63,10 +63,6 @@ pub(super) fn feature_lines(
     }
     drop_detail(mesh, adjacency, params.feature_length * mesh.bounds().diagonal(), &mut kept);
     kept
-}
-
-fn length(mesh: &TriMesh, h: u32) -> f64 {
-    mesh.points[mesh.origin(h) as usize].distance(mesh.points[mesh.origin(next(h)) as usize])
 }
 
 /// Mean unit normal of the surface to the left of sharp half-edge `h`, up to `reach` from its middle and to the
@@ -136,7 +132,7 @@ fn drop_loose(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut 
                 line.push(if a == back { b } else { a });
                 end = mesh.origin(next(line[line.len() - 1]));
             }
-            let total = line.iter().map(|&h| length(mesh, h)).sum();
+            let total = line.iter().map(|&h| mesh.edge_length(h)).sum();
             if total < shortest {
                 lines.push((total, line, end));
             }
@@ -176,7 +172,7 @@ fn drop_regions(mesh: &TriMesh, adjacency: &Adjacency, smallest: f64, sharp: &mu
         let (own, other) = (root[h as usize / 3], root[adjacency.opposite[h as usize] as usize / 3]);
         if own != other && area[own as usize] < smallest {
             let rim = rims.entry(own).or_default().entry(other).or_default();
-            rim.0 += length(mesh, h);
+            rim.0 += mesh.edge_length(h);
             rim.1.push(h);
         }
     }
@@ -198,7 +194,7 @@ fn drop_short(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut 
     }
     let mut total = vec![0.0; mesh.points.len()];
     for &h in &edges {
-        total[sets.root(mesh.origin(h)) as usize] += length(mesh, h);
+        total[sets.root(mesh.origin(h)) as usize] += mesh.edge_length(h);
     }
     for &h in &edges {
         if total[sets.root(mesh.origin(h)) as usize] < shortest {

@@ -9,12 +9,12 @@
 //! cells, too.
 
 use super::LayoutError;
+use crate::geom::graph::{Dense, Reached, Search};
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
 use crate::observe::Observer;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap, HashMap};
+use std::collections::{BTreeMap, HashMap};
 
 /// Rounds of Lloyd relaxation; the cells hardly change after these.
 const LLOYD_ROUNDS: usize = 5;
@@ -33,21 +33,6 @@ pub(super) struct Ground<'a> {
     pub sharp: &'a [bool],
     centroid: Vec<DVec3>,
     area: Vec<f64>,
-}
-
-/// An `f64` that sorts.
-#[derive(PartialEq)]
-struct Sorted(f64);
-impl Eq for Sorted {}
-impl PartialOrd for Sorted {
-    fn partial_cmp(&self, other: &Sorted) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Sorted {
-    fn cmp(&self, other: &Sorted) -> std::cmp::Ordering {
-        self.0.total_cmp(&other.0)
-    }
 }
 
 impl<'a> Ground<'a> {
@@ -79,36 +64,29 @@ impl<'a> Ground<'a> {
         self.adjacency.fan(v).map(|h| self.area[h as usize / 3]).sum::<f64>() / 3.0
     }
 
-    /// Lowers `distance` by paths from `sources`, and names the faces reached after their source's label.
-    fn grow(&self, sources: &[(u32, u32)], distance: &mut [f64], label: &mut [u32]) {
-        let mut heap = BinaryHeap::new();
-        for &(f, l) in sources {
-            distance[f as usize] = 0.0;
-            label[f as usize] = l;
-            heap.push(Reverse((Sorted(0.0), f, l)));
+    /// Shortens ways by those from `sources`, faces with the names of their cells; the last step to a face is the name of
+    /// its cell.
+    fn grow(&self, sources: &[(u32, u32)], ways: &mut Dense) {
+        let mut search = Search::over(ways);
+        for &(f, cell) in sources {
+            // A site is its own even where another lies at the same place.
+            search.reached.set(f, f64::INFINITY, NONE);
+            search.reach(f, 0.0, cell);
         }
-        while let Some(Reverse((Sorted(d), f, l))) = heap.pop() {
-            if d > distance[f as usize] || label[f as usize] != l {
-                continue;
-            }
+        while let Some((f, d)) = search.settle() {
+            let cell = search.reached.via(f);
             for g in self.neighbours(f) {
-                let e = d + self.centroid[f as usize].distance(self.centroid[g as usize]);
-                if e < distance[g as usize] {
-                    distance[g as usize] = e;
-                    label[g as usize] = l;
-                    heap.push(Reverse((Sorted(e), g, l)));
-                }
+                search.reach(g, d + self.centroid[f as usize].distance(self.centroid[g as usize]), cell);
             }
         }
     }
 
     /// Cells grown from `sites`.
-    fn cells(&self, sites: &[u32]) -> (Vec<u32>, Vec<f64>) {
-        let mut distance = vec![f64::INFINITY; self.area.len()];
-        let mut label = vec![NONE; self.area.len()];
+    fn cells(&self, sites: &[u32]) -> Dense {
         let sources: Vec<_> = sites.iter().enumerate().map(|(l, &f)| (f, l as u32)).collect();
-        self.grow(&sources, &mut distance, &mut label);
-        (label, distance)
+        let mut ways = Dense::new(self.area.len());
+        self.grow(&sources, &mut ways);
+        ways
     }
 
     /// For each cell the face nearest to its centroid.
@@ -158,31 +136,27 @@ impl<'a> Ground<'a> {
             }
             closed.push(!open);
         }
-        let mut distance = vec![f64::INFINITY; n];
-        let mut label = vec![NONE; n];
+        let mut ways = Dense::new(n);
         let mut sites = Vec::new();
-        let mut add = |f: u32, distance: &mut Vec<f64>, label: &mut Vec<u32>| {
-            self.grow(&[(f, sites.len() as u32)], distance, label);
+        let mut add = |f: u32, ways: &mut Dense| {
+            self.grow(&[(f, sites.len() as u32)], ways);
             sites.push(f);
         };
+        let nearer = |ways: &Dense, a: u32, b: u32| ways.distance(a).total_cmp(&ways.distance(b)).then(b.cmp(&a));
         for (r, &f) in first.iter().enumerate() {
-            add(f, &mut distance, &mut label);
+            add(f, &mut ways);
             if closed[r] {
                 let members: Vec<u32> = (0..n as u32).filter(|&f| region[f as usize] == r as u32).collect();
                 for _ in 1..CLOSED_CELLS.min(members.len()) {
-                    let far = members.iter().copied().max_by_key(|&f| (Sorted(distance[f as usize]), Reverse(f)));
-                    add(far.expect("a face"), &mut distance, &mut label);
+                    let far = members.iter().copied().max_by(|&a, &b| nearer(&ways, a, b));
+                    add(far.expect("a face"), &mut ways);
                 }
             }
         }
         let mut left = count.saturating_sub(first.len());
         loop {
-            let far =
-                (0..n as u32).max_by(|&a, &b| distance[a as usize].total_cmp(&distance[b as usize]).then(b.cmp(&a)));
-            match far {
-                Some(f) if distance[f as usize] > if left > 0 { 0.0 } else { reach } => {
-                    add(f, &mut distance, &mut label)
-                }
+            match (0..n as u32).max_by(|&a, &b| nearer(&ways, a, b)) {
+                Some(f) if ways.distance(f) > if left > 0 { 0.0 } else { reach } => add(f, &mut ways),
                 _ => break,
             }
             left = left.saturating_sub(1);
@@ -330,24 +304,23 @@ pub(super) fn partition(
         if observer.cancelled() {
             return Err(LayoutError::Cancelled);
         }
-        let (label, _) = ground.cells(&sites);
-        sites = ground.middles(&label, sites.len());
+        sites = ground.middles(&ground.cells(&sites).via, sites.len());
     }
-    let (mut label, mut distance) = ground.cells(&sites);
-    let mut is_site = vec![false; label.len()];
+    let mut ways = ground.cells(&sites);
+    let mut is_site = vec![false; ways.via.len()];
     sites.iter().for_each(|&f| is_site[f as usize] = true);
     for round in 0.. {
         if observer.cancelled() {
             return Err(LayoutError::Cancelled);
         }
-        let mut wanted = ground.wanted(&label, &distance, sites.len(), round >= GENTLE_ROUNDS);
+        let mut wanted = ground.wanted(&ways.via, &ways.distance, sites.len(), round >= GENTLE_ROUNDS);
         wanted.retain(|&f| !std::mem::replace(&mut is_site[f as usize], true));
         if wanted.is_empty() {
-            return Ok((label, sites.len()));
+            return Ok((ways.via, sites.len()));
         }
         let first = sites.len() as u32;
         let sources: Vec<(u32, u32)> = wanted.iter().enumerate().map(|(i, &f)| (f, first + i as u32)).collect();
-        ground.grow(&sources, &mut distance, &mut label);
+        ground.grow(&sources, &mut ways);
         sites.extend(wanted);
     }
     unreachable!("the rounds end when every face is its own cell")

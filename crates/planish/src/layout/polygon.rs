@@ -11,12 +11,13 @@
 use super::complex::Complex;
 use super::recut::Change;
 use super::shape::flat_cost;
+use crate::geom::graph::{Reached, Search};
+use crate::geom::polyline;
 use crate::mesh::{Adjacency, NONE, TriMesh, previous};
 use crate::network::CurveKind;
 use crate::network::imprint::{Place, half_edge};
 use glam::DVec3;
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 
 /// Cost of a cell too many or too few around a node, against a quad whose corners are all 45 degrees off.
 pub(super) const VALENCE_COST: f64 = 1.5;
@@ -38,7 +39,7 @@ const SPLIT_COST: f64 = 1.0;
 pub(super) fn make_even(mesh: &TriMesh, complex: &mut Complex) -> bool {
     let length = |complex: &Complex, a: u32| -> f64 {
         let chain = &complex.arc(2 * a).chain;
-        chain.windows(2).map(|w| w[0].position(mesh).distance(w[1].position(mesh))).sum()
+        polyline::length(chain.iter().map(|p| p.position(mesh)))
     };
     let splittable = |complex: &Complex, a: u32| complex.arc(2 * a).chain.len() > 2;
     for c in 0..complex.cells.len() as u32 {
@@ -109,35 +110,30 @@ fn cheapest(
     ends: impl Fn(usize) -> bool,
 ) -> Option<Vec<(u32, usize)>> {
     let outside = complex.cells.len();
-    let mut distance = vec![f64::INFINITY; outside + 1];
-    let mut via = vec![(NONE, NONE as usize); outside + 1];
-    let mut heap = BinaryHeap::from([Reverse((0u64, start))]);
-    distance[start] = 0.0;
-    while let Some(Reverse((key, c))) = heap.pop() {
-        if f64::from_bits(key) > distance[c] {
-            continue;
-        }
+    let name = |cell: u32| if cell == NONE { outside } else { cell as usize };
+    let mut search = Search::dense(outside + 1);
+    search.reach(start as u32, 0.0, NONE);
+    while let Some((c, so_far)) = search.settle() {
+        let c = c as usize;
         if c != start && ends(c) {
             let mut path = Vec::new();
             let mut at = c;
             while at != start {
-                let (a, before) = via[at];
+                let a = search.reached.via(at as u32);
                 path.push((a, at));
-                at = before;
+                let [left, right] = [2 * a, 2 * a + 1].map(|h| name(complex.cell(h)));
+                at = if left == at { right } else { left };
             }
             path.reverse();
             return Some(path);
         }
         for &h in complex.loop_of(c as u32) {
-            let other = complex.cell(h ^ 1);
-            let d = if other == NONE { outside } else { other as usize };
+            let d = name(complex.cell(h ^ 1));
             let a = h / 2;
             // Crossing a chosen arc again takes its node away.
             let step = if chosen[a as usize] { 0.1 } else { cost[a as usize] };
-            if d != c && distance[c] + step < distance[d] {
-                distance[d] = distance[c] + step;
-                via[d] = (a, c);
-                heap.push(Reverse((distance[d].to_bits(), d)));
+            if d != c {
+                search.reach(d as u32, so_far + step, a);
             }
         }
     }
@@ -147,10 +143,7 @@ fn cheapest(
 /// Splits an arc at the inner vertex nearest to its middle by length.
 fn split_middle(mesh: &TriMesh, complex: &mut Complex, a: u32) {
     let chain = &complex.arc(2 * a).chain;
-    let mut along = vec![0.0];
-    for w in chain.windows(2) {
-        along.push(along[along.len() - 1] + w[0].position(mesh).distance(w[1].position(mesh)));
-    }
+    let along = polyline::arc_lengths(chain.iter().map(|p| p.position(mesh)));
     let half = along[along.len() - 1] / 2.0;
     let at = (1..chain.len() - 1)
         .min_by(|&i, &j| (along[i] - half).abs().total_cmp(&(along[j] - half).abs()))

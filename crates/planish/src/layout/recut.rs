@@ -5,6 +5,7 @@
 
 use super::complex::{Arc, Complex, Node};
 use super::shape::{Shape, Trace};
+use crate::mesh::disjoint::disjoint;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::CurveKind;
 use crate::network::disk::{Disk, Met};
@@ -473,22 +474,11 @@ impl<'a> Bench<'a> {
         let mut waiting = items.to_vec();
         let mut made = 0;
         while !waiting.is_empty() {
-            let mut taken = vec![false; self.complex.cells.len()];
-            let (mut now, mut later) = (Vec::new(), Vec::new());
             let stars = self.complex.stars();
-            for &item in &waiting {
-                let Some(change) = plan(&self.complex, &stars, item) else { continue };
-                if change.cells.iter().any(|&c| taken[c as usize]) {
-                    later.push(item);
-                    continue;
-                }
-                for &c in &change.cells {
-                    taken[c as usize] = true;
-                }
-                now.push(change);
-            }
+            let planned = waiting.iter().filter_map(|&item| Some((item, plan(&self.complex, &stars, item)?)));
+            let (now, later) = disjoint(planned, |(_, change)| change.cells.clone(), |(_, change)| Some(change));
             made += self.apply(&now);
-            waiting = later;
+            waiting = later.into_iter().map(|x| x.0).collect();
         }
         made
     }

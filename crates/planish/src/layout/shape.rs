@@ -2,6 +2,7 @@
 //!
 //! The energy of `docs/methods/layout.md`, with its formula there.
 
+use crate::geom::polyline;
 use glam::DVec3;
 
 /// The direction of a curve at its end is taken at this part of its length: beyond the faces, before its bends.
@@ -31,18 +32,8 @@ pub(super) struct Trace {
 impl Trace {
     /// The trace of a polyline.
     pub fn of(points: &[DVec3]) -> Trace {
-        let length: f64 = points.windows(2).map(|w| w[0].distance(w[1])).sum();
-        let at = |target: f64| {
-            let mut left = target;
-            for w in points.windows(2) {
-                let step = w[0].distance(w[1]);
-                if left <= step {
-                    return w[0].lerp(w[1], if step > 0.0 { left / step } else { 0.0 });
-                }
-                left -= step;
-            }
-            points[points.len() - 1]
-        };
+        let length = polyline::length(points.iter().copied());
+        let at = |target: f64| polyline::at_length(points, target);
         Trace { length, heads: [at(HEAD * length), at((1.0 - HEAD) * length)] }
     }
 

@@ -3,7 +3,9 @@
 
 use super::complex::Complex;
 use super::recut::{Bench, Change, outline};
-use crate::mesh::TriMesh;
+use crate::geom::polyline;
+use crate::mesh::disjoint::disjoint;
+use crate::mesh::{NONE, TriMesh};
 use crate::network::CurveKind;
 use crate::network::imprint::Place;
 use rayon::prelude::*;
@@ -34,27 +36,13 @@ pub(super) fn slide(bench: &mut Bench, nodes: &[u32]) -> usize {
     let mut waiting = nodes.to_vec();
     let mut made = 0;
     while !waiting.is_empty() {
-        let mut taken = vec![false; bench.complex.cells.len()];
-        let (mut now, mut later) = (Vec::new(), Vec::new());
-        let stars = bench.complex.stars();
-        for &node in &waiting {
-            let star = &stars[node as usize];
-            if star.iter().any(|&h| {
-                [h, h ^ 1].iter().any(|&g| taken.get(bench.complex.cell(g) as usize).copied().unwrap_or(false))
-            }) {
-                later.push(node);
-                continue;
-            }
-            let Some(slide) = plan(bench.mesh, &bench.complex, star) else { continue };
-            for &h in star {
-                for g in [h, h ^ 1] {
-                    if let Some(t) = taken.get_mut(bench.complex.cell(g) as usize) {
-                        *t = true;
-                    }
-                }
-            }
-            now.push(slide);
-        }
+        let complex = &bench.complex;
+        let stars = complex.stars();
+        let cells = |&node: &u32| {
+            let around = stars[node as usize].iter().flat_map(|&h| [complex.cell(h), complex.cell(h ^ 1)]);
+            around.filter(|&c| c != NONE).collect()
+        };
+        let (now, later) = disjoint(waiting, cells, |node| plan(bench.mesh, complex, &stars[node as usize]));
         made += apply(bench, &now);
         waiting = later;
     }
@@ -87,10 +75,7 @@ fn plan(mesh: &TriMesh, complex: &Complex, star: &[u32]) -> Option<Slide> {
     line.reverse();
     let old = line.len() - 1;
     line.extend_from_slice(&vertices(star[y])?[1..]);
-    let mut along = vec![0.0];
-    for w in line.windows(2) {
-        along.push(along[along.len() - 1] + mesh.points[w[0] as usize].distance(mesh.points[w[1] as usize]));
-    }
+    let along = polyline::arc_lengths(line.iter().map(|&v| mesh.points[v as usize]));
     let total = along[along.len() - 1];
     // Across from the other ends of the smooth arcs.
     let (mut sum, mut count) = (0.0, 0.0);

@@ -7,11 +7,13 @@
 use super::fill::{Gain, Scale};
 use super::partition::Ground;
 use super::recut::{Bench, Change};
+use crate::geom::graph::Search;
+use crate::mesh::NONE;
+use crate::mesh::disjoint::disjoint;
 use crate::network::CurveKind;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 
 /// Radii of the disks, in sides of a patch: fingers and limbs.
 const RADII: [f64; 2] = [0.5, 1.0];
@@ -37,23 +39,15 @@ type Disc = Vec<(u32, f64)>;
 
 /// The vertices within `radius` of `starts` along edges, nearest first. `inside`, if given, bounds the search.
 fn disc(ground: &Ground, starts: &[u32], radius: f64, inside: Option<&BTreeMap<u32, f64>>) -> Disc {
-    let mut distance: BTreeMap<u32, f64> = starts.iter().map(|&v| (v, 0.0)).collect();
-    let mut heap: BinaryHeap<Reverse<(u64, u32)>> = starts.iter().map(|&v| Reverse((0, v))).collect();
+    let mut search = Search::sparse();
+    starts.iter().for_each(|&v| search.reach(v, 0.0, NONE));
     let mut found = Disc::new();
-    while let Some(Reverse((key, v))) = heap.pop() {
-        let d = f64::from_bits(key);
-        if d > distance[&v] {
-            continue;
-        }
+    while let Some((v, d)) = search.settle() {
         found.push((v, d));
         for w in ground.around(v) {
             let e = d + ground.mesh.points[v as usize].distance(ground.mesh.points[w as usize]);
-            if e <= radius
-                && inside.is_none_or(|set| set.contains_key(&w))
-                && distance.get(&w).is_none_or(|&known| e < known)
-            {
-                distance.insert(w, e);
-                heap.push(Reverse((e.to_bits(), w)));
+            if e <= radius && inside.is_none_or(|set| set.contains_key(&w)) {
+                search.reach(w, e, v);
             }
         }
     }
@@ -134,20 +128,10 @@ pub(super) fn plant(bench: &mut Bench, tips: &[u32], patches: usize) {
     while !waiting.is_empty() {
         let scale = Scale::new(bench, patches);
         let best: Vec<Option<Gain>> = waiting.par_iter().map(|&tip| best(bench, &scale, tip)).collect();
-        let mut taken = vec![false; bench.complex.cells.len()];
-        let (mut now, mut later) = (Vec::new(), Vec::new());
-        for (&tip, best) in waiting.iter().zip(best) {
-            match best {
-                Some((_, change)) if change.cells.iter().any(|&c| taken[c as usize]) => later.push(tip),
-                Some((_, change)) => {
-                    change.cells.iter().for_each(|&c| taken[c as usize] = true);
-                    now.push(change);
-                }
-                None => {}
-            }
-        }
+        let planned = waiting.into_iter().zip(best).filter_map(|(tip, best)| Some((tip, best?.1)));
+        let (now, later) = disjoint(planned, |(_, change)| change.cells.clone(), |(_, change)| Some(change));
         bench.apply(&now);
-        waiting = later;
+        waiting = later.into_iter().map(|x| x.0).collect();
     }
 }
 

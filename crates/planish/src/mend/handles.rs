@@ -9,11 +9,10 @@
 //! 3. the surface is cut along it, and both boundaries are filled with the triangles of least area (`lids`)
 
 use crate::geom::Aabb;
+use crate::geom::graph::{self, Dense, Reached};
 use crate::mesh::sets::Sets;
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
 use glam::DVec3;
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 
 /// A handle or a hole with a loop shorter than this share of the diagonal is none: less than a three-hundredth wide.
 pub const TINY_LOOP: f64 = 0.01;
@@ -39,7 +38,7 @@ pub(super) fn close(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &mut 
             source,
             adjacency: &adjacency,
             local: vec![NONE; triangles.len()],
-            reached: vec![(f64::INFINITY, NONE); source.len()],
+            reached: Dense::new(source.len()),
         };
         if seeds.is_none() && search.genus(&(0..triangles.len() as u32).collect::<Vec<_>>()) == 0 {
             break;
@@ -86,7 +85,7 @@ struct Search<'a> {
     /// Place of a triangle in the piece that is looked at.
     local: Vec<u32>,
     /// Distance of a vertex from the root, and the half-edge that led there.
-    reached: Vec<(f64, u32)>,
+    reached: Dense,
 }
 
 impl Search<'_> {
@@ -225,20 +224,19 @@ impl Search<'_> {
         let (rim, roots) = self.rim_loops(&piece);
         let in_tree = |s: &Self, h: u32| {
             let g = s.adjacency.opposite[h as usize];
-            let led = |e: u32, v: u32| s.reached[v as usize].1 == e;
+            let led = |e: u32, v: u32| s.reached.via(v) == e;
             [h, g].into_iter().any(|e| e != NONE && (led(e, s.origin(e)) || led(e, s.end(e))))
         };
-        let mut edges: Vec<(Reverse<u64>, u32)> = Vec::new();
+        let mut edges: Vec<(f64, u32)> = Vec::new();
         for h in piece.iter().flat_map(|&t| 3 * t..3 * t + 3) {
             let g = self.adjacency.opposite[h as usize];
             if (self.rim(h) || h < g) && !in_tree(self, h) {
                 let (a, b) = (self.origin(h), self.end(h));
-                let length = self.reached[a as usize].0 + self.at(a).distance(self.at(b)) + self.reached[b as usize].0;
-                // Lengths are positive: their bits are in their order.
-                edges.push((Reverse(length.to_bits()), h));
+                let length = self.reached.distance(a) + self.at(a).distance(self.at(b)) + self.reached.distance(b);
+                edges.push((length, h));
             }
         }
-        edges.sort_unstable();
+        edges.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut sets = Sets::new(piece.len() + rim.len());
         let mut last = None;
         for (_, h) in edges {
@@ -270,7 +268,7 @@ impl Search<'_> {
             (there, length)
         });
         self.leave(&piece);
-        visited.iter().for_each(|&v| self.reached[v as usize] = (f64::INFINITY, NONE));
+        visited.iter().for_each(|&v| self.reached.set(v, f64::INFINITY, NONE));
         found.filter(|f| f.0.len() > 2)
     }
 
@@ -278,34 +276,26 @@ impl Search<'_> {
         self.origin(next(h))
     }
 
-    /// Shortest paths from `root` in the piece that was entered; returns the vertices reached.
+    /// Shortest paths from `root` in the piece that was entered, each with the half-edge of its last step; returns the
+    /// vertices reached.
     fn tree(&mut self, root: u32) -> Vec<u32> {
-        let mut heap = BinaryHeap::from([(Reverse(0u64), root)]);
-        let mut visited = vec![root];
-        self.reached[root as usize].0 = 0.0;
-        while let Some((Reverse(bits), v)) = heap.pop() {
-            let so_far = f64::from_bits(bits);
-            if so_far > self.reached[v as usize].0 {
-                continue;
-            }
-            for h in self.adjacency.fan(v).collect::<Vec<_>>() {
+        let mut search = graph::Search::over(std::mem::replace(&mut self.reached, Dense::new(0)));
+        let mut visited = Vec::new();
+        search.reach(root, 0.0, NONE);
+        while let Some((v, so_far)) = search.settle() {
+            visited.push(v);
+            for h in self.adjacency.fan(v) {
                 // Edges that begin here, and on a boundary the one that ends here and has no other side.
                 for (e, w) in [(h, self.end(h)), (previous(h), self.origin(previous(h)))] {
                     let outside = self.local[e as usize / 3] == NONE && self.rim(e);
                     if outside || e != h && self.adjacency.opposite[e as usize] != NONE {
                         continue;
                     }
-                    let far = so_far + self.at(v).distance(self.at(w));
-                    if far < self.reached[w as usize].0 {
-                        if self.reached[w as usize].0.is_infinite() {
-                            visited.push(w);
-                        }
-                        self.reached[w as usize] = (far, e);
-                        heap.push((Reverse(far.to_bits()), w));
-                    }
+                    search.reach(w, so_far + self.at(v).distance(self.at(w)), e);
                 }
             }
         }
+        self.reached = search.reached;
         visited
     }
 
@@ -314,7 +304,7 @@ impl Search<'_> {
         let mut way = vec![v];
         loop {
             let v = way[way.len() - 1];
-            let h = self.reached[v as usize].1;
+            let h = self.reached.via(v);
             if h == NONE {
                 return way;
             }

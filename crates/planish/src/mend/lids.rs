@@ -11,7 +11,8 @@
 //! of their distance, as boundaries of scans have short and long edges.
 
 use crate::linalg::SparseCholesky;
-use crate::mesh::{Adjacency, NONE, next, previous};
+use crate::mesh::change::Changing;
+use crate::mesh::disjoint::{Taken, disjoint};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -21,6 +22,8 @@ const LONG: f64 = 1.4;
 const ROUNDS: usize = 16;
 /// Rounds of flipping after each; most lids settle in three.
 const FLIPS: usize = 8;
+/// Angles that are a little more than two right ones, as those of a square's corners are by rounding, turn no edge.
+const SQUARE: f64 = 1e-6;
 /// Neighbours closer than this share of the usual length weigh no more.
 const CLOSEST: f64 = 0.1;
 
@@ -74,10 +77,11 @@ pub(super) fn lid(rim: &[DVec3], beside: &[Vec<DVec3>], flat: &[[usize; 3]]) -> 
     let around = (0..n).flat_map(|k| beside[k].iter().map(move |p| p.distance(rim[k])));
     let (sum, count) = around.fold((0.0, 0.0), |(sum, count), d| (sum + d, count + 1.0));
     let length = if sum > 0.0 { sum / count } else { return lid };
+    let mut mesh = Changing::new(&lid.triangles, n, &[]);
     for _ in 0..ROUNDS {
-        let split = split(&mut lid, LONG * length);
+        let split = split(&mut mesh, &mut lid.points, LONG * length);
         for _ in 0..FLIPS {
-            if flip(&mut lid, n as u32) == 0 {
+            if flip(&mut mesh, &lid.points, n as u32) == 0 {
                 break;
             }
         }
@@ -85,67 +89,56 @@ pub(super) fn lid(rim: &[DVec3], beside: &[Vec<DVec3>], flat: &[[usize; 3]]) -> 
             break;
         }
     }
+    lid.triangles = mesh.into_triangles();
     smooth(&mut lid, n, beside, length);
     lid
 }
 
+/// The inner edges of a lid, each as the first triangle that has it, its place there, and the triangle beyond.
+fn inner(mesh: &Changing) -> impl Iterator<Item = (u32, usize, u32)> {
+    let edges = (0..mesh.len()).flat_map(|t| (0..3).map(move |k| (t, k)));
+    edges.filter_map(|(t, k)| {
+        let other = mesh.beyond(t, edge(mesh, t, k))?;
+        (t < other).then_some((t, k, other))
+    })
+}
+
+fn edge(mesh: &Changing, t: u32, k: usize) -> [u32; 2] {
+    let corners = mesh.corners(t);
+    [corners[k], corners[(k + 1) % 3]]
+}
+
 /// Splits inner edges longer than `longest`, at most one of each triangle; returns their number.
-fn split(lid: &mut Lid, longest: f64) -> usize {
-    let adjacency = Adjacency::of(&lid.triangles, lid.points.len());
-    let from = |t: &[[u32; 3]], h: u32| t[h as usize / 3][h as usize % 3];
-    let length = |h: u32| {
-        let [a, b] = [from(&lid.triangles, h), from(&lid.triangles, next(h))];
-        lid.points[a as usize].distance(lid.points[b as usize])
+fn split(mesh: &mut Changing, points: &mut Vec<DVec3>, longest: f64) -> usize {
+    let length = |t: u32, k: usize| {
+        let [a, b] = edge(mesh, t, k).map(|v| points[v as usize]);
+        a.distance(b)
     };
-    let inner = (0..adjacency.opposite.len() as u32).filter(|&h| {
-        let g = adjacency.opposite[h as usize];
-        g != NONE && h < g && length(h) > longest
-    });
-    let mut long: Vec<u32> = inner.collect();
-    long.sort_by(|&g, &h| length(h).total_cmp(&length(g)).then(g.cmp(&h)));
-    let mut busy = vec![false; lid.triangles.len()];
-    let mut count = 0;
-    for h in long {
-        let g = adjacency.opposite[h as usize];
-        if busy[h as usize / 3] || busy[g as usize / 3] {
-            continue;
-        }
-        let [a, b] = [from(&lid.triangles, h), from(&lid.triangles, g)];
-        let [c, d] = [h, g].map(|e| from(&lid.triangles, previous(e)));
-        let middle = lid.points.len() as u32;
-        lid.points.push(lid.points[a as usize].midpoint(lid.points[b as usize]));
-        lid.triangles[h as usize / 3] = [a, middle, c];
-        lid.triangles[g as usize / 3] = [b, middle, d];
-        lid.triangles.extend([[middle, b, c], [middle, a, d]]);
-        busy[h as usize / 3] = true;
-        busy[g as usize / 3] = true;
-        count += 1;
+    let mut long: Vec<(f64, u32, usize, u32)> =
+        inner(mesh).map(|(t, k, other)| (length(t, k), t, k, other)).filter(|x| x.0 > longest).collect();
+    long.sort_by(|x, y| y.0.total_cmp(&x.0).then((x.1, x.2).cmp(&(y.1, y.2))));
+    let (chosen, _) = disjoint(long, |x| vec![x.1, x.3], Some);
+    for &(_, t, k, _) in &chosen {
+        let [a, b] = edge(mesh, t, k).map(|v| points[v as usize]);
+        points.push(a.midpoint(b));
+        mesh.split(t, k);
     }
-    count
+    chosen.len()
 }
 
 /// Flips inner edges whose opposite angles are more than two right ones, at most one of each triangle; returns their
 /// number. No edge joins two of the first `n` points, the boundary: the surface may have it.
-fn flip(lid: &mut Lid, n: u32) -> usize {
-    let adjacency = Adjacency::of(&lid.triangles, lid.points.len());
-    let Lid { points, triangles } = lid;
-    let mut busy = vec![false; triangles.len()];
+fn flip(mesh: &mut Changing, points: &[DVec3], n: u32) -> usize {
+    let mut busy = Taken::default();
     let mut count = 0;
-    for h in 0..adjacency.opposite.len() as u32 {
-        let g = adjacency.opposite[h as usize];
-        if g == NONE || g < h || busy[h as usize / 3] || busy[g as usize / 3] {
-            continue;
-        }
-        let at = |h: u32| triangles[h as usize / 3][h as usize % 3];
-        let [a, b, c, d] = [at(h), at(g), at(previous(h)), at(previous(g))];
-        let [pa, pb, pc, pd] = [a, b, c, d].map(|v| points[v as usize]);
+    for (t, k) in (0..mesh.len()).flat_map(|t| (0..3).map(move |k| (t, k))) {
+        let Some(flip) = mesh.flip_of(t, k) else { continue };
+        let [pa, pb, pc, pd] = [flip.edge[0], flip.edge[1], flip.tips[0], flip.tips[1]].map(|v| points[v as usize]);
         let angle = (pa - pc).angle_between(pb - pc) + (pa - pd).angle_between(pb - pd);
-        let joined = c.max(d) < n || adjacency.fan(c).any(|e| [at(next(e)), at(previous(e))].contains(&d));
-        if angle > std::f64::consts::PI * (1.0 + 1e-6) && !joined {
-            triangles[h as usize / 3] = [a, d, c];
-            triangles[g as usize / 3] = [d, b, c];
-            busy[h as usize / 3] = true;
-            busy[g as usize / 3] = true;
+        let is_first = flip.triangles[0] < flip.triangles[1] && busy.spares(&flip.triangles);
+        if is_first && angle > std::f64::consts::PI * (1.0 + SQUARE) && flip.tips.iter().any(|&v| v >= n) {
+            mesh.flip(&flip);
+            busy.add(&flip.triangles);
             count += 1;
         }
     }

@@ -5,8 +5,7 @@
 
 use super::TriMesh;
 
-/// "No half-edge": the other side of a boundary edge.
-pub const NONE: u32 = u32::MAX;
+pub use crate::geom::NONE;
 
 /// Half-edge adjacency of an oriented mesh whose edges have at most two triangles.
 #[derive(Clone, Debug)]

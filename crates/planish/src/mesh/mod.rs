@@ -1,10 +1,11 @@
 //! Triangle meshes: flat arrays, adjacency, places on the surface.
 
 mod adjacency;
+pub(crate) mod change;
 pub mod compare;
 pub mod decimate;
 pub(crate) mod diagnose;
-mod face_point;
+pub(crate) mod disjoint;
 mod features;
 pub(crate) mod intersect;
 pub mod path;
@@ -18,7 +19,6 @@ pub use adjacency::{Adjacency, Fan, NONE, next, previous};
 pub use compare::{CompareError, CompareParams, Comparison, compare, compare_samples};
 pub use decimate::{DecimateError, DecimateParams, DecimateTarget, Decimated, decimate};
 pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
-pub use face_point::FacePoint;
 pub use features::{boundary_loops, components, sharp_edges};
 pub use intersect::self_intersections;
 pub use smooth::{SmoothError, SmoothParams, Smoothed, smooth};
@@ -26,7 +26,9 @@ pub use soup::check;
 pub use tags::{FEATURE, FeatureKind, FeatureTags};
 pub use walk::{CurvePlace, move_point_on_curve, move_point_on_surface};
 
-use crate::geom::Aabb;
+pub use crate::geom::FacePoint;
+
+use crate::geom::{Aabb, Triangles};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -87,6 +89,23 @@ impl TriMesh {
         self.triangles[h as usize / 3][h as usize % 3]
     }
 
+    /// Length of the edge of half-edge `h`.
+    pub fn edge_length(&self, h: u32) -> f64 {
+        let (t, k) = (h as usize / 3, h as usize % 3);
+        let [from, to] = [k, (k + 1) % 3].map(|k| self.points[self.triangles[t][k] as usize]);
+        from.distance(to)
+    }
+
+    /// Mean length of the edges, those of two triangles counted twice; 0 without triangles.
+    pub fn mean_edge(&self) -> f64 {
+        let around = |t: usize| {
+            let [a, b, c] = self.corners(t);
+            a.distance(b) + b.distance(c) + c.distance(a)
+        };
+        let count = self.triangles.len();
+        (0..count).map(around).sum::<f64>() / (3 * count).max(1) as f64
+    }
+
     /// Bounding box of all vertices.
     pub fn bounds(&self) -> Aabb {
         Aabb::of(&self.points)
@@ -127,5 +146,19 @@ impl TriMesh {
             }
         }
         sum.into_iter().map(DVec3::normalize_or_zero).collect()
+    }
+}
+
+impl FacePoint {
+    /// World position.
+    pub fn position(&self, mesh: &TriMesh) -> DVec3 {
+        let [a, b, c] = mesh.corners(self.face as usize);
+        a * self.bary[0] + b * self.bary[1] + c * self.bary[2]
+    }
+}
+
+impl<'a> From<&'a TriMesh> for Triangles<'a> {
+    fn from(mesh: &'a TriMesh) -> Triangles<'a> {
+        Triangles { points: &mesh.points, triangles: &mesh.triangles }
     }
 }

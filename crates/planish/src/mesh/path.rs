@@ -5,8 +5,7 @@
 //! Departs from [K98]: where the greedy path runs into a dead end, A* takes over.
 
 use super::{Adjacency, FacePoint, NONE, TriMesh, next, previous};
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use crate::geom::graph::{Dense, Reached, Search};
 
 /// Neighbours of vertex `v` as `(vertex, half-edge of the edge)`, counter-clockwise.
 pub fn neighbours<'a>(mesh: &'a TriMesh, adjacency: &'a Adjacency, v: u32) -> impl Iterator<Item = (u32, u32)> + 'a {
@@ -63,36 +62,15 @@ pub fn shortest(
     })
 }
 
-/// Distances along edges from a set of sources.
-#[derive(Clone, Debug)]
-pub struct EdgeDistance {
-    /// For each vertex its distance, infinite where not reached.
-    pub distance: Vec<f64>,
-    /// For each vertex the one before it on the way from a source ([`NONE`] at sources and where not reached).
-    pub before: Vec<u32>,
-}
-
-impl EdgeDistance {
-    /// The chain of vertices from `v` back to its source.
-    pub fn chain(&self, v: u32) -> Vec<u32> {
-        let mut chain = vec![v];
-        let mut at = v;
-        while self.before[at as usize] != NONE {
-            at = self.before[at as usize];
-            chain.push(at);
-        }
-        chain
-    }
-}
-
-/// Distances along edges from many sources, each with the distance it starts at (Dijkstra), up to `reach`.
+/// Distances along edges from many sources, each with the distance it starts at (Dijkstra), up to `reach`; `via` of the
+/// result is the vertex before.
 pub fn distances(
     mesh: &TriMesh,
     adjacency: &Adjacency,
     sources: &[(u32, f64)],
     weight: impl Fn(u32) -> f64,
     reach: f64,
-) -> EdgeDistance {
+) -> Dense {
     search(mesh, adjacency, sources, weight, |_| 0.0, |_, d| d > reach)
 }
 
@@ -114,30 +92,7 @@ pub fn places(mesh: &TriMesh, adjacency: &Adjacency, chain: &[u32]) -> Vec<FaceP
         .collect()
 }
 
-/// A vertex waiting in the heap; the nearest comes out first, ties by index.
-struct Waiting {
-    estimate: f64,
-    distance: f64,
-    vertex: u32,
-}
-
-impl PartialEq for Waiting {
-    fn eq(&self, other: &Waiting) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Waiting {}
-impl PartialOrd for Waiting {
-    fn partial_cmp(&self, other: &Waiting) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Waiting {
-    fn cmp(&self, other: &Waiting) -> Ordering {
-        other.estimate.total_cmp(&self.estimate).then(other.vertex.cmp(&self.vertex))
-    }
-}
-
+/// * `done` - told each vertex as it is settled and its distance; true ends the search
 fn search(
     mesh: &TriMesh,
     adjacency: &Adjacency,
@@ -145,31 +100,19 @@ fn search(
     weight: impl Fn(u32) -> f64,
     ahead: impl Fn(u32) -> f64,
     done: impl Fn(u32, f64) -> bool,
-) -> EdgeDistance {
-    let n = mesh.points.len();
-    let mut field = EdgeDistance { distance: vec![f64::INFINITY; n], before: vec![NONE; n] };
-    let mut heap = BinaryHeap::new();
-    for &(vertex, distance) in sources {
-        if distance < field.distance[vertex as usize] {
-            field.distance[vertex as usize] = distance;
-            heap.push(Waiting { estimate: distance + ahead(vertex), distance, vertex });
-        }
+) -> Dense {
+    let mut search = Search::dense(mesh.points.len());
+    for &(v, distance) in sources {
+        search.reach_towards(v, distance, NONE, ahead(v));
     }
-    while let Some(Waiting { distance, vertex: v, .. }) = heap.pop() {
-        if distance > field.distance[v as usize] {
-            continue;
-        }
+    while let Some((v, distance)) = search.settle() {
         if done(v, distance) {
             break;
         }
         for (w, h) in neighbours(mesh, adjacency, v) {
-            let d = distance + mesh.points[v as usize].distance(mesh.points[w as usize]) * weight(h).max(0.0);
-            if d < field.distance[w as usize] {
-                field.distance[w as usize] = d;
-                field.before[w as usize] = v;
-                heap.push(Waiting { estimate: d + ahead(w), distance: d, vertex: w });
-            }
+            let d = distance + mesh.edge_length(h) * weight(h).max(0.0);
+            search.reach_towards(w, d, v, ahead(w));
         }
     }
-    field
+    search.reached
 }

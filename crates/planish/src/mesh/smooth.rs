@@ -182,7 +182,7 @@ impl<'a> Filter<'a> {
         }
         let centers: Vec<DVec3> =
             (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.corners(t).iter().sum::<DVec3>() / 3.0).collect();
-        let edge = mean_edge(mesh);
+        let edge = mesh.mean_edge();
         let first = first_rings(mesh, adjacency, tags);
         // Two rings: triangles around the triangles around.
         let around = Lists::new(mesh.triangles.len(), |t, marks, list| {
@@ -327,16 +327,6 @@ fn first_rings(mesh: &TriMesh, adjacency: &Adjacency, tags: &FeatureTags) -> Lis
             }
         }
     })
-}
-
-fn mean_edge(mesh: &TriMesh) -> f64 {
-    let sum: f64 = (0..mesh.triangles.len())
-        .map(|t| {
-            let [a, b, c] = mesh.corners(t);
-            a.distance(b) + b.distance(c) + c.distance(a)
-        })
-        .sum();
-    sum / (3 * mesh.triangles.len()) as f64
 }
 
 /// Shifts a closed mesh along its normals to the volume of the other.

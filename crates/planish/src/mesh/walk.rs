@@ -8,12 +8,11 @@
 //! the edge; triangles without area are stepped over.
 
 use super::{Adjacency, FacePoint, NONE, TriMesh, next, previous};
+use crate::geom::tolerance::ON_EDGE;
 use glam::DVec3;
 
 /// A triangle whose area is below this share of its longest edge squared has no usable plane.
 const NO_PLANE: f64 = 1e-13;
-/// A barycentric weight below this is zero: the point is on the edge.
-const ON_EDGE: f64 = 1e-13;
 /// Triangles without area that are stepped over in one go.
 const HOPS: usize = 16;
 

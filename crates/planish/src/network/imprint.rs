@@ -10,6 +10,7 @@
 
 use super::disk::{self, Disk};
 use super::{Network, PatchMesh};
+use crate::geom::tolerance::ON_EDGE;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -19,9 +20,6 @@ use std::collections::{HashMap, HashSet};
 /// Outward bulge of the points of an edge in the flat picture of a face, as a fraction of the face. It makes
 /// them strictly convex, so that rounding can neither hide one nor leave a gap along the edge.
 const BULGE: f64 = 1e-7;
-
-/// Barycentric coordinates below this count as zero: the point lies on the edge or at the corner.
-const ON_EDGE: f64 = 1e-12;
 
 /// Why curves could not be imprinted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -4,10 +4,11 @@
 //! taken for surface detail, or two patches run into one another there. Four greedy repairs, each to its fixed point:
 //! `docs/methods/sharp.md`, step 1.
 
+use crate::geom::graph::{Reached, Search};
+use crate::mesh::disjoint::disjoint;
 use crate::mesh::{Adjacency, FeatureTags, NONE, TriMesh, next, path, previous};
 use glam::DVec3;
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 
 /// Greatest cost of a bridge over a gap, mean edges of the mesh: a sharp edge costs its length, a flat one twice that.
 const WIDEST: f64 = 8.0;
@@ -42,7 +43,7 @@ pub fn mend_lines(mesh: &TriMesh, tags: &mut FeatureTags) -> usize {
     let mut sharp = tags.on(mesh);
     sharp.iter_mut().zip(&adjacency.opposite).for_each(|(s, &o)| *s &= o != NONE);
     let bridged = bridge_gaps(mesh, &adjacency, &mut sharp);
-    cut_spikes(mesh, &adjacency, SPIKE * mean_edge(mesh), &mut sharp);
+    cut_spikes(mesh, &adjacency, SPIKE * mesh.mean_edge(), &mut sharp);
     *tags = tags.with_edges((0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| ends(mesh, h)));
     bridged
 }
@@ -60,6 +61,15 @@ struct Bridge {
     vertices: Vec<u32>,
 }
 
+/// The half-edges on sharp lines that leave each vertex.
+fn lines_at(mesh: &TriMesh, sharp: &[bool]) -> BTreeMap<u32, Vec<u32>> {
+    let mut lines: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
+        lines.entry(mesh.origin(h)).or_default().push(h);
+    }
+    lines
+}
+
 /// The half-edges on sharp lines that leave each vertex, and the loose ends of these lines.
 fn loose_ends(
     mesh: &TriMesh,
@@ -67,10 +77,7 @@ fn loose_ends(
     sharp: &[bool],
     edge: f64,
 ) -> (BTreeMap<u32, Vec<u32>>, BTreeMap<u32, End>) {
-    let mut lines: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
-        lines.entry(mesh.origin(h)).or_default().push(h);
-    }
+    let lines = lines_at(mesh, sharp);
     let loose = |v: &u32| lines[v].len() == 1 && !adjacency.is_boundary_vertex(*v);
     let ends = lines.keys().copied().filter(loose).map(|v| (v, End::new(mesh, &lines, v, edge))).collect();
     (lines, ends)
@@ -113,7 +120,7 @@ fn cut_spurs(mesh: &TriMesh, adjacency: &Adjacency, edge: f64, sharp: &mut [bool
 /// a few edges away; spurs are cut first. Returns how many gaps were bridged.
 /// * `sharp` - for each half-edge whether it is on a sharp line; both halves of an edge alike
 pub fn bridge_gaps(mesh: &TriMesh, adjacency: &Adjacency, sharp: &mut [bool]) -> usize {
-    let edge = mean_edge(mesh);
+    let edge = mesh.mean_edge();
     cut_spurs(mesh, adjacency, edge, sharp);
     let mut bridged = 0;
     loop {
@@ -122,16 +129,10 @@ pub fn bridge_gaps(mesh: &TriMesh, adjacency: &Adjacency, sharp: &mut [bool]) ->
         let mut bridges: Vec<Bridge> = ends.keys().filter_map(search).collect();
         bridges.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.vertices.cmp(&b.vertices)));
         // One at each place and time: others may lead elsewhere after it.
-        let mut taken: Vec<u32> = Vec::new();
-        for bridge in &bridges {
-            if bridge.vertices.iter().any(|v| taken.contains(v)) {
-                continue;
-            }
-            taken.extend(&bridge.vertices);
-            mark(mesh, adjacency, &bridge.vertices, sharp, true);
-            bridged += 1;
-        }
-        if taken.is_empty() {
+        let (now, _) = disjoint(bridges, |bridge| bridge.vertices.clone(), Some);
+        now.iter().for_each(|bridge| mark(mesh, adjacency, &bridge.vertices, sharp, true));
+        bridged += now.len();
+        if now.is_empty() {
             return bridged;
         }
     }
@@ -143,7 +144,7 @@ impl End {
         let (mut h, mut along) = (lines[&v][0], 0.0);
         let mut from = None;
         loop {
-            along += length(mesh, h);
+            along += mesh.edge_length(h);
             let to = mesh.origin(next(h));
             tail.push((to, along));
             if from.is_none() && along >= LAST * edge {
@@ -182,16 +183,12 @@ fn bridge(
     let end = &ends[&v];
     let at = |v: u32| mesh.points[v as usize];
     let reach = (WIDEST * edge).min(end.length() / LONG);
-    let mut found: BTreeMap<u32, (f64, u32)> = BTreeMap::from([(v, (0.0, v))]);
-    let mut heap = BinaryHeap::from([Reverse((0, v))]);
+    let mut search = Search::sparse();
+    search.reach(v, 0.0, NONE);
     let mut best: Option<(f64, u32)> = None;
-    while let Some(Reverse((bits, w))) = heap.pop() {
-        let cost = f64::from_bits(bits);
+    while let Some((w, cost)) = search.settle() {
         if best.is_some_and(|b| b.0 <= cost) {
             break;
-        }
-        if cost > found[&w].0 {
-            continue;
         }
         if w != v && (lines.contains_key(&w) || adjacency.is_boundary_vertex(w)) {
             let near = end.tail.iter().any(|t| t.0 == w && t.1 < LONG * cost);
@@ -205,36 +202,20 @@ fn bridge(
             continue;
         }
         for (x, h) in path::neighbours(mesh, adjacency, w) {
-            let cost = cost + length(mesh, h) * (2.0 - bend(mesh, adjacency, h));
-            if cost <= reach && found.get(&x).is_none_or(|known| cost < known.0) {
-                found.insert(x, (cost, w));
-                heap.push(Reverse((cost.to_bits(), x)));
+            let cost = cost + mesh.edge_length(h) * (2.0 - bend(mesh, adjacency, h));
+            if cost <= reach {
+                search.reach(x, cost, w);
             }
         }
     }
     let (cost, target) = best?;
-    let mut vertices = vec![target];
-    while let Some(&w) = vertices.last()
-        && w != v
-    {
-        vertices.push(found[&w].1);
-    }
-    Some(Bridge { cost, vertices })
+    Some(Bridge { cost, vertices: search.reached.chain(target) })
 }
 
 /// The vertices of a half-edge, the lesser first.
 fn ends(mesh: &TriMesh, h: u32) -> [u32; 2] {
     let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
     [a.min(b), a.max(b)]
-}
-
-fn mean_edge(mesh: &TriMesh) -> f64 {
-    let count = 3 * mesh.triangles.len();
-    (0..count as u32).map(|h| length(mesh, h)).sum::<f64>() / count.max(1) as f64
-}
-
-fn length(mesh: &TriMesh, h: u32) -> f64 {
-    mesh.points[mesh.origin(h) as usize].distance(mesh.points[mesh.origin(next(h)) as usize])
 }
 
 /// How much the surface bends at an edge: the sine of the angle there, 1 beyond a right angle.
@@ -288,14 +269,14 @@ pub fn cut_spikes(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &m
     }
 }
 
+/// A detour of a line: what going straight saves, its half-edges, and the half-edge that takes their place.
+type Jog = (f64, Vec<u32>, u32);
+
 /// Cuts jogs: replaces detours of a few edges by the straight way, those first that cost most against it.
 fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bool]) {
-    let cost = |h: u32| length(mesh, h) * (2.0 - bend(mesh, adjacency, h));
+    let cost = |h: u32| mesh.edge_length(h) * (2.0 - bend(mesh, adjacency, h));
     loop {
-        let mut lines: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for h in (0..sharp.len() as u32).filter(|&h| sharp[h as usize]) {
-            lines.entry(mesh.origin(h)).or_default().push(h);
-        }
+        let lines = lines_at(mesh, sharp);
         // Half-edges from a vertex on, until the line ends or forks.
         let leg = |mut h: u32| {
             let mut leg = vec![h];
@@ -309,7 +290,7 @@ fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bo
             }
             leg
         };
-        let mut jogs: Vec<(f64, Vec<u32>, u32)> = Vec::new();
+        let mut jogs: Vec<Jog> = Vec::new();
         for (v, out) in lines.iter().filter(|l| l.1.len() == 2 && !adjacency.is_boundary_vertex(*l.0)) {
             let legs = [leg(out[0]), leg(out[1])];
             for (i, &a) in legs[0].iter().enumerate() {
@@ -317,7 +298,7 @@ fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bo
                 for (to, h) in path::neighbours(mesh, adjacency, from) {
                     let Some(j) = legs[1].iter().position(|&b| mesh.origin(next(b)) == to) else { continue };
                     let detour = [&legs[0][..=i], &legs[1][..=j]].concat();
-                    let way: f64 = detour.iter().map(|&h| length(mesh, h)).sum::<f64>() + length(mesh, h);
+                    let way: f64 = detour.iter().map(|&h| mesh.edge_length(h)).sum::<f64>() + mesh.edge_length(h);
                     let saved = JOG_COST * detour.iter().map(|&h| cost(h)).sum::<f64>() - cost(h);
                     let is_free = !sharp[h as usize] && adjacency.opposite[h as usize] != NONE && to != *v;
                     if is_free && way < longest && saved > 0.0 {
@@ -327,19 +308,15 @@ fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bo
             }
         }
         jogs.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
-        let mut taken: Vec<u32> = Vec::new();
-        for (_, detour, short) in &jogs {
-            let around: Vec<u32> = detour.iter().flat_map(|&h| [mesh.origin(h), mesh.origin(next(h))]).collect();
-            if around.iter().any(|v| taken.contains(v)) {
-                continue;
-            }
-            taken.extend(around);
+        let around = |jog: &Jog| jog.1.iter().flat_map(|&h| [mesh.origin(h), mesh.origin(next(h))]).collect();
+        let (now, _) = disjoint(jogs, around, Some);
+        for (_, detour, short) in &now {
             for (&h, is_sharp) in detour.iter().map(|h| (h, false)).chain([(short, true)]) {
                 sharp[h as usize] = is_sharp;
                 sharp[adjacency.opposite[h as usize] as usize] = is_sharp;
             }
         }
-        if taken.is_empty() {
+        if now.is_empty() {
             return;
         }
     }

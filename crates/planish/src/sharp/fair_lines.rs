@@ -277,9 +277,12 @@ fn tidy(mesh: &mut TriMesh, tags: &mut FeatureTags, wishes: &mut Wishes) {
     for _ in 0..MERGES {
         faulty = merging.round(&faulty, fault, MERGED * wishes.cell);
     }
-    let Merging { triangles, lines, .. } = merging;
-    let expected = triangles.iter().zip(&wishes.expected).filter(|x| x.0.is_some());
-    wishes.expected = expected.map(|x| *x.1).collect();
-    mesh.triangles = triangles.into_iter().flatten().collect();
-    tags.edges = lines.into_iter().collect();
+    let merged = merging.mesh;
+    let mut t = 0;
+    wishes.expected.retain(|_| {
+        t += 1;
+        merged.get(t - 1).is_some()
+    });
+    tags.edges = merged.lines.iter().copied().collect();
+    mesh.triangles = merged.into_triangles();
 }

@@ -2,6 +2,8 @@
 //!
 //! See `docs/methods/sharp.md`, step 5.
 
+use crate::mesh::change::{Change, Changing};
+use crate::mesh::disjoint::Taken;
 use crate::mesh::intersect::intersections_of;
 use crate::mesh::{FeatureKind, TriMesh};
 use glam::DVec3;
@@ -25,36 +27,15 @@ pub(super) enum Fault {
 pub(super) struct Merging<'a> {
     points: &'a [DVec3],
     kinds: &'a [FeatureKind],
-    /// The triangles; `None` where one is gone.
-    pub triangles: Vec<Option<[u32; 3]>>,
-    /// Edges of lines, the lesser vertex first.
-    pub lines: BTreeSet<[u32; 2]>,
-    stars: Vec<Vec<u32>>,
-}
-
-/// What was before a change.
-struct Change {
-    triangles: Vec<(u32, Option<[u32; 3]>)>,
-    stars: Vec<(u32, Vec<u32>)>,
-    removed: Vec<[u32; 2]>,
-    added: Option<[u32; 2]>,
+    /// The triangles and the edges of lines.
+    pub mesh: Changing,
 }
 
 impl<'a> Merging<'a> {
     /// * `kinds` - of the vertices; corners stay
     /// * `lines` - edges of sharp lines: a vertex on one is merged along it only, and they are not flipped
     pub fn new(mesh: &'a TriMesh, kinds: &'a [FeatureKind], lines: &[[u32; 2]]) -> Merging<'a> {
-        let mut stars = vec![Vec::new(); mesh.points.len()];
-        for (t, triangle) in mesh.triangles.iter().enumerate() {
-            triangle.iter().for_each(|&v| stars[v as usize].push(t as u32));
-        }
-        Merging {
-            points: &mesh.points,
-            kinds,
-            triangles: mesh.triangles.iter().copied().map(Some).collect(),
-            lines: lines.iter().copied().collect(),
-            stars,
-        }
+        Merging { points: &mesh.points, kinds, mesh: Changing::new(&mesh.triangles, mesh.points.len(), lines) }
     }
 
     /// Changes what is around faulty triangles where that leaves fewer faults; no triangle comes to meet another.
@@ -62,20 +43,20 @@ impl<'a> Merging<'a> {
     /// * `fault` - of a triangle with these corners
     /// * `longest` - vertices are merged over edges that are at most so long
     pub fn round(&mut self, faulty: &[u32], fault: impl Fn(u32, [DVec3; 3]) -> Fault, longest: f64) -> Vec<u32> {
-        let mut taken = BTreeSet::new();
+        let mut taken = Taken::default();
         let mut changes: Vec<Change> = Vec::new();
         for &t in faulty {
-            let Some(corners) = self.triangles[t as usize] else { continue };
+            let Some(corners) = self.mesh.get(t) else { continue };
             if fault(t, corners.map(|v| self.points[v as usize])) == Fault::None {
                 continue;
             }
-            let around: BTreeSet<u32> = corners.iter().flat_map(|&v| self.around(v)).chain(corners).collect();
-            if around.iter().any(|v| taken.contains(v)) {
+            let around: Vec<u32> = corners.iter().flat_map(|&v| self.mesh.around(v)).chain(corners).collect();
+            if !taken.spares(&around) {
                 continue;
             }
             let change = self.merge_any(corners, &fault, longest).or_else(|| self.flip_any(t, corners, &fault));
             if let Some(change) = change {
-                taken.extend(around);
+                taken.add(&around);
                 changes.push(change);
             }
         }
@@ -83,7 +64,7 @@ impl<'a> Merging<'a> {
         if changes.is_empty() {
             return Vec::new();
         }
-        let changed = changes.iter().flat_map(|c| c.triangles.iter().map(|t| t.0));
+        let changed = changes.iter().flat_map(Change::triangles);
         let next: BTreeSet<u32> = faulty.iter().copied().chain(changed).collect();
         next.difference(&back).copied().collect()
     }
@@ -92,67 +73,29 @@ impl<'a> Merging<'a> {
     fn undo_meeting(&mut self, changes: &mut Vec<Change>) -> BTreeSet<u32> {
         let mut undone = BTreeSet::new();
         while !changes.is_empty() {
-            let left: Vec<u32> =
-                (0..self.triangles.len() as u32).filter(|&t| self.triangles[t as usize].is_some()).collect();
-            let triangles = self.triangles.iter().flatten().copied().collect();
+            let left: Vec<u32> = (0..self.mesh.len()).filter(|&t| self.mesh.get(t).is_some()).collect();
+            let triangles = left.iter().map(|&t| self.mesh.corners(t)).collect();
             let mesh = TriMesh { points: self.points.to_vec(), triangles, attributes: Vec::new() };
-            let mut changed = vec![false; self.triangles.len()];
-            changes.iter().flat_map(|c| &c.triangles).for_each(|t| changed[t.0 as usize] = true);
+            let mut changed = vec![false; self.mesh.len() as usize];
+            changes.iter().flat_map(Change::triangles).for_each(|t| changed[t as usize] = true);
             let meeting = intersections_of(&mesh, |t| changed[left[t as usize] as usize]);
             let meeting: BTreeSet<u32> = meeting.into_iter().flatten().map(|t| left[t as usize]).collect();
-            let meets = |c: &Change| c.triangles.iter().any(|t| meeting.contains(&t.0));
+            let meets = |c: &Change| c.triangles().any(|t| meeting.contains(&t));
             let (back, stay): (Vec<Change>, Vec<Change>) = std::mem::take(changes).into_iter().partition(meets);
             *changes = stay;
             if back.is_empty() {
                 break;
             }
             for change in back {
-                undone.extend(change.triangles.iter().map(|t| t.0));
-                self.undo(change);
+                undone.extend(change.triangles());
+                self.mesh.undo(change);
             }
         }
         undone
     }
 
-    fn undo(&mut self, change: Change) {
-        change.triangles.into_iter().for_each(|(t, was)| self.triangles[t as usize] = was);
-        change.stars.into_iter().for_each(|(v, was)| self.stars[v as usize] = was);
-        if let Some(edge) = change.added {
-            self.lines.remove(&edge);
-        }
-        self.lines.extend(change.removed);
-    }
-
-    /// What is there before these triangles change.
-    fn before(&self, triangles: &[u32]) -> Change {
-        let vertices: BTreeSet<u32> = triangles.iter().flat_map(|&t| self.corners(t)).collect();
-        Change {
-            triangles: triangles.iter().map(|&t| (t, self.triangles[t as usize])).collect(),
-            stars: vertices.into_iter().map(|v| (v, self.stars[v as usize].clone())).collect(),
-            removed: Vec::new(),
-            added: None,
-        }
-    }
-
-    fn corners(&self, t: u32) -> [u32; 3] {
-        self.triangles[t as usize].unwrap_or_default()
-    }
-
     fn places(&self, corners: [u32; 3]) -> [DVec3; 3] {
         corners.map(|v| self.points[v as usize])
-    }
-
-    fn is_line(&self, v: u32, w: u32) -> bool {
-        self.lines.contains(&[v.min(w), v.max(w)])
-    }
-
-    /// Neighbours of `v`, ascending.
-    fn around(&self, v: u32) -> Vec<u32> {
-        let star = self.stars[v as usize].iter();
-        let mut around: Vec<u32> = star.flat_map(|&t| self.corners(t)).filter(|&x| x != v).collect();
-        around.sort_unstable();
-        around.dedup();
-        around
     }
 
     /// Merges a vertex of a triangle into another where that helps, over the shortest edge.
@@ -169,16 +112,15 @@ impl<'a> Merging<'a> {
             .collect();
         ways.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
         let (_, v, w) = ways.into_iter().find(|&(_, v, w)| self.is_mergeable(v, w) && self.helps(v, w, fault))?;
-        Some(self.merge(v, w))
+        Some(self.mesh.collapse(v, w))
     }
 
     /// True if the mesh stays a manifold with its lines when `v` becomes `w`.
     fn is_mergeable(&self, v: u32, w: u32) -> bool {
-        let (own, other) = (self.around(v), self.around(w));
-        // At the boundary there are fewer triangles than neighbours.
-        let is_inner = own.len() == self.stars[v as usize].len() && other.len() == self.stars[w as usize].len();
+        let (own, other) = (self.mesh.around(v), self.mesh.around(w));
+        let is_inner = self.mesh.is_inner(v) && self.mesh.is_inner(w);
         let both: Vec<u32> = own.iter().copied().filter(|x| other.binary_search(x).is_ok()).collect();
-        let beside: Vec<u32> = own.iter().copied().filter(|&x| self.is_line(v, x)).collect();
+        let beside: Vec<u32> = own.iter().copied().filter(|&x| self.mesh.is_line(v, x)).collect();
         let keeps_lines = match beside[..] {
             [] => self.kinds[v as usize] != FeatureKind::Corner,
             [a, b] => {
@@ -187,14 +129,15 @@ impl<'a> Merging<'a> {
             }
             _ => false,
         };
-        is_inner && keeps_lines && both.len() == 2 && own.len() + other.len() > 7
+        // No vertex is left with three neighbours.
+        is_inner && keeps_lines && own.len() + other.len() > 7 && self.mesh.is_collapsible(v, w)
     }
 
     /// True if there are fewer faults when `v` becomes `w`, and nothing is turned.
     fn helps(&self, v: u32, w: u32, fault: &impl Fn(u32, [DVec3; 3]) -> Fault) -> bool {
         let (mut before, mut after) = (0, 0);
-        for &t in &self.stars[v as usize] {
-            let corners = self.corners(t);
+        for &t in self.mesh.star(v) {
+            let corners = self.mesh.corners(t);
             let at = self.places(corners);
             before += fault(t, at) as usize;
             if corners.contains(&w) {
@@ -210,62 +153,20 @@ impl<'a> Merging<'a> {
         after < before
     }
 
-    fn merge(&mut self, v: u32, w: u32) -> Change {
-        let star = self.stars[v as usize].clone();
-        let mut change = self.before(&star);
-        for t in star {
-            let corners = self.corners(t);
-            if corners.contains(&w) {
-                corners.iter().for_each(|&x| self.stars[x as usize].retain(|&s| s != t));
-                self.triangles[t as usize] = None;
-            } else {
-                self.triangles[t as usize] = Some(corners.map(|x| if x == v { w } else { x }));
-                self.stars[w as usize].push(t);
-            }
-        }
-        self.stars[v as usize].clear();
-        let ring: Vec<u32> = change.stars.iter().map(|s| s.0).filter(|&x| x != v && self.is_line(v, x)).collect();
-        for x in ring {
-            change.removed.push([v.min(x), v.max(x)]);
-            self.lines.remove(&[v.min(x), v.max(x)]);
-            if x != w {
-                self.lines.insert([x.min(w), x.max(w)]);
-                change.added = Some([x.min(w), x.max(w)]);
-            }
-        }
-        change
-    }
-
-    /// Flips an edge of `t` where that helps.
+    /// Flips an edge of `t = [a, b, c]` where that helps.
     fn flip_any(&mut self, t: u32, corners: [u32; 3], fault: &impl Fn(u32, [DVec3; 3]) -> Fault) -> Option<Change> {
-        (0..3).find_map(|k| self.flip(t, corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3], fault))
-    }
-
-    /// Flips the edge from `a` to `b` of the triangle `t = [a, b, c]`.
-    fn flip(&mut self, t: u32, a: u32, b: u32, c: u32, fault: &impl Fn(u32, [DVec3; 3]) -> Fault) -> Option<Change> {
-        let mut others = self.stars[a as usize].iter().filter(|&&s| s != t && self.corners(s).contains(&b));
-        let (&other, None) = (others.next()?, others.next()) else { return None };
-        let d = self.corners(other).into_iter().find(|&x| x != a && x != b)?;
-        if self.is_line(a, b) || self.around(c).contains(&d) || self.around(a).len() < 4 || self.around(b).len() < 4 {
-            return None;
-        }
-        let (own, new) = (self.places([a, d, c]), self.places([d, b, c]));
-        let was = [self.places([a, b, c]), self.places(self.corners(other))];
-        let faults = [fault(t, own), fault(other, new)];
-        let before = fault(t, was[0]) as usize + fault(other, was[1]) as usize;
-        let is_shaped = shape(own).min(shape(new)) >= shape(was[0]).min(shape(was[1])).min(SHAPE);
-        if faults.contains(&Fault::Turned) || faults.iter().map(|&f| f as usize).sum::<usize>() >= before || !is_shaped
-        {
-            return None;
-        }
-        let change = self.before(&[t, other]);
-        self.triangles[t as usize] = Some([a, d, c]);
-        self.triangles[other as usize] = Some([d, b, c]);
-        self.stars[a as usize].retain(|&s| s != other);
-        self.stars[b as usize].retain(|&s| s != t);
-        self.stars[c as usize].push(other);
-        self.stars[d as usize].push(t);
-        Some(change)
+        let flip = (0..3).filter_map(|k| self.mesh.flip_of(t, k)).find(|flip| {
+            let [own, new] = flip.corners.map(|c| self.places(c));
+            let [t, other] = flip.triangles;
+            let was = [corners, self.mesh.corners(other)].map(|c| self.places(c));
+            let faults = [fault(t, own), fault(other, new)];
+            let before = fault(t, was[0]) as usize + fault(other, was[1]) as usize;
+            let is_shaped = shape(own).min(shape(new)) >= shape(was[0]).min(shape(was[1])).min(SHAPE);
+            let is_better = faults.iter().map(|&f| f as usize).sum::<usize>() < before;
+            let keeps_four = flip.edge.iter().all(|&v| self.mesh.around(v).len() >= 4);
+            keeps_four && is_better && is_shaped && !faults.contains(&Fault::Turned)
+        })?;
+        Some(self.mesh.flip(&flip))
     }
 }
 
@@ -304,8 +205,8 @@ mod tests {
         while !faulty.is_empty() {
             faulty = merging.round(&faulty, &fault, 2.0);
         }
-        let triangles = merging.triangles.into_iter().flatten().collect();
-        let lines = merging.lines.into_iter().collect();
+        let lines = merging.mesh.lines.iter().copied().collect();
+        let triangles = merging.mesh.into_triangles();
         (TriMesh { points: mesh.points.clone(), triangles, attributes: Vec::new() }, lines)
     }
 

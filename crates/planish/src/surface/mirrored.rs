@@ -14,6 +14,7 @@ use super::Surface;
 use super::basis::{is_uniform, uniform_knots};
 use super::sides::{node, side_len};
 use crate::curve::symmetry::Plane;
+use crate::geom::polyline;
 use crate::mesh::TriMesh;
 use crate::network::Network;
 use glam::DVec3;
@@ -132,15 +133,7 @@ fn nearest(places: &[DVec3], p: DVec3, within: f64) -> Option<usize> {
 /// The place halfway along a curve.
 fn middle(mesh: &TriMesh, curve: &crate::network::Curve) -> DVec3 {
     let at: Vec<DVec3> = curve.points.iter().map(|p| p.position(mesh)).collect();
-    let mut left = at.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>() / 2.0;
-    for w in at.windows(2) {
-        let d = w[0].distance(w[1]);
-        if left <= d && d > 0.0 {
-            return w[0].lerp(w[1], left / d);
-        }
-        left -= d;
-    }
-    at.last().copied().unwrap_or_default()
+    polyline::at_length(&at, polyline::length(at.iter().copied()) / 2.0)
 }
 
 /// Control points of surface `p` that lie in the plane.

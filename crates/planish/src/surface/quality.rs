@@ -6,6 +6,7 @@
 use super::basis::{BasisRows, uniform_parameters};
 use super::sides::place;
 use super::{RowSampler, Surface};
+use crate::geom::polyline;
 use crate::grid::Grid;
 use crate::network::{CurveKind, Network};
 use glam::DVec3;
@@ -129,7 +130,7 @@ pub fn seam_angles(network: &Network, surfaces: &[Surface], step: f64) -> Vec<Se
             })
         };
         let coarse: Vec<DVec3> = uniform_parameters(SEAM_SAMPLES).into_iter().map(|t| jets(t)[0].point).collect();
-        let length: f64 = coarse.windows(2).map(|w| w[0].distance(w[1])).sum();
+        let length = polyline::length(coarse);
         let pieces = (length / step).ceil().clamp(1.0, MOST_ANGLES);
         let even = (0..pieces as usize).map(move |i| (i as f64 + 0.5) / pieces);
         even.map(|t| {

@@ -29,8 +29,8 @@ impl Frame {
 
     /// Frame of the plane of least squared distances.
     pub(crate) fn of_moments(m: &Moments) -> Frame {
-        let (_, rows) = eigen3(m.covariance());
-        Frame::of(DVec3::from_array(rows[0]))
+        let (_, axes) = eigen3(m.covariance());
+        Frame::of(axes[0])
     }
 }
 

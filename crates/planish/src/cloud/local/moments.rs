@@ -6,7 +6,7 @@
 //!
 //! Normal equations of [X03] §4.1 and §6.2.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Number of monomials of degree up to four.
 pub(crate) const COUNT: usize = 35;
@@ -135,12 +135,12 @@ impl Moments {
     }
 
     /// Covariance of the points.
-    pub(crate) fn covariance(&self) -> [[f64; 3]; 3] {
+    pub(crate) fn covariance(&self) -> DMat3 {
         let m = self.mean();
         let [xx, xy, xz, yy, yz, zz] = [4, 5, 6, 7, 8, 9].map(|k| self.0[k] / self.0[0]);
         let (xx, xy, xz) = (xx - m.x * m.x, xy - m.x * m.y, xz - m.x * m.z);
         let (yy, yz, zz) = (yy - m.y * m.y, yz - m.y * m.z, zz - m.z * m.z);
-        [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+        DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz])
     }
 
     /// The 10 x 10 matrix of products of the monomials of a quadric: `a^T M a` is the sum of squared values.

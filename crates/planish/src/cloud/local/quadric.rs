@@ -5,7 +5,7 @@
 //! Distances are Taubin's first-order ones, |f| / |grad f|.
 
 use crate::linalg::eigen3;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// f(y) = a · (xx, xy, xz, yy, yz, zz, x, y, z, 1) at y = (p - center) / scale.
@@ -104,7 +104,7 @@ impl Quadric {
     /// Variation of the gradient over a ball of `radius` around `p`, against the gradient there.
     /// Source: [X03] eq. 10 with the largest eigenvalue of its footnote.
     pub fn variation(&self, p: DVec3, radius: f64) -> f64 {
-        let (values, _) = eigen3(self.hessian());
+        let (values, _) = eigen3(DMat3::from_cols_array_2d(&self.hessian()));
         let (_, g) = self.value(p);
         let s = values[0].abs().max(values[2].abs());
         if s == 0.0 { 0.0 } else { radius / self.scale * s / g.length() }

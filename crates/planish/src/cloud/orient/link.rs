@@ -5,6 +5,7 @@
 
 use crate::cloud::local::fitted::Fit;
 use crate::geom::KdTree;
+use crate::geom::tolerance::divisor;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -67,7 +68,7 @@ fn vote(fits: &[Fit], i: usize, j: usize) -> Option<Vote> {
     let (e, m) = g.quadric.distance(f.center);
     let turn = n.dot(g.normal) + m.dot(f.normal);
     // A fit through two sheets at once is thicker than what is around it, and speaks for neither.
-    let ratio = f.noise.min(g.noise) / f.noise.max(g.noise).max(1e-300) / (f.thickness * g.thickness);
+    let ratio = f.noise.min(g.noise) / divisor(f.noise.max(g.noise)) / (f.thickness * g.thickness);
     let alike = ratio.powi(THICK).max(1e-6);
     let near = (1.0 - apart / (2.0 * reach)).max(0.01) * alike;
     // The two sides of a plate or a gap that were found as such look away from each other, and nothing speaks louder.
@@ -93,11 +94,11 @@ fn vote(fits: &[Fit], i: usize, j: usize) -> Option<Vote> {
     }
     // The reflection of one normal along the line to the other must be the other normal or its opposite, and both must
     // lie on the same side of each other: else these two are no opposite points and tell nothing.
-    let way = (g.center - f.center) / apart.max(1e-300);
+    let way = (g.center - f.center) / divisor(apart);
     let mirrored = (f.normal - 2.0 * f.normal.dot(way) * way).dot(g.normal);
     let sign = (d * e).signum();
     let like = (mirrored * sign - OPPOSITE) / (1.0 - OPPOSITE);
-    let clear = (d.abs().min(e.abs()) / apart.max(1e-300)).min(1.0);
+    let clear = (d.abs().min(e.abs()) / divisor(apart)).min(1.0);
     let evidence = clear * near * 0.5 * like;
     (evidence > 0.0 && evidence.is_finite()).then_some(Vote {
         a: i as u32,

@@ -21,6 +21,7 @@ use super::local::fitted::Fit;
 use super::orient::link::{Vote, components};
 use super::orient::segments::{Shape, by_area, segments};
 use super::orient::wind::wind;
+use crate::geom::tolerance::divisor;
 use glam::DVec3;
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeMap, BinaryHeap};
@@ -218,7 +219,7 @@ fn decide(own: &[u32], fits: &[Fit], sign: &mut [f64], hints: &Hints, settled: &
     }
     if verdict == 0.0 && closed {
         let around = Dipoles::new(settled);
-        let inside = sum(&|i| around.number(fits[i].center, 0.0)) / area.max(1e-300);
+        let inside = sum(&|i| around.number(fits[i].center, 0.0)) / divisor(area);
         // Inside a body a closed part is a cavity, whose outside is its own inside.
         verdict = if inside > 0.5 { -volume } else { volume };
     }

@@ -8,6 +8,7 @@ use super::link::Vote;
 use super::{DECIDED, Hints, SWEEPS, patches};
 use crate::cloud::Dipoles;
 use crate::cloud::local::fitted::Fit;
+use crate::geom::tolerance::divisor;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -59,7 +60,7 @@ pub(crate) fn wind(
                 let [all, own] = [&all, &alone].map(|d| d.number(fits[i].center, SKIP * hints.areas[i].sqrt()));
                 gain += hints.areas[i] * own * (all - own - 0.5);
             }
-            gain / f64::max(asked, 1e-300)
+            gain / divisor(asked)
         };
         let gains: Vec<(f64, &Vec<usize>)> =
             members.par_iter().filter(|m| m.1.len() >= FEWEST).map(|(_, own)| (gain(own), own)).collect();

@@ -24,6 +24,7 @@ use crate::cloud::local::joints::LIMIT;
 use crate::cloud::local::nest::{Seen, cost, nest};
 use crate::cloud::local::points::Points;
 use crate::geom::KdTree;
+use crate::geom::tolerance::divisor;
 use crate::observe::Observer;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -159,7 +160,7 @@ fn own(points: &[DVec3], fits: &mut [Fit], owner: &mut [u32]) {
         tree.nearest_after(p, RIVALS, last, near);
         let off = |n: &(f64, u32)| {
             let f = &all[n.1 as usize];
-            (f.quadric.distance(p).0 / f.noise.max(1e-300)).powi(2) + 9.0 * n.0 / (f.radius * f.radius)
+            (f.quadric.distance(p).0 / divisor(f.noise)).powi(2) + 9.0 * n.0 / (f.radius * f.radius)
         };
         let best = near.iter().map(|n| (off(n), n.1)).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         *own = best.map_or(u32::MAX, |b| b.1);
@@ -205,7 +206,7 @@ fn fit_site(
 ) -> Vec<Fit> {
     let survey = &sites.survey[site];
     let p = survey.quadric.center;
-    let noise = sites.noise(site).max(1e-300);
+    let noise = divisor(sites.noise(site));
     let starts = if let Some(layer) = survey.layer {
         [survey.quadric, layer].map(|sheet| Start { sheet, at: sheet.project(p).0, radius: survey.radius }).to_vec()
     } else if class == 0 {
@@ -228,7 +229,7 @@ fn fit_site(
                 normal,
                 radius,
                 noise: s.rms,
-                thickness: (s.rms / sites.prior[site].noise.max(1e-300)).max(1.0),
+                thickness: (s.rms / divisor(sites.prior[site].noise)).max(1.0),
                 error,
                 irregularity,
                 class,

@@ -9,7 +9,7 @@
 use crate::cloud::FEWEST;
 use crate::geom::KdTree;
 use crate::linalg::eigen3;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 /// The neighbour whose distance tells.
@@ -38,14 +38,9 @@ const LEVEL: f64 = 0.12;
 /// * `level` - mean squared sine of the angles between the ways to them and the plane, at most
 /// * `amid` - length of their mean unit vector, at most
 fn flat(p: DVec3, near: impl Iterator<Item = DVec3>, level: f64, amid: f64) -> bool {
-    let (mut spread, mut sum, mut count) = ([[0.0; 3]; 3], DVec3::ZERO, 0.0);
+    let (mut spread, mut sum, mut count) = (DMat3::ZERO, DVec3::ZERO, 0.0);
     for way in near.filter_map(|q| (q - p).try_normalize()) {
-        let w = way.to_array();
-        for i in 0..3 {
-            for j in 0..3 {
-                spread[i][j] += w[i] * w[j];
-            }
-        }
+        spread += DMat3::from_cols(way * way.x, way * way.y, way * way.z);
         sum += way;
         count += 1.0;
     }

@@ -1,5 +1,6 @@
 //! Feature test and feature vertex of one loop ([K01] §4.2 and §4.3).
 
+use crate::linalg::eigen3;
 use glam::{DMat3, DVec3};
 
 /// What the normals of a loop tell.
@@ -69,12 +70,12 @@ pub fn solve(planes: &[(DVec3, DVec3)], near: DVec3, shape: Shape) -> DVec3 {
         a += DMat3::from_cols(*n * n.x, *n * n.y, *n * n.z);
         b += *n * (sum.x / count);
     }
-    let (values, vectors) = eigen(a);
+    let (values, vectors) = eigen3(a);
     let rank = if shape == Shape::Edge { 2 } else { 3 };
-    // Squares of the singular values; the greatest first.
-    let limit = RANK * RANK * values[0];
+    // Squares of the singular values.
+    let limit = RANK * RANK * values[2];
     let mut x = DVec3::ZERO;
-    for k in 0..rank {
+    for k in (3 - rank..3).rev() {
         if values[k] > limit {
             x += vectors[k] * (vectors[k].dot(b) / values[k]);
         }
@@ -89,36 +90,6 @@ fn in_closed_form(groups: &[(DVec3, DVec3, f64)]) -> Option<DVec3> {
     // Squares of the singular values are 1 + c and 1 - c.
     let apart = 1.0 - c * c;
     (apart > RANK).then(|| (*m * (d - c * e) + *n * (e - c * d)) / apart)
-}
-
-/// Eigenvalues, descending, and unit eigenvectors of a symmetric matrix, by Jacobi rotations.
-pub fn eigen(a: DMat3) -> ([f64; 3], [DVec3; 3]) {
-    let mut on = [a.x_axis.x, a.y_axis.y, a.z_axis.z];
-    // Beside the diagonal, each named by the third axis.
-    let mut off = [a.y_axis.z, a.x_axis.z, a.x_axis.y];
-    let mut v = [DVec3::X, DVec3::Y, DVec3::Z];
-    for _ in 0..16 {
-        let squares = |x: &[f64; 3]| x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
-        if !(squares(&off) > 1e-32 * squares(&on)) {
-            break;
-        }
-        for (p, q, r) in [(0, 1, 2), (0, 2, 1), (1, 2, 0)] {
-            let apq = off[r];
-            if apq == 0.0 {
-                continue;
-            }
-            let theta = (on[q] - on[p]) / (2.0 * apq);
-            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-            let c = 1.0 / (t * t + 1.0).sqrt();
-            let s = t * c;
-            (on[p], on[q], off[r]) = (on[p] - t * apq, on[q] + t * apq, 0.0);
-            (off[q], off[p]) = (c * off[q] - s * off[p], s * off[q] + c * off[p]);
-            (v[p], v[q]) = (v[p] * c - v[q] * s, v[p] * s + v[q] * c);
-        }
-    }
-    let mut order = [0, 1, 2];
-    order.sort_by(|&i, &j| on[j].total_cmp(&on[i]).then(i.cmp(&j)));
-    (order.map(|k| on[k]), order.map(|k| v[k]))
 }
 
 #[cfg(test)]
@@ -136,16 +107,6 @@ mod tests {
         let along = normals[0].cross(normals[1]).normalize();
         let found = solve(&planes[..2], DVec3::ZERO, Shape::Edge);
         assert!(found.distance(corner - along * along.dot(corner)) < 1e-12, "{found}");
-    }
-
-    #[test]
-    fn eigenvectors_of_a_symmetric_matrix_are_right_to_1e_12() {
-        let a = DMat3::from_cols_array(&[4.0, 1.0, -2.0, 1.0, 3.0, 0.5, -2.0, 0.5, 1.0]);
-        let (values, vectors) = eigen(a);
-        for k in 0..3 {
-            assert!((a * vectors[k] - vectors[k] * values[k]).length() < 1e-12);
-        }
-        assert!(values[0] >= values[1] && values[1] >= values[2]);
     }
 
     #[test]

@@ -8,6 +8,7 @@
 //! cases.)
 
 use super::FACES;
+use crate::linalg::eigen3;
 use glam::DVec3;
 
 /// The trilinear interpolant of a cell over the unit cube; `f[c]` at corner `c`.
@@ -135,7 +136,7 @@ impl Trilinear {
             let (xy, yz, zx) = (cxy + cxyz * saddle.z, cyz + cxyz * saddle.x, czx + cxyz * saddle.y);
             let hessian =
                 glam::DMat3::from_cols(DVec3::new(0.0, xy, zx), DVec3::new(xy, 0.0, yz), DVec3::new(zx, yz, 0.0));
-            let (values, vectors) = super::feature::eigen(hessian);
+            let (values, vectors) = eigen3(hessian);
             // Directions in which the value goes away from the level: one for a saddle that joins.
             let away: Vec<usize> = (0..3).filter(|&k| values[k] * sign > 0.0).collect();
             let [one] = away[..] else { continue };

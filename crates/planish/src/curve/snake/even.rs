@@ -10,9 +10,9 @@ use super::super::CurveError;
 use super::super::chain::{SurfaceCurve, sample};
 use super::super::strip::connect;
 use super::Snake;
+use crate::geom::polyline;
 use crate::mesh::FacePoint;
 use crate::observe::Observer;
-use glam::DVec3;
 
 /// Points whose distances along the surface differ from even by more than this are moved.
 const UNEVEN: f64 = 0.02;
@@ -77,8 +77,7 @@ impl Snake<'_> {
         let (mut chain, mut lengths) = (vec![places[0]], Vec::with_capacity(places.len()));
         for w in places.windows(2) {
             let way = connect(self.mesh, self.adjacency, w[0], w[1])?;
-            let at: Vec<DVec3> = way.iter().map(|p| p.position(self.mesh)).collect();
-            lengths.push(at.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>());
+            lengths.push(polyline::length(way.iter().map(|p| p.position(self.mesh))));
             chain.extend_from_slice(&way[1..]);
         }
         Ok((chain, lengths))

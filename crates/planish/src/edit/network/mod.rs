@@ -12,6 +12,7 @@ mod split;
 pub use relax::{Holds, Stretch};
 
 use crate::curve::{CurveError, SurfaceCurve};
+use crate::geom::polyline;
 use crate::layout::LayoutError;
 use crate::mesh::{Adjacency, CurvePlace, FacePoint, NONE, TriMesh, move_point_on_curve, next};
 use crate::network::diagnose::{Diagnosis, diagnose, glance};
@@ -257,7 +258,7 @@ impl<'m> Editor<'m> {
             return Err(EditError::AtEnd { curve });
         }
         let at = self.positions(curve);
-        let length: f64 = at.windows(2).map(|w| w[0].distance(w[1])).sum();
+        let length = polyline::length(at.iter().copied());
         let place = move_point_on_curve(&at, false, CurvePlace { segment: 0, share: 0.0 }, share * length);
         self.split_at(curve, place)
     }

@@ -19,6 +19,7 @@ use super::chart::locate::orientation;
 use super::chart::loosen::loosen;
 use super::{Fault, SideStops, side};
 use crate::geom::tolerance;
+use crate::geom::tolerance::divisor;
 use crate::linalg::SparseCholesky;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
 use crate::network::PatchMesh;
@@ -359,7 +360,7 @@ impl Chart {
         let total: f64 = self.triangles.iter().map(world).sum();
         let floor = total * 1e-3 / self.triangles.len() as f64;
         let ratio = |t: &[u32; 3]| {
-            let area = (self.orientation_of(t) / 2.0).max(1e-300);
+            let area = divisor(self.orientation_of(t) / 2.0);
             ((world(t).max(floor) / total) / area).clamp(1e-6, 1e6)
         };
         self.triangles.iter().map(ratio).collect()

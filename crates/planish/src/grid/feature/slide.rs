@@ -10,6 +10,7 @@
 //! refined alone. As sub-patches are relaxed one by one, there is no common relaxation along which weights could
 //! change.
 
+use crate::geom::polyline;
 use crate::grid::side::{Stops, stop_share, turned};
 use crate::grid::{Grid, GridError, GridParams, SideStops, relax_at, rim_node};
 use crate::mesh::TriMesh;
@@ -97,8 +98,7 @@ pub(crate) fn read(
 /// Shares of the points of the side that two sub-patches share, from those `before`: side `k` of `patch`, and a side of
 /// `other` against it.
 fn slid(before: &[f64], (patch, k, grid): (&PatchMesh, usize, &Grid), other: (usize, &Grid)) -> Vec<f64> {
-    let chain: Vec<DVec3> = patch.sides[k].iter().map(|&v| patch.mesh.points[v as usize]).collect();
-    let length: f64 = chain.windows(2).map(|w| w[0].distance(w[1])).sum();
+    let length = polyline::length(patch.sides[k].iter().map(|&v| patch.mesh.points[v as usize]));
     let point = |n: usize| grid.points[rim_node(k, n, grid.cols, grid.rows)];
     let mut wanted = before.to_vec();
     for n in 1..CELLS {

@@ -1,7 +1,5 @@
-//! Places on a mesh: a face and barycentric coordinates, the face points of [K98] §3.1.
+//! Places on triangles: a face and barycentric coordinates, the face points of [K98] §3.1.
 
-use super::TriMesh;
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// A place on a mesh: a face and barycentric coordinates that are not negative and sum to one.
@@ -19,11 +17,5 @@ impl FacePoint {
         let mut bary = [0.0; 3];
         bary[k] = 1.0;
         FacePoint { face, bary }
-    }
-
-    /// World position.
-    pub fn position(&self, mesh: &TriMesh) -> DVec3 {
-        let [a, b, c] = mesh.corners(self.face as usize);
-        a * self.bary[0] + b * self.bary[1] + c * self.bary[2]
     }
 }
