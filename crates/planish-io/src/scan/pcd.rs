@@ -26,6 +26,34 @@ fn fault(what: impl Into<String>, line: usize) -> ReadError {
 
 pub(super) fn read(bytes: &[u8]) -> Result<Cloud, ReadError> {
     let mut lines = Lines::new(bytes, 0, 1);
+    let header = header(&mut lines)?;
+    let find = |name: &str| header.fields.iter().position(|f| f.name == name);
+    let (Some(x), Some(y), Some(z)) = (find("x"), find("y"), find("z")) else {
+        return Err(fault("the fields have no x, y and z", lines.number()));
+    };
+    let body = &bytes[lines.at()..];
+    let table = match header.data.as_str() {
+        "ascii" => header.ascii(body.len(), &mut lines)?,
+        "binary" => header.binary(body, lines.at())?,
+        "binary_compressed" => header.compressed(body, lines.at())?,
+        other => return Err(fault(format!("data \"{}\" is not read", shown(other.as_bytes())), lines.number())),
+    };
+    Ok(assemble(&header.fields, table, header.count, [x, y, z], &header.pose))
+}
+
+/// What stands before the points.
+struct Header {
+    fields: Vec<Field>,
+    /// Points.
+    count: usize,
+    /// How they are written.
+    data: String,
+    /// Position and quaternion of the scanner, as far as they are there.
+    pose: Vec<f64>,
+}
+
+/// Reads the lines up to that which begins with DATA.
+fn header(lines: &mut Lines) -> Result<Header, ReadError> {
     let (mut fields, mut points, mut data) = (Vec::<Field>::new(), None, None);
     let mut pose: Vec<f64> = Vec::new();
     while let Some(line) = lines.next_line() {
@@ -34,13 +62,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<Cloud, ReadError> {
         let at = lines.number();
         let Some(key) = words.next() else { continue };
         let rest: Vec<&str> = words.collect();
-        let numbers = || rest.iter().map(|w| w.parse::<usize>().ok()).collect::<Option<Vec<usize>>>();
         match key {
             "FIELDS" | "COLUMNS" => {
                 fields = rest.iter().map(|n| Field { name: n.to_string(), size: 4, kind: b'F', count: 1 }).collect();
             }
             "SIZE" | "COUNT" => {
-                let n = numbers().filter(|n| n.len() == fields.len());
+                let numbers = rest.iter().map(|w| w.parse::<usize>().ok()).collect::<Option<Vec<usize>>>();
+                let n = numbers.filter(|n| n.len() == fields.len());
                 let n = n.ok_or_else(|| fault(format!("{key} does not match FIELDS"), at))?;
                 for (f, n) in fields.iter_mut().zip(n) {
                     if n > 1 << 20 || (key == "SIZE" && ![1, 2, 4, 8].contains(&n)) {
@@ -70,92 +98,101 @@ pub(super) fn read(bytes: &[u8]) -> Result<Cloud, ReadError> {
     let line = lines.number();
     let data = data.ok_or_else(|| fault("there is no line DATA", line))?;
     let count = points.ok_or_else(|| fault("there is no line POINTS", line))?;
-    let find = |name: &str| fields.iter().position(|f| f.name == name);
-    let (Some(x), Some(y), Some(z)) = (find("x"), find("y"), find("z")) else {
-        return Err(fault("the fields have no x, y and z", line));
-    };
-    let size: usize = fields.iter().map(|f| f.size * f.count).sum();
-    let width: usize = fields.iter().map(|f| f.count).sum();
-    let start = lines.at();
-    let body = &bytes[start..];
-    let short = |needed: usize, left: usize| ReadError::Truncated {
-        what: format!("{count} points"),
-        needed: needed as u64,
-        left: left as u64,
-        place: Place::Byte(start),
-    };
-    let mut table: Vec<Vec<f64>>;
-    match data.as_str() {
-        "ascii" => {
-            // A number takes a character and a blank.
-            if count.saturating_mul(2 * width) > body.len() + 1 {
-                return Err(short(count.saturating_mul(2 * width), body.len()));
-            }
-            table = vec![Vec::with_capacity(count); width];
-            for i in 0..count {
-                let Some(words) = lines.next_words() else { return Err(short(count, i)) };
-                let row: Vec<&[u8]> = words.collect();
-                if row.len() < width {
-                    let what = format!("a line has {} numbers instead of {width}", row.len());
-                    return Err(ReadError::Syntax { what, place: Place::Line(lines.number()) });
-                }
-                for (k, w) in row.iter().take(width).enumerate() {
-                    table[k].push(crate::text::real(w, || Place::Line(lines.number()))?);
-                }
-            }
-        }
-        "binary" => {
-            let needed = count.saturating_mul(size);
-            if needed > body.len() {
-                return Err(short(needed, body.len()));
-            }
-            table = vec![Vec::with_capacity(count); width];
-            for record in body[..needed].chunks_exact(size.max(1)) {
-                let (mut at, mut k) = (0, 0);
-                for f in &fields {
-                    for _ in 0..f.count {
-                        table[k].push(number(&record[at..at + f.size], f.kind));
-                        at += f.size;
-                        k += 1;
-                    }
-                }
-            }
-        }
-        "binary_compressed" => {
-            if body.len() < 8 {
-                return Err(short(8, body.len()));
-            }
-            let word = |at: usize| u32::from_le_bytes([body[at], body[at + 1], body[at + 2], body[at + 3]]) as usize;
-            let (packed, plain) = (word(0), word(4));
-            let needed = count.saturating_mul(size);
-            if packed > body.len() - 8 {
-                return Err(short(packed, body.len() - 8));
-            }
-            // The densest LZF code makes 264 bytes of three.
-            if plain < needed || plain / 88 > packed {
-                return Err(short(needed, plain.min(packed * 88)));
-            }
-            let content = unpack(&body[8..8 + packed], plain).ok_or_else(|| ReadError::Syntax {
-                what: "the packed points are damaged".into(),
-                place: Place::Byte(start),
-            })?;
-            table = Vec::new();
-            let mut at = 0;
-            for f in &fields {
-                let first = table.len();
-                table.resize(first + f.count, Vec::with_capacity(count));
-                for i in 0..count {
-                    for k in 0..f.count {
-                        let from = at + (i * f.count + k) * f.size;
-                        table[first + k].push(number(&content[from..from + f.size], f.kind));
-                    }
-                }
-                at += count * f.count * f.size;
-            }
-        }
-        other => return Err(fault(format!("data \"{}\" is not read", shown(other.as_bytes())), line)),
+    Ok(Header { fields, count, data, pose })
+}
+
+/// Tables have a column for each number of a point; `start` is where the body begins in the file.
+impl Header {
+    /// Bytes of a point.
+    fn size(&self) -> usize {
+        self.fields.iter().map(|f| f.size * f.count).sum()
     }
-    Ok(assemble(&fields, table, count, [x, y, z], &pose))
+
+    /// Numbers of a point.
+    fn width(&self) -> usize {
+        self.fields.iter().map(|f| f.count).sum()
+    }
+
+    fn short(&self, needed: usize, left: usize, start: usize) -> ReadError {
+        let (what, place) = (format!("{} points", self.count), Place::Byte(start));
+        ReadError::Truncated { what, needed: needed as u64, left: left as u64, place }
+    }
+
+    fn ascii(&self, length: usize, lines: &mut Lines) -> Result<Vec<Vec<f64>>, ReadError> {
+        let (width, start) = (self.width(), lines.at());
+        // A number takes a character and a blank.
+        let needed = self.count.saturating_mul(2 * width);
+        if needed > length + 1 {
+            return Err(self.short(needed, length, start));
+        }
+        let mut table = vec![Vec::with_capacity(self.count); width];
+        for i in 0..self.count {
+            let Some(words) = lines.next_words() else { return Err(self.short(self.count, i, start)) };
+            let row: Vec<&[u8]> = words.collect();
+            if row.len() < width {
+                let what = format!("a line has {} numbers instead of {width}", row.len());
+                return Err(ReadError::Syntax { what, place: Place::Line(lines.number()) });
+            }
+            for (column, w) in table.iter_mut().zip(row) {
+                column.push(crate::text::real(w, || Place::Line(lines.number()))?);
+            }
+        }
+        Ok(table)
+    }
+
+    fn binary(&self, body: &[u8], start: usize) -> Result<Vec<Vec<f64>>, ReadError> {
+        let needed = self.count.saturating_mul(self.size());
+        if needed > body.len() {
+            return Err(self.short(needed, body.len(), start));
+        }
+        let mut table = vec![Vec::with_capacity(self.count); self.width()];
+        for record in body[..needed].chunks_exact(self.size().max(1)) {
+            let (mut at, mut k) = (0, 0);
+            for f in &self.fields {
+                for _ in 0..f.count {
+                    table[k].push(number(&record[at..at + f.size], f.kind));
+                    at += f.size;
+                    k += 1;
+                }
+            }
+        }
+        Ok(table)
+    }
+
+    /// Field by field, packed by LZF.
+    fn compressed(&self, body: &[u8], start: usize) -> Result<Vec<Vec<f64>>, ReadError> {
+        if body.len() < 8 {
+            return Err(self.short(8, body.len(), start));
+        }
+        let word = |at: usize| u32::from_le_bytes([body[at], body[at + 1], body[at + 2], body[at + 3]]) as usize;
+        let (packed, plain) = (word(0), word(4));
+        let needed = self.count.saturating_mul(self.size());
+        if packed > body.len() - 8 {
+            return Err(self.short(packed, body.len() - 8, start));
+        }
+        // The densest LZF code makes 264 bytes of three.
+        if plain < needed || plain / 88 > packed {
+            return Err(self.short(needed, plain.min(packed * 88), start));
+        }
+        let content = unpack(&body[8..8 + packed], plain).ok_or_else(|| ReadError::Syntax {
+            what: "the packed points are damaged".into(),
+            place: Place::Byte(start),
+        })?;
+        let mut table: Vec<Vec<f64>> = Vec::new();
+        let mut at = 0;
+        for f in &self.fields {
+            let first = table.len();
+            table.resize(first + f.count, Vec::with_capacity(self.count));
+            for i in 0..self.count {
+                for k in 0..f.count {
+                    let from = at + (i * f.count + k) * f.size;
+                    table[first + k].push(number(&content[from..from + f.size], f.kind));
+                }
+            }
+            at += self.count * f.count * f.size;
+        }
+        Ok(table)
+    }
 }
 
 fn assemble(fields: &[Field], table: Vec<Vec<f64>>, count: usize, axes: [usize; 3], pose: &[f64]) -> Cloud {

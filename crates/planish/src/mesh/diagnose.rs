@@ -68,83 +68,19 @@ pub fn diagnose(mesh: &TriMesh) -> Diagnosis {
     let finite = |v: &usize| mesh.points[*v].is_finite();
     let bounds = Aabb::of((0..vertices).filter(|&v| used[v]).filter(finite).map(|v| &mesh.points[v]));
     let diagonal = bounds.diagonal();
-
-    let keyed = keyed_edges(&triangles);
-    let (mut edges, mut boundary, mut over) = (0, Vec::new(), 0);
-    for run in keyed.chunk_by(|x, y| x.0 == y.0) {
-        edges += 1;
-        match run.len() {
-            1 => boundary.push(run[0].1),
-            2 => {}
-            _ => over += 1,
-        }
-    }
-    let mate = mates(&keyed, 3 * triangles.len());
-    drop(keyed);
-    let orientation = orient(&triangles, &mate);
-    let fan = fans(&triangles, &mate);
-
-    // Fans per vertex, of triangles with three different vertices.
-    let mut fan_count = vec![0u32; vertices];
-    let mut solid = 0;
-    for (t, tri) in triangles.iter().enumerate().filter(|(_, t)| !repeats(t)) {
-        solid += 1;
-        for k in 0..3 {
-            fan_count[tri[k] as usize] += (fan[3 * t + k] == (3 * t + k) as u32) as u32;
-        }
-    }
+    let edges = Edges::new(&triangles);
+    let (fan_count, solid) = fan_counts(&triangles, &edges.mate, vertices);
     let non_manifold_vertices = fan_count.iter().filter(|&&n| n > 1).count();
     // A vertex on an edge of three triangles is counted by its edge.
-    let manifold = over == 0 && non_manifold_vertices == 0;
-
-    let mut loops = super::sets::Sets::new(vertices);
-    let mut on_boundary = Vec::new();
-    for &h in &boundary {
-        let (a, b) = (origin(&triangles, h), origin(&triangles, super::next(h)));
-        loops.join(a, b);
-        on_boundary.extend([a, b]);
-    }
-    let boundary_loops = {
-        let mut roots: Vec<u32> = on_boundary.into_iter().map(|v| loops.root(v)).collect();
-        roots.sort_unstable();
-        roots.dedup();
-        roots.len()
-    };
-
-    let mut sides = vec![[0usize; 2]; orientation.pieces];
-    let mut open = vec![false; orientation.pieces];
-    let mut volumes = vec![0.0; orientation.pieces];
-    let mut conflict = false;
-    let center = if diagonal > 0.0 { bounds.center() } else { glam::DVec3::ZERO };
-    let (mut area, mut degenerate_faces, mut bare_pieces) = (0.0, 0, 0);
-    for (t, tri) in triangles.iter().enumerate() {
-        let piece = orientation.piece[t] as usize;
-        let [a, b, c] = tri.map(|v| mesh.points[v as usize] - center);
-        let twice = (b - a).cross(c - a).length();
-        area += twice / 2.0;
-        let thin = !(twice / 2.0 > DEGENERATE_AREA * diagonal * diagonal);
-        degenerate_faces += (repeats(tri) || thin) as usize;
-        if repeats(tri) {
-            bare_pieces += 1;
-            continue;
-        }
-        sides[piece][orientation.turned[t] as usize] += 1;
-        volumes[piece] += a.dot(b.cross(c)) / 6.0;
-        for h in 3 * t as u32..3 * t as u32 + 3 {
-            let g = mate[h as usize];
-            open[piece] |= g == NONE;
-            if g != NONE {
-                let agree = origin(&triangles, g) != origin(&triangles, h);
-                conflict |= agree == (orientation.turned[t] != orientation.turned[g as usize / 3]);
-            }
-        }
-    }
-    let flipped_faces = sides.iter().map(|s| s[0].min(s[1])).sum::<usize>();
+    let manifold = edges.over == 0 && non_manifold_vertices == 0;
+    let boundary_loops = loops(&triangles, &edges.boundary, vertices);
+    let pieces = Pieces::new(mesh, &triangles, &edges.mate, &bounds);
+    let flipped_faces = pieces.sides.iter().map(|s| s[0].min(s[1])).sum::<usize>();
     let referenced = fan_count.iter().filter(|&&n| n > 0).count();
-    let euler = referenced as i64 - edges as i64 + solid as i64;
-    let components = orientation.pieces - bare_pieces;
-    let watertight = boundary.is_empty() && over == 0 && solid > 0;
-    let oriented = flipped_faces == 0 && !conflict;
+    let euler = referenced as i64 - edges.count as i64 + solid as i64;
+    let components = pieces.sides.len() - pieces.bare;
+    let watertight = edges.boundary.is_empty() && edges.over == 0 && solid > 0;
+    let oriented = flipped_faces == 0 && !pieces.conflict;
     let mut sorted: Vec<[u32; 3]> = triangles.iter().map(|t| sorted_triple(*t)).collect();
     sorted.sort_unstable();
     sorted.dedup();
@@ -155,22 +91,136 @@ pub fn diagnose(mesh: &TriMesh) -> Diagnosis {
         diagonal,
         components,
         boundary_loops,
-        boundary_edges: boundary.len(),
+        boundary_edges: edges.boundary.len(),
         euler,
         genus: (manifold && oriented).then(|| components as i64 - (euler + boundary_loops as i64) / 2),
         watertight,
         manifold,
-        non_manifold_edges: over,
+        non_manifold_edges: edges.over,
         non_manifold_vertices,
         duplicate_faces: triangles.len() - sorted.len(),
-        degenerate_faces,
+        degenerate_faces: pieces.degenerate,
         flipped_faces,
-        inverted_components: (0..orientation.pieces).filter(|&p| !open[p] && volumes[p] < 0.0).count(),
+        inverted_components: pieces.open.iter().zip(&pieces.volumes).filter(|(open, v)| !**open && **v < 0.0).count(),
         unreferenced_vertices: used.iter().filter(|&&u| !u).count(),
         non_finite_vertices: (0..vertices).filter(|v| !finite(v)).count(),
         bad_indices: mesh.triangles.len() - triangles.len(),
-        area,
-        volume: watertight.then(|| volumes.iter().sum()),
+        area: pieces.area,
+        volume: watertight.then(|| pieces.volumes.iter().sum()),
+    }
+}
+
+/// Edges by how many triangles they have.
+struct Edges {
+    count: usize,
+    /// Half-edges of one triangle alone.
+    boundary: Vec<u32>,
+    /// Edges of more than two.
+    over: usize,
+    /// For each half-edge that of the other triangle.
+    mate: Vec<u32>,
+}
+
+impl Edges {
+    fn new(triangles: &[[u32; 3]]) -> Edges {
+        let keyed = keyed_edges(triangles);
+        let mut edges = Edges { count: 0, boundary: Vec::new(), over: 0, mate: mates(&keyed, 3 * triangles.len()) };
+        for run in keyed.chunk_by(|x, y| x.0 == y.0) {
+            edges.count += 1;
+            match run.len() {
+                1 => edges.boundary.push(run[0].1),
+                2 => {}
+                _ => edges.over += 1,
+            }
+        }
+        edges
+    }
+}
+
+/// Fans around each vertex, of triangles with three different vertices, and the number of these.
+fn fan_counts(triangles: &[[u32; 3]], mate: &[u32], vertices: usize) -> (Vec<u32>, usize) {
+    let fan = fans(triangles, mate);
+    let mut count = vec![0u32; vertices];
+    let mut solid = 0;
+    for (t, tri) in triangles.iter().enumerate().filter(|(_, t)| !repeats(t)) {
+        solid += 1;
+        for k in 0..3 {
+            count[tri[k] as usize] += (fan[3 * t + k] == (3 * t + k) as u32) as u32;
+        }
+    }
+    (count, solid)
+}
+
+/// Number of loops that half-edges of the boundary make.
+fn loops(triangles: &[[u32; 3]], boundary: &[u32], vertices: usize) -> usize {
+    let mut sets = super::sets::Sets::new(vertices);
+    let mut on_boundary = Vec::new();
+    for &h in boundary {
+        let (a, b) = (origin(triangles, h), origin(triangles, super::next(h)));
+        sets.join(a, b);
+        on_boundary.extend([a, b]);
+    }
+    let mut roots: Vec<u32> = on_boundary.into_iter().map(|v| sets.root(v)).collect();
+    roots.sort_unstable();
+    roots.dedup();
+    roots.len()
+}
+
+/// Connected pieces, and what is summed over all triangles.
+struct Pieces {
+    /// Triangles of each piece that agree with its first, and those that do not.
+    sides: Vec<[usize; 2]>,
+    /// Pieces with a boundary.
+    open: Vec<bool>,
+    /// Enclosed volumes, as far as the pieces are closed.
+    volumes: Vec<f64>,
+    /// Pieces that are one triangle with a repeated vertex.
+    bare: usize,
+    /// A piece has no orientation that all its triangles agree with.
+    conflict: bool,
+    area: f64,
+    /// Triangles with a repeated vertex or without area.
+    degenerate: usize,
+}
+
+impl Pieces {
+    fn new(mesh: &TriMesh, triangles: &[[u32; 3]], mate: &[u32], bounds: &Aabb) -> Pieces {
+        let orientation = orient(triangles, mate);
+        let diagonal = bounds.diagonal();
+        let center = if diagonal > 0.0 { bounds.center() } else { glam::DVec3::ZERO };
+        let count = orientation.pieces;
+        let mut all = Pieces {
+            sides: vec![[0usize; 2]; count],
+            open: vec![false; count],
+            volumes: vec![0.0; count],
+            bare: 0,
+            conflict: false,
+            area: 0.0,
+            degenerate: 0,
+        };
+        for (t, tri) in triangles.iter().enumerate() {
+            let piece = orientation.piece[t] as usize;
+            let [a, b, c] = tri.map(|v| mesh.points[v as usize] - center);
+            let area = (b - a).cross(c - a).length() / 2.0;
+            all.area += area;
+            let thin = !(area > DEGENERATE_AREA * diagonal * diagonal);
+            all.degenerate += (repeats(tri) || thin) as usize;
+            if repeats(tri) {
+                all.bare += 1;
+                continue;
+            }
+            all.sides[piece][orientation.turned[t] as usize] += 1;
+            all.volumes[piece] += a.dot(b.cross(c)) / 6.0;
+            for h in 3 * t as u32..3 * t as u32 + 3 {
+                let g = mate[h as usize];
+                all.open[piece] |= g == NONE;
+                if g != NONE {
+                    let agree = origin(triangles, g) != origin(triangles, h);
+                    all.conflict |= agree == (orientation.turned[t] != orientation.turned[g as usize / 3]);
+                }
+            }
+        }
+        all
     }
 }
 

@@ -196,110 +196,153 @@ impl Disk {
     }
 
     /// Walks straight from `at` to `goal` in the map `uv`, and tells what is met on the way.
-    fn march(&self, uv: &[DVec2], at: At, goal: Goal, met: &mut Vec<Met>) -> Option<At> {
-        let coord = |p: DVec2| Coord { x: p.x, y: p.y };
-        let place = |v: u32| coord(uv[v as usize]);
-        let end = match goal {
-            Goal::Vertex(b) => uv[b as usize],
-            Goal::Point(p) => p,
-        };
-        let target = coord(end);
-        let edges = |f: u32| (3 * f..3 * f + 3).map(|h| (h, self.from(h), self.from(next(h))));
-        let arrived = |f: u32| match goal {
-            Goal::Vertex(b) => self.triangles[f as usize].contains(&b).then_some(At::Vertex(b)),
-            Goal::Point(p) => {
-                edges(f).all(|(_, p, q)| orient2d(place(p), place(q), target) >= 0.0).then_some(At::Face(f, p))
-            }
-        };
-        let mut at = at;
+    fn march(&self, uv: &[DVec2], mut at: At, goal: Goal, met: &mut Vec<Met>) -> Option<At> {
+        let march = March { disk: self, uv, goal };
         let mut steps = 0;
-        'start: loop {
+        loop {
             steps += 1;
             if steps > self.vertices.len() {
                 return None;
             }
-            let (source, mut edge) = match at {
-                At::Vertex(v) => {
-                    let mut exit = None;
-                    for h in self.adjacency.fan(v) {
-                        let (p, q) = (self.from(next(h)), self.from(previous(h)));
-                        if let Goal::Vertex(b) = goal {
-                            for (w, edge) in [(p, h), (q, previous(h))] {
-                                if w == b {
-                                    let open = self.adjacency.opposite[edge as usize] == NONE;
-                                    return if open { None } else { Some(At::Vertex(b)) };
-                                }
-                            }
-                        } else if let Some(at) = arrived(h / 3) {
-                            return Some(at);
-                        }
-                        let (right, left) =
-                            (orient2d(place(v), place(p), target), orient2d(place(v), place(q), target));
-                        let ahead = |w: u32| (uv[w as usize] - uv[v as usize]).dot(end - uv[v as usize]) > 0.0;
-                        if right == 0.0 && ahead(p) {
-                            exit = Some(Err(p));
-                        } else if left == 0.0 && ahead(q) {
-                            exit = Some(Err(q));
-                        } else if right > 0.0 && left < 0.0 {
-                            exit = Some(Ok(next(h)));
-                        }
-                    }
-                    match exit? {
-                        Err(w) => {
-                            met.push(Met::Vertex(w));
-                            at = At::Vertex(w);
-                            continue 'start;
-                        }
-                        Ok(edge) => (place(v), edge),
-                    }
-                }
-                At::Face(f, from) => {
-                    if let Some(at) = arrived(f) {
-                        return Some(at);
-                    }
-                    let source = coord(from);
-                    let (h, p, q) = edges(f).find(|&(_, p, q)| {
-                        orient2d(place(p), place(q), target) < 0.0
-                            && orient2d(source, target, place(p)) <= 0.0
-                            && orient2d(source, target, place(q)) >= 0.0
-                    })?;
-                    if let Some(w) = [p, q].into_iter().find(|&w| orient2d(source, target, place(w)) == 0.0) {
-                        met.push(Met::Vertex(w));
-                        at = At::Vertex(w);
-                        continue 'start;
-                    }
-                    (source, h)
-                }
+            let mut way = match at {
+                At::Vertex(v) => march.leave_vertex(v)?,
+                At::Face(f, from) => march.leave_face(f, from)?,
             };
-            loop {
-                steps += 1;
-                if steps > 3 * self.triangles.len() {
-                    return None;
+            if let Way::Across { source, edge } = way {
+                way = march.cross(source, edge, &mut steps, met)?;
+            }
+            match way {
+                Way::Arrived(at) => return Some(at),
+                Way::Through(v) => {
+                    met.push(Met::Vertex(v));
+                    at = At::Vertex(v);
                 }
-                let (p, q) = (self.from(edge), self.from(next(edge)));
-                let (right, left) = (-orient2d(source, target, place(p)), orient2d(source, target, place(q)));
-                if right <= 0.0 || left <= 0.0 {
-                    return None;
-                }
-                met.push(Met::Edge(p, q, right / (right + left)));
-                let other = self.adjacency.opposite[edge as usize];
-                if other == NONE {
-                    return None;
-                }
-                if let Some(at) = arrived(other / 3) {
-                    return Some(at);
-                }
-                let r = self.from(previous(other));
-                let side = orient2d(source, target, place(r));
-                if side == 0.0 {
-                    met.push(Met::Vertex(r));
-                    at = At::Vertex(r);
-                    continue 'start;
-                }
-                edge = if side > 0.0 { next(other) } else { previous(other) };
+                Way::Across { .. } => return None,
             }
         }
     }
+}
+
+/// A straight walk in a map.
+struct March<'a> {
+    disk: &'a Disk,
+    uv: &'a [DVec2],
+    goal: Goal,
+}
+
+/// How a walk goes on.
+enum Way {
+    /// It is where it was to go.
+    Arrived(At),
+    /// To a vertex that lies on the line.
+    Through(u32),
+    /// Across an edge, on the line from `source`.
+    Across { source: Coord<f64>, edge: u32 },
+}
+
+impl March<'_> {
+    fn place(&self, v: u32) -> Coord<f64> {
+        coord(self.uv[v as usize])
+    }
+
+    fn end(&self) -> DVec2 {
+        match self.goal {
+            Goal::Vertex(b) => self.uv[b as usize],
+            Goal::Point(p) => p,
+        }
+    }
+
+    /// Half-edges of a triangle with their ends.
+    fn edges(&self, f: u32) -> impl Iterator<Item = (u32, u32, u32)> {
+        (3 * f..3 * f + 3).map(|h| (h, self.disk.from(h), self.disk.from(next(h))))
+    }
+
+    fn arrived(&self, f: u32) -> Option<At> {
+        match self.goal {
+            Goal::Vertex(b) => self.disk.triangles[f as usize].contains(&b).then_some(At::Vertex(b)),
+            Goal::Point(p) => (self.edges(f))
+                .all(|(_, a, b)| orient2d(self.place(a), self.place(b), coord(p)) >= 0.0)
+                .then_some(At::Face(f, p)),
+        }
+    }
+
+    fn leave_vertex(&self, v: u32) -> Option<Way> {
+        let (disk, uv, end) = (self.disk, self.uv, self.end());
+        let target = coord(end);
+        let mut way = None;
+        for h in disk.adjacency.fan(v) {
+            let (p, q) = (disk.from(next(h)), disk.from(previous(h)));
+            if let Goal::Vertex(b) = self.goal {
+                for (w, edge) in [(p, h), (q, previous(h))] {
+                    if w == b {
+                        let open = disk.adjacency.opposite[edge as usize] == NONE;
+                        return if open { None } else { Some(Way::Arrived(At::Vertex(b))) };
+                    }
+                }
+            } else if let Some(at) = self.arrived(h / 3) {
+                return Some(Way::Arrived(at));
+            }
+            let (right, left) =
+                (orient2d(self.place(v), self.place(p), target), orient2d(self.place(v), self.place(q), target));
+            let ahead = |w: u32| (uv[w as usize] - uv[v as usize]).dot(end - uv[v as usize]) > 0.0;
+            if right == 0.0 && ahead(p) {
+                way = Some(Way::Through(p));
+            } else if left == 0.0 && ahead(q) {
+                way = Some(Way::Through(q));
+            } else if right > 0.0 && left < 0.0 {
+                way = Some(Way::Across { source: self.place(v), edge: next(h) });
+            }
+        }
+        way
+    }
+
+    fn leave_face(&self, f: u32, from: DVec2) -> Option<Way> {
+        if let Some(at) = self.arrived(f) {
+            return Some(Way::Arrived(at));
+        }
+        let (source, target) = (coord(from), coord(self.end()));
+        let (edge, p, q) = self.edges(f).find(|&(_, p, q)| {
+            orient2d(self.place(p), self.place(q), target) < 0.0
+                && orient2d(source, target, self.place(p)) <= 0.0
+                && orient2d(source, target, self.place(q)) >= 0.0
+        })?;
+        let on_line = [p, q].into_iter().find(|&w| orient2d(source, target, self.place(w)) == 0.0);
+        Some(on_line.map_or(Way::Across { source, edge }, Way::Through))
+    }
+
+    /// Crosses edge after edge until the walk arrives or meets a vertex.
+    fn cross(&self, source: Coord<f64>, mut edge: u32, steps: &mut usize, met: &mut Vec<Met>) -> Option<Way> {
+        let (disk, target) = (self.disk, coord(self.end()));
+        loop {
+            *steps += 1;
+            if *steps > 3 * disk.triangles.len() {
+                return None;
+            }
+            let (p, q) = (disk.from(edge), disk.from(next(edge)));
+            let (right, left) = (-orient2d(source, target, self.place(p)), orient2d(source, target, self.place(q)));
+            if right <= 0.0 || left <= 0.0 {
+                return None;
+            }
+            met.push(Met::Edge(p, q, right / (right + left)));
+            let other = disk.adjacency.opposite[edge as usize];
+            if other == NONE {
+                return None;
+            }
+            if let Some(at) = self.arrived(other / 3) {
+                return Some(Way::Arrived(at));
+            }
+            let r = disk.from(previous(other));
+            let side = orient2d(source, target, self.place(r));
+            if side == 0.0 {
+                return Some(Way::Through(r));
+            }
+            edge = if side > 0.0 { next(other) } else { previous(other) };
+        }
+    }
+}
+
+fn coord(p: DVec2) -> Coord<f64> {
+    Coord { x: p.x, y: p.y }
 }
 
 /// Where a line in a map is.

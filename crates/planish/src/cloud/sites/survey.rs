@@ -113,21 +113,8 @@ pub(crate) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
     let start = if prior.sure { KNOWN_RADII * prior.noise } else { NOISE_RADII * floor };
     let mut p = p;
     if start > r0 {
-        // A point aside of the surface sees one side of the noise; the search begins on the plane of its ball.
         r0 = start;
-        for _ in 0..2 {
-            let Scratch { around, ball, ones, .. } = &mut *scratch;
-            around.clear();
-            tree.within(p, r0, |_, q, _| around.push(q));
-            ball.refill(around);
-            ball.localize(p, r0, DVec3::ZERO, ones);
-            ones.fill(1.0);
-            let m = ball.moments(ones);
-            if m.weight() >= SMALLEST as f64 {
-                let n = Frame::of_moments(&m).n;
-                p += r0 * n * m.mean().dot(n);
-            }
-        }
+        p = onto_plane(tree, p, r0, scratch);
     }
     let radius = |j: usize| r0 * GROWTH.powi(j as i32);
     let quadric = |h: &Height| Quadric { center: p, scale: r0, a: h.implicit() };
@@ -162,45 +149,19 @@ pub(crate) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
             if j > 0 && (radius(j) > reach || (inner.len() > PLENTY && GROWTH.powi(j as i32) > WIDE_ENOUGH * usual)) {
                 break 'rounds;
             }
-            let Some(height) = framed_height(&sums.matrix(), Frame::of_moments(&sums)) else { continue };
-            let ball = GROWTH.powi(j as i32);
-            let Scatter { noise, excess, kurtosis } = bias(&height, inner, ball, rows);
-            let count = inner.len();
-            let layers = if prior.one || kurtosis >= PEAKED { None } else { split(&height, inner, &rows[2]) };
-            let (noise, excess) = match &layers {
-                None => (noise.max(floor / r0), excess),
-                // Each sheet has half of the points, and its bias is not measured: that of both together is.
-                Some(l) => (l.noise.max(floor / r0), PARAMETERS + 2.0 * layer_bias(l, inner, ball, rows)),
-            };
-            let (radii, own) = match prior.sure {
-                true => (KNOWN_RADII, noise.min(prior.noise / r0)),
-                false if prior.noise > 0.0 => (NOISE_RADII, noise),
-                false => (KNOWN_RADII, noise),
-            };
-            let wide = (radii * own).max(NO_VOLUME * noise);
-            // The first ball is as wide as the noise asks, but for rounding.
-            if ball * (1.0 + 1e-9) < wide {
-                continue;
-            }
-            usual = usual.min(noise);
-            // Two standard deviations of a noise level from this many points pass as chance.
-            let chance = THICKER + (2.0 / count as f64).sqrt();
-            let thick = (noise * noise - (chance * usual).powi(2)).max(0.0);
-            let error = noise * noise * (PARAMETERS + excess) / count as f64 + thick;
+            let Some(ball) = Ball::fit(&sums, inner, GROWTH.powi(j as i32), prior, r0, rows) else { continue };
+            usual = usual.min(ball.noise);
+            let error = ball.error(usual);
             if error < least {
                 least = error;
                 best = Some(Survey {
                     radius: radius(j),
-                    noise: noise * r0,
+                    noise: ball.noise * r0,
                     error: error * r0 * r0,
-                    spacing: radius(j)
-                        * (std::f64::consts::PI * if layers.is_some() { 2.0 } else { 1.0 } / count as f64).sqrt(),
-                    sure: layers.is_none()
-                        && count as f64 > MANY
-                        && excess < UNBIASED
-                        && (kurtosis - 3.0).abs() < LACK.min(NORMAL * (24.0 / count as f64).sqrt()),
-                    quadric: quadric(layers.as_ref().map_or(&height, |l| &l.sheets[0])),
-                    layer: layers.map(|l| quadric(&l.sheets[1])),
+                    spacing: radius(j) * ball.spacing(),
+                    sure: ball.is_sure(),
+                    quadric: quadric(ball.layers.as_ref().map_or(&ball.height, |l| &l.sheets[0])),
+                    layer: ball.layers.map(|l| quadric(&l.sheets[1])),
                 });
             } else if error > HOPELESS * least {
                 break 'rounds;
@@ -208,6 +169,86 @@ pub(crate) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
         }
     }
     best
+}
+
+/// Moves a point onto the plane of the ball around it, twice: one aside of the surface sees one side of the noise.
+fn onto_plane(tree: &KdTree, mut p: DVec3, radius: f64, scratch: &mut Scratch) -> DVec3 {
+    let Scratch { around, ball, ones, .. } = scratch;
+    for _ in 0..2 {
+        around.clear();
+        tree.within(p, radius, |_, q, _| around.push(q));
+        ball.refill(around);
+        ball.localize(p, radius, DVec3::ZERO, ones);
+        ones.fill(1.0);
+        let m = ball.moments(ones);
+        if m.weight() >= SMALLEST as f64 {
+            let n = Frame::of_moments(&m).n;
+            p += radius * n * m.mean().dot(n);
+        }
+    }
+    p
+}
+
+/// A ball as its points tell of it; lengths in units of the first ball's radius.
+struct Ball {
+    height: Height,
+    layers: Option<Layers>,
+    noise: f64,
+    excess: f64,
+    kurtosis: f64,
+    count: usize,
+}
+
+impl Ball {
+    /// `None` if the points determine no sheet, or the ball is so narrow that noise would pass for its shape.
+    /// * `ball` - its radius; `unit` - the unit of length, world units
+    fn fit(
+        sums: &Moments,
+        inner: &Points,
+        ball: f64,
+        prior: Prior,
+        unit: f64,
+        rows: &mut [Vec<f64>; 3],
+    ) -> Option<Ball> {
+        let height = framed_height(&sums.matrix(), Frame::of_moments(sums))?;
+        let Scatter { noise, excess, kurtosis } = bias(&height, inner, ball, rows);
+        let layers = if prior.one || kurtosis >= PEAKED { None } else { split(&height, inner, &rows[2]) };
+        let floor = KNOWN * prior.noise;
+        let (noise, excess) = match &layers {
+            None => (noise.max(floor / unit), excess),
+            // Each sheet has half of the points, and its bias is not measured: that of both together is.
+            Some(l) => (l.noise.max(floor / unit), PARAMETERS + 2.0 * layer_bias(l, inner, ball, rows)),
+        };
+        let (radii, own) = match prior.sure {
+            true => (KNOWN_RADII, noise.min(prior.noise / unit)),
+            false if prior.noise > 0.0 => (NOISE_RADII, noise),
+            false => (KNOWN_RADII, noise),
+        };
+        let wide = (radii * own).max(NO_VOLUME * noise);
+        // The first ball is as wide as the noise asks, but for rounding.
+        (!(ball * (1.0 + 1e-9) < wide)).then_some(Ball { height, layers, noise, excess, kurtosis, count: inner.len() })
+    }
+
+    /// Expected squared error where `usual` is the noise of the region.
+    fn error(&self, usual: f64) -> f64 {
+        // Two standard deviations of a noise level from this many points pass as chance.
+        let chance = THICKER + (2.0 / self.count as f64).sqrt();
+        let thick = (self.noise * self.noise - (chance * usual).powi(2)).max(0.0);
+        self.noise * self.noise * (PARAMETERS + self.excess) / self.count as f64 + thick
+    }
+
+    /// Distance between points, in radii of the ball.
+    fn spacing(&self) -> f64 {
+        (std::f64::consts::PI * if self.layers.is_some() { 2.0 } else { 1.0 } / self.count as f64).sqrt()
+    }
+
+    /// True if the noise is what the points scatter and no shape.
+    fn is_sure(&self) -> bool {
+        self.layers.is_none()
+            && self.count as f64 > MANY
+            && self.excess < UNBIASED
+            && (self.kurtosis - 3.0).abs() < LACK.min(NORMAL * (24.0 / self.count as f64).sqrt())
+    }
 }
 
 /// What the averages of the sectors hold beyond noise if every point belongs to the nearer of two sheets.
