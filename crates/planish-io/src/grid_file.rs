@@ -125,6 +125,50 @@ fn nrrd(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
         let hint = "name a volume: .nrrd or .npy".into();
         return Err(ReadError::WrongFormat { expected: "NRRD", found: "something else", hint });
     }
+    let header = nrrd_header(bytes)?;
+    let NrrdHeader { big, spacing, origin, data, line, .. } = header;
+    let missing = |what: &str| header_fault(format!("the header has no \"{what}\""), line, "write the file again");
+    let kind = header.kind.ok_or_else(|| missing("type"))?;
+    let (size, size_line) = header.size.ok_or_else(|| missing("sizes"))?;
+    let (encoding, encoding_line) = header.encoding.ok_or_else(|| missing("encoding"))?;
+    let samples = count(size, Place::Line(size_line))?;
+    let needed = samples * kind.size();
+    let body = match encoding.as_str() {
+        "raw" => Cow::Borrowed(&bytes[data..]),
+        "gzip" | "gz" => {
+            // One byte more than there may be tells that there is too much; a bomb fills no memory.
+            let mut out = Vec::with_capacity(needed.min(bytes.len() * 8));
+            let mut reader = flate2::read::MultiGzDecoder::new(&bytes[data..]).take(needed as u64 + 1);
+            reader.read_to_end(&mut out).map_err(|e| ReadError::Syntax {
+                what: format!("the compressed data is damaged ({e})"),
+                place: Place::Byte(data),
+            })?;
+            Cow::Owned(out)
+        }
+        other => return Err(unsupported(format!("the encoding \"{other}\""), encoding_line)),
+    };
+    agree(body.len() as u64, needed, size, data)?;
+    let mut values = vec![0.0; samples];
+    kind.convert(&body, big, &mut values);
+    checked(ScalarGrid { size, origin, spacing, values: values.into() }, line)
+}
+
+/// The fields of an NRRD header, with their lines where a fault would be told.
+struct NrrdHeader {
+    kind: Option<Scalar>,
+    size: Option<([usize; 3], usize)>,
+    encoding: Option<(String, usize)>,
+    /// The high byte comes first.
+    big: bool,
+    spacing: DVec3,
+    origin: DVec3,
+    /// Where the numbers begin.
+    data: usize,
+    /// Last line.
+    line: usize,
+}
+
+fn nrrd_header(bytes: &[u8]) -> Result<NrrdHeader, ReadError> {
     let mut kind = None;
     let mut size = None;
     let mut encoding = None;
@@ -133,7 +177,7 @@ fn nrrd(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
     let mut origin = DVec3::ZERO;
     let mut at = 0;
     let mut line = 0;
-    let data = loop {
+    loop {
         let Some(end) = bytes[at..].iter().position(|&b| b == b'\n') else {
             return Err(header_fault(
                 "the header has no end (an empty line)",
@@ -145,7 +189,7 @@ fn nrrd(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
         at += end + 1;
         line += 1;
         if text.is_empty() {
-            break at;
+            return Ok(NrrdHeader { kind, size, encoding, big, spacing, origin, data: at, line });
         }
         if line == 1 || text.starts_with(b"#") {
             continue;
@@ -198,31 +242,7 @@ fn nrrd(bytes: &[u8]) -> Result<ScalarGrid, ReadError> {
             "byte skip" | "line skip" if value != "0" => return Err(unsupported(format!("\"{key}\""), line)),
             _ => {}
         }
-    };
-    let missing = |what: &str| header_fault(format!("the header has no \"{what}\""), line, "write the file again");
-    let kind = kind.ok_or_else(|| missing("type"))?;
-    let (size, size_line) = size.ok_or_else(|| missing("sizes"))?;
-    let (encoding, encoding_line) = encoding.ok_or_else(|| missing("encoding"))?;
-    let samples = count(size, Place::Line(size_line))?;
-    let needed = samples * kind.size();
-    let body = match encoding.as_str() {
-        "raw" => Cow::Borrowed(&bytes[data..]),
-        "gzip" | "gz" => {
-            // One byte more than there may be tells that there is too much; a bomb fills no memory.
-            let mut out = Vec::with_capacity(needed.min(bytes.len() * 8));
-            let mut reader = flate2::read::MultiGzDecoder::new(&bytes[data..]).take(needed as u64 + 1);
-            reader.read_to_end(&mut out).map_err(|e| ReadError::Syntax {
-                what: format!("the compressed data is damaged ({e})"),
-                place: Place::Byte(data),
-            })?;
-            Cow::Owned(out)
-        }
-        other => return Err(unsupported(format!("the encoding \"{other}\""), encoding_line)),
-    };
-    agree(body.len() as u64, needed, size, data)?;
-    let mut values = vec![0.0; samples];
-    kind.convert(&body, big, &mut values);
-    checked(ScalarGrid { size, origin, spacing, values: values.into() }, line)
+    }
 }
 
 /// Axis-parallel directions as spacings.

@@ -339,37 +339,7 @@ impl<'a> Sketch<'a> {
         places: &[Vec<Place>],
     ) -> Result<Network, FeatureError> {
         let (nu, nv) = (across.len() + 1, along.len() + 1);
-        // Anchors: where each u curve meets each v curve.
-        let mut on_chain: BTreeMap<u32, usize> = BTreeMap::new();
-        let mut on_edge: BTreeMap<(u32, u32), usize> = BTreeMap::new();
-        for (c, chain) in self.chains.iter().enumerate() {
-            on_chain.extend(chain.iter().map(|&v| (v, c)));
-            on_edge.extend(chain.windows(2).map(|w| ((w[0].min(w[1]), w[0].max(w[1])), c)));
-        }
-        let mut anchors = vec![vec![None; across.len()]; along.len()];
-        for (l, list) in places.iter().enumerate() {
-            for p in list {
-                let met = match *p {
-                    Place::Vertex(v) => on_chain.get(&v),
-                    Place::Edge(h, _) => {
-                        let (a, b) = (self.ground.origin(h), self.ground.origin(next(h)));
-                        on_edge.get(&(a.min(b), a.max(b)))
-                    }
-                    Place::Face(_) => None,
-                };
-                if let Some(&c) = met {
-                    if anchors[l][c].is_some() {
-                        let place = p.position(self.ground);
-                        return Err(FeatureError::MeetAgain { a: across[c], b: along[l], times: 2, place });
-                    }
-                    anchors[l][c] = Some(*p);
-                }
-            }
-            if let Some(c) = anchors[l].iter().position(Option::is_none) {
-                let place = lines[l][0].position(self.ground);
-                return Err(FeatureError::MeetAgain { a: across[c], b: along[l], times: 0, place });
-            }
-        }
+        let anchors = self.anchors(across, along, lines, places)?;
         // u lines from low to high v: side 0, the u curves, side 2 turned round; each in nu pieces.
         let ends = |c: usize, e: usize| {
             let chain = &self.chains[c];
@@ -401,47 +371,48 @@ impl<'a> Sketch<'a> {
                 }
             }
         }
-        let mut network = Network::default();
-        let corner = |j: usize, i: usize| (j * (nu + 1) + i) as u32;
-        for j in 0..=nv {
-            for i in 0..=nu {
-                let place = if i < nu { rows[j][i][0] } else { rows[j][nu - 1][rows[j][nu - 1].len() - 1] };
-                network.corners.push(Corner { place });
+        Ok(lattice(rows, cols))
+    }
+
+    /// Where each u curve meets each v curve.
+    fn anchors(
+        &self,
+        across: &[usize],
+        along: &[usize],
+        lines: &[Vec<FacePoint>],
+        places: &[Vec<Place>],
+    ) -> Result<Vec<Vec<Option<Place>>>, FeatureError> {
+        let mut on_chain: BTreeMap<u32, usize> = BTreeMap::new();
+        let mut on_edge: BTreeMap<(u32, u32), usize> = BTreeMap::new();
+        for (c, chain) in self.chains.iter().enumerate() {
+            on_chain.extend(chain.iter().map(|&v| (v, c)));
+            on_edge.extend(chain.windows(2).map(|w| ((w[0].min(w[1]), w[0].max(w[1])), c)));
+        }
+        let mut anchors = vec![vec![None; across.len()]; along.len()];
+        for (l, list) in places.iter().enumerate() {
+            for p in list {
+                let met = match *p {
+                    Place::Vertex(v) => on_chain.get(&v),
+                    Place::Edge(h, _) => {
+                        let (a, b) = (self.ground.origin(h), self.ground.origin(next(h)));
+                        on_edge.get(&(a.min(b), a.max(b)))
+                    }
+                    Place::Face(_) => None,
+                };
+                if let Some(&c) = met {
+                    if anchors[l][c].is_some() {
+                        let place = p.position(self.ground);
+                        return Err(FeatureError::MeetAgain { a: across[c], b: along[l], times: 2, place });
+                    }
+                    anchors[l][c] = Some(*p);
+                }
+            }
+            if let Some(c) = anchors[l].iter().position(Option::is_none) {
+                let place = lines[l][0].position(self.ground);
+                return Err(FeatureError::MeetAgain { a: across[c], b: along[l], times: 0, place });
             }
         }
-        for (j, pieces) in rows.into_iter().enumerate() {
-            for (i, points) in pieces.into_iter().enumerate() {
-                network.curves.push(Curve {
-                    corners: [corner(j, i), corner(j, i + 1)],
-                    kind: CurveKind::Smooth,
-                    points,
-                });
-            }
-        }
-        let upright = network.curves.len() as u32;
-        for (i, pieces) in cols.into_iter().enumerate() {
-            for (j, points) in pieces.into_iter().enumerate() {
-                network.curves.push(Curve {
-                    corners: [corner(j, i), corner(j + 1, i)],
-                    kind: CurveKind::Smooth,
-                    points,
-                });
-            }
-        }
-        for j in 0..nv as u32 {
-            for i in 0..nu as u32 {
-                let (nu, nv) = (nu as u32, nv as u32);
-                network.patches.push(Patch {
-                    sides: [
-                        Side { curve: j * nu + i, reversed: false },
-                        Side { curve: upright + (i + 1) * nv + j, reversed: false },
-                        Side { curve: (j + 1) * nu + i, reversed: true },
-                        Side { curve: upright + i * nv + j, reversed: true },
-                    ],
-                });
-            }
-        }
-        Ok(network)
+        Ok(anchors)
     }
 
     /// A v curve as places, with the anchors that lie on its edges put in.
@@ -472,4 +443,44 @@ impl<'a> Sketch<'a> {
         }
         out
     }
+}
+
+/// The network of a lattice of curves.
+/// * `rows` - curves along u from low to high v, each in pieces
+/// * `cols` - curves along v from low to high u, each in pieces
+fn lattice(rows: Vec<Vec<Vec<FacePoint>>>, cols: Vec<Vec<Vec<FacePoint>>>) -> Network {
+    let (nu, nv) = (cols.len() - 1, rows.len() - 1);
+    let mut network = Network::default();
+    let corner = |j: usize, i: usize| (j * (nu + 1) + i) as u32;
+    for j in 0..=nv {
+        for i in 0..=nu {
+            let place = if i < nu { rows[j][i][0] } else { rows[j][nu - 1][rows[j][nu - 1].len() - 1] };
+            network.corners.push(Corner { place });
+        }
+    }
+    for (j, pieces) in rows.into_iter().enumerate() {
+        for (i, points) in pieces.into_iter().enumerate() {
+            network.curves.push(Curve { corners: [corner(j, i), corner(j, i + 1)], kind: CurveKind::Smooth, points });
+        }
+    }
+    let upright = network.curves.len() as u32;
+    for (i, pieces) in cols.into_iter().enumerate() {
+        for (j, points) in pieces.into_iter().enumerate() {
+            network.curves.push(Curve { corners: [corner(j, i), corner(j + 1, i)], kind: CurveKind::Smooth, points });
+        }
+    }
+    for j in 0..nv as u32 {
+        for i in 0..nu as u32 {
+            let (nu, nv) = (nu as u32, nv as u32);
+            network.patches.push(Patch {
+                sides: [
+                    Side { curve: j * nu + i, reversed: false },
+                    Side { curve: upright + (i + 1) * nv + j, reversed: false },
+                    Side { curve: (j + 1) * nu + i, reversed: true },
+                    Side { curve: upright + i * nv + j, reversed: true },
+                ],
+            });
+        }
+    }
+    network
 }
