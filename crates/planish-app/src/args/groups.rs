@@ -13,7 +13,7 @@ pub struct Common {
     /// Write the report to FILE.json
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
-    /// Number of threads; the result does not depend on it [default: all cores]
+    /// Number of threads, at most four for each core; the result does not depend on it [default: one for each core]
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// Seed of everything random

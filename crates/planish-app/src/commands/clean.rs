@@ -112,7 +112,7 @@ fn segments(output: &Path, cleaned: &Cleaned) -> Vec<(PathBuf, Cloud)> {
 /// Sharp lines as polylines of an OBJ file.
 fn lines_obj(cleaned: &Cleaned) -> String {
     use std::fmt::Write;
-    let mut text = format!("# planish {}: feature lines\n", env!("CARGO_PKG_VERSION"));
+    let mut text = format!("# planish {}: sharp lines\n", env!("CARGO_PKG_VERSION"));
     let mut next = 1;
     for line in &cleaned.lines {
         for p in line {
@@ -144,7 +144,7 @@ fn table(args: &Clean, samples: &Samples, cleaned: &Cleaned, report: &Report) ->
     table.row("outliers", count(cleaned.outliers as u64));
     table.row("points", format!("{}: {}", args.output.display(), count(cleaned.cloud.points.len() as u64)));
     if let Some(path) = &args.lines {
-        table.row("feature lines", format!("{}: {}", path.display(), count(cleaned.lines.len() as u64)));
+        table.row("sharp lines", format!("{}: {}", path.display(), count(cleaned.lines.len() as u64)));
     }
     table
 }

@@ -48,6 +48,9 @@ pub fn run(cli: Cli) -> Result<Status, Failure> {
     }
 }
 
+/// Threads for each core of the machine, at most.
+const THREADS_PER_CORE: usize = 4;
+
 /// What the common options make of a command.
 struct Session {
     common: Common,
@@ -59,7 +62,9 @@ impl Session {
         if let Some(report) = &common.report {
             files::check_extension(report, &["json"])?;
         }
-        let threads = common.threads.map_or(0, |n| n.get());
+        // More threads than that only wait for each other.
+        let most = THREADS_PER_CORE * std::thread::available_parallelism().map_or(1, |n| n.get());
+        let threads = common.threads.map_or(0, |n| n.get().min(most));
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::fault)?;
         Ok(Session { common: common.clone(), bars: Bars::new(common.quiet, common.verbose) })
     }
