@@ -3,6 +3,7 @@
 //! [K98] §3.3.1. Places slide over the faces (MovePointOnSurface) and never leave them, so a curve cannot jump to
 //! another sheet of the surface.
 
+use crate::geom::polyline::Along;
 use crate::mesh::{Adjacency, FacePoint, TriMesh, move_point_on_surface};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -68,23 +69,15 @@ pub fn attract(mesh: &TriMesh, adjacency: &Adjacency, points: &[FacePoint], attr
 
 /// `count` positions at equal arc length along a polyline; its ends are kept.
 pub fn sample_polyline(points: &[DVec3], count: usize) -> Vec<DVec3> {
-    let mut sums = vec![0.0];
-    for w in points.windows(2) {
-        sums.push(sums[sums.len() - 1] + w[0].distance(w[1]));
-    }
-    let total = sums[sums.len() - 1];
-    let mut s = 0;
+    let mut along = Along::new(points.iter().copied());
+    let total = along.length();
     (0..count)
         .map(|k| {
             if points.len() < 2 {
                 return points[0];
             }
             let target = total * k as f64 / (count - 1).max(1) as f64;
-            while s + 2 < sums.len() && sums[s + 1] <= target {
-                s += 1;
-            }
-            let span = sums[s + 1] - sums[s];
-            let t = if span > 0.0 { ((target - sums[s]) / span).clamp(0.0, 1.0) } else { 0.0 };
+            let (s, t) = along.advance(target);
             points[s].lerp(points[s + 1], t)
         })
         .collect()

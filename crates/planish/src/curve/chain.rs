@@ -4,7 +4,7 @@
 
 use super::CurveError;
 use super::strip::{connect, vertex_of};
-use crate::geom::polyline;
+use crate::geom::polyline::{self, Along};
 use crate::geom::tolerance::ON_EDGE;
 use crate::mesh::{Adjacency, FacePoint, TriMesh};
 use glam::DVec3;
@@ -186,13 +186,8 @@ pub(crate) fn without_spur(mesh: &TriMesh, chain: &mut Vec<FacePoint>, joint: us
 
 /// `count` places at equal arc length along a chain whose neighbours share a face; the ends are kept.
 pub(crate) fn sample(mesh: &TriMesh, adjacency: &Adjacency, chain: &[FacePoint], count: usize) -> Vec<FacePoint> {
-    let at: Vec<DVec3> = chain.iter().map(|p| p.position(mesh)).collect();
-    let mut sums = vec![0.0];
-    for w in at.windows(2) {
-        sums.push(sums[sums.len() - 1] + w[0].distance(w[1]));
-    }
-    let total = sums[sums.len() - 1];
-    let mut s = 0;
+    let mut along = Along::new(chain.iter().map(|p| p.position(mesh)));
+    let total = along.length();
     (0..count)
         .map(|k| {
             if k == 0 || chain.len() < 2 {
@@ -202,11 +197,7 @@ pub(crate) fn sample(mesh: &TriMesh, adjacency: &Adjacency, chain: &[FacePoint],
                 return chain[chain.len() - 1];
             }
             let target = total * k as f64 / (count - 1) as f64;
-            while s + 2 < sums.len() && sums[s + 1] <= target {
-                s += 1;
-            }
-            let span = sums[s + 1] - sums[s];
-            let t = if span > 0.0 { ((target - sums[s]) / span).clamp(0.0, 1.0) } else { 0.0 };
+            let (s, t) = along.advance(target);
             between(mesh, adjacency, &chain[s], &chain[s + 1], t)
         })
         .collect()
@@ -240,7 +231,7 @@ pub(crate) fn between(mesh: &TriMesh, adjacency: &Adjacency, a: &FacePoint, b: &
             _ => *b,
         };
     };
-    let (x, y) = (on_face(mesh, a, face), on_face(mesh, b, face));
+    let (x, y) = (a.weights_on(mesh, face), b.weights_on(mesh, face));
     let bary = std::array::from_fn(|k| x[k] + (y[k] - x[k]) * t);
     FacePoint { face, bary }
 }
@@ -260,21 +251,4 @@ fn on_edge(p: &FacePoint, k: usize) -> FacePoint {
     bary[k] = 0.0;
     let sum: f64 = bary.iter().sum();
     FacePoint { face: p.face, bary: bary.map(|b| b / sum) }
-}
-
-/// Weights of a place on another face that it lies on.
-fn on_face(mesh: &TriMesh, p: &FacePoint, face: u32) -> [f64; 3] {
-    if p.face == face {
-        return p.bary;
-    }
-    let (from, to) = (mesh.triangles[p.face as usize], mesh.triangles[face as usize]);
-    let mut bary = [0.0; 3];
-    for k in 0..3 {
-        if p.bary[k] != 0.0
-            && let Some(j) = to.iter().position(|&v| v == from[k])
-        {
-            bary[j] = p.bary[k];
-        }
-    }
-    bary
 }

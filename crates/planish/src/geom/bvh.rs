@@ -200,13 +200,7 @@ impl Bvh {
                 if !(away <= reach) {
                     continue;
                 }
-                let mut at = top;
-                while at > base && stack[at - 1].2 < away {
-                    stack[at] = stack[at - 1];
-                    at -= 1;
-                }
-                stack[at] = (node.link[k], node.count[k], away);
-                top += 1;
+                put(&mut stack, base, &mut top, (node.link[k], node.count[k], away));
             }
         }
         found
@@ -245,17 +239,23 @@ impl Bvh {
                     continue;
                 }
                 let Some(near) = ray.enters(node, k, start) else { continue };
-                let mut at = top;
-                while at > base && stack[at - 1].2 < near {
-                    stack[at] = stack[at - 1];
-                    at -= 1;
-                }
-                stack[at] = (node.link[k], node.count[k], near);
-                top += 1;
+                put(&mut stack, base, &mut top, (node.link[k], node.count[k], near));
             }
         }
         found.map(|i| RayHit { face: self.faces[i], distance: best })
     }
+}
+
+/// Puts a child (link, count, distance) on a stack above its brothers from `base` on that are further away.
+#[inline]
+fn put(stack: &mut [(u32, u32, f64); STACK], base: usize, top: &mut usize, child: (u32, u32, f64)) {
+    let mut at = *top;
+    while at > base && stack[at - 1].2 < child.2 {
+        stack[at] = stack[at - 1];
+        at -= 1;
+    }
+    stack[at] = child;
+    *top += 1;
 }
 
 /// Points within so many half diagonals are told apart by `f32`; from afar `f64` is needed to.

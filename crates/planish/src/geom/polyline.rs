@@ -26,6 +26,34 @@ pub fn arc_lengths(points: impl IntoIterator<Item = DVec3>) -> Vec<f64> {
     along.collect()
 }
 
+/// A walk along a polyline, by its length.
+pub struct Along {
+    sums: Vec<f64>,
+    segment: usize,
+}
+
+impl Along {
+    /// A walk from the first point of a polyline of two or more.
+    pub fn new(points: impl IntoIterator<Item = DVec3>) -> Along {
+        Along { sums: arc_lengths(points), segment: 0 }
+    }
+
+    /// The whole length.
+    pub fn length(&self) -> f64 {
+        self.sums.last().copied().unwrap_or(0.0)
+    }
+
+    /// Goes on to a length, no less than the one before: the segment there and the share of it, 0 to 1.
+    pub fn advance(&mut self, target: f64) -> (usize, f64) {
+        while self.segment + 2 < self.sums.len() && self.sums[self.segment + 1] <= target {
+            self.segment += 1;
+        }
+        let start = self.sums[self.segment];
+        let span = self.sums[self.segment + 1] - start;
+        (self.segment, if span > 0.0 { ((target - start) / span).clamp(0.0, 1.0) } else { 0.0 })
+    }
+}
+
 /// The place at `target` of the length of a polyline; its last point beyond that, the origin if it has none.
 pub fn at_length(points: &[DVec3], target: f64) -> DVec3 {
     let mut left = target;
@@ -50,6 +78,11 @@ mod tests {
         assert_eq!(arc_lengths(square), [0.0, 2.0, 4.0, 6.0]);
         assert_eq!(at_length(&square, 3.0), DVec3::new(2.0, 1.0, 0.0));
         assert_eq!((at_length(&square, 0.0), at_length(&square, 7.0)), (square[0], square[3]));
+        let mut along = Along::new(square);
+        assert_eq!(
+            [0.0, 1.0, 2.0, 5.0, 6.0].map(|s| along.advance(s)),
+            [(0, 0.0), (0, 0.5), (1, 0.0), (2, 0.5), (2, 1.0)]
+        );
         assert_eq!((length([]), length([DVec3::X]), arc_lengths([DVec3::X])), (0.0, 0.0, vec![0.0]));
     }
 }

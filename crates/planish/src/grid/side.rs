@@ -5,7 +5,7 @@
 //!
 //! [K98] §5.4 and §5.6.
 
-use crate::geom::polyline;
+use crate::geom::polyline::{self, Along};
 use glam::DVec3;
 
 /// A segment shorter than this fraction of the mean one is taken as that long in the chart, so that the chart's
@@ -90,19 +90,14 @@ pub fn resample_at(chain: &[DVec3], count: usize, stops: &Stops) -> SideSamples 
     let backwards = runs_backwards(chain);
     let canonical: Vec<DVec3> = if backwards { chain.iter().rev().copied().collect() } else { chain.to_vec() };
     let stops = if backwards { turned(stops, count) } else { stops.clone() };
-    let sums = polyline::arc_lengths(canonical.iter().copied());
-    let total = sums[sums.len() - 1];
+    let mut along = Along::new(canonical.iter().copied());
+    let total = along.length();
     let segments = canonical.len() - 1;
     let mut out = SideSamples { points: Vec::new(), segment: Vec::new(), fraction: Vec::new() };
-    let mut s = 0;
     for k in 0..count {
         let share = if stops.is_empty() { k as f64 / (count - 1) as f64 } else { share_at(k, count, &stops) };
         let target = total * share;
-        while s + 1 < segments && sums[s + 1] <= target {
-            s += 1;
-        }
-        let span = sums[s + 1] - sums[s];
-        let t = if span > 0.0 { ((target - sums[s]) / span).clamp(0.0, 1.0) } else { 0.0 };
+        let (s, t) = along.advance(target);
         let (segment, t, point) = match k {
             0 => (0, 0.0, canonical[0]),
             _ if k + 1 == count => (segments - 1, 1.0, canonical[segments]),

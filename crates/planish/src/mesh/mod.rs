@@ -150,6 +150,15 @@ impl TriMesh {
 }
 
 impl FacePoint {
+    /// Weights of the corners of another face that the place lies on.
+    pub fn weights_on(&self, mesh: &TriMesh, face: u32) -> [f64; 3] {
+        if self.face == face {
+            return self.bary;
+        }
+        let (from, to) = (mesh.triangles[self.face as usize], mesh.triangles[face as usize]);
+        to.map(|v| from.iter().position(|&w| w == v).map_or(0.0, |k| self.bary[k]))
+    }
+
     /// World position.
     pub fn position(&self, mesh: &TriMesh) -> DVec3 {
         let [a, b, c] = mesh.corners(self.face as usize);

@@ -202,7 +202,7 @@ impl Pieces {
         let own = self.of.get(&p.face).into_iter().flatten().copied();
         let weights = |t: u32| {
             let corners = patch.mesh.triangles[t as usize]
-                .map(|v| weights_on(input, &patch.origin[v as usize], patch.face_origin[t as usize]));
+                .map(|v| patch.origin[v as usize].weights_on(input, patch.face_origin[t as usize]));
             inside(corners, p.bary)
         };
         own.map(|t| (t, weights(t)))
@@ -254,21 +254,6 @@ fn inside(corners: [[f64; 3]; 3], p: [f64; 3]) -> [f64; 3] {
     [(c - b).perp_dot(q - b) / area, (a - c).perp_dot(q - c) / area, (b - a).perp_dot(q - a) / area]
 }
 
-/// Weights of a place on a face that it lies on.
-fn weights_on(mesh: &TriMesh, p: &FacePoint, face: u32) -> [f64; 3] {
-    if p.face == face {
-        return p.bary;
-    }
-    let (from, to) = (mesh.triangles[p.face as usize], mesh.triangles[face as usize]);
-    let mut bary = [0.0; 3];
-    for k in 0..3 {
-        if let Some(j) = to.iter().position(|&v| v == from[k]) {
-            bary[j] += p.bary[k];
-        }
-    }
-    bary
-}
-
 /// A place of the cut mesh on the uncut one.
 pub(crate) fn to_patch(cut: &imprint::Cut, mesh: &TriMesh, adjacency: &Adjacency, p: &FacePoint) -> FacePoint {
     let parent = cut.parent[p.face as usize];
@@ -286,7 +271,7 @@ pub(crate) fn to_input(input: &TriMesh, patch: &PatchMesh, p: &FacePoint) -> Fac
     let face = patch.face_origin[p.face as usize];
     let mut bary = [0.0; 3];
     for (k, &v) in patch.mesh.triangles[p.face as usize].iter().enumerate() {
-        let w = weights_on(input, &patch.origin[v as usize], face);
+        let w = patch.origin[v as usize].weights_on(input, face);
         (0..3).for_each(|i| bary[i] += p.bary[k] * w[i]);
     }
     normal(face, bary)
