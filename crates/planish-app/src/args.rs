@@ -195,6 +195,15 @@ impl HoleArgs {
     pub fn choice(&self) -> Option<bool> {
         if self.open || self.close { Some(self.close) } else { None }
     }
+
+    /// Refuses the options for an input that is no scan.
+    /// # Errors
+    /// If one of them is given.
+    pub fn refuse(&self, hint: &'static str) -> Result<(), Failure> {
+        let Some(close) = self.choice() else { return Ok(()) };
+        let flag = if close { "--close" } else { "--open" };
+        Err(Failure::usage(flag, "is for holes of a scan, and the input is none").hint(hint))
+    }
 }
 
 /// `planish clean`

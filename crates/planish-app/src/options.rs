@@ -1,10 +1,12 @@
 //! Options of a stage, made from the stage's parameter struct: its fields become flags, its doc comments
 //! their help, its defaults and ranges theirs. Nothing about a parameter is declared a second time.
 //!
-//! A field `feature_angle_deg` becomes `--feature-angle-deg`; where two stages have a field of one name,
-//! each flag has its stage in front (`--grid-iterations`, `--fit-iterations`). A field that is one of several
+//! A field `feature_angle_deg` becomes `--feature-angle-deg`; where two stages have a field of one name, or a group of
+//! options written by hand has an option of it, the flag has its stage in front (`--fit-smoothing`, `--volume-close`):
+//! of two options of one name one would do nothing. A field that is one of several
 //! things (`resolution`: a tolerance or control points) becomes one flag for each, of which one may be given.
 
+use crate::args::{Common, HoleArgs, ScanArgs};
 use crate::failure::Failure;
 use clap::builder::{PossibleValuesParser, ValueParser};
 use clap::error::ErrorKind;
@@ -147,7 +149,11 @@ impl Field {
         let arg = Arg::new(self.id.clone()).long(self.flag.clone()).help(self.help.clone()).value_name(value_name);
         let arg = arg.value_parser(parser).action(ArgAction::Set).allow_negative_numbers(true);
         let arg = arg.conflicts_with_all(self.rivals.clone());
-        if matches!(self.kind, Kind::Flag) { arg.num_args(0..=1).default_missing_value("true") } else { arg }
+        if !matches!(self.kind, Kind::Flag) {
+            return arg;
+        }
+        // The value needs its `=`: what follows the flag may be the input.
+        arg.num_args(0..=1).require_equals(true).default_missing_value("true")
     }
 
     fn read(&self, text: &str) -> Result<Value, String> {
@@ -303,18 +309,37 @@ fn choices(property: &Value) -> Option<Vec<String>> {
     (!words.is_empty()).then_some(words)
 }
 
-/// Field names that more than one stage has.
+/// Field names that more than one stage has, or one stage and a group of options that many commands have.
 fn clashing_names() -> Vec<String> {
     let stages = serde_json::to_value(PipelineParams::default()).unwrap_or_default();
-    let mut names: Vec<String> = stages
-        .as_object()
-        .into_iter()
-        .flat_map(|s| s.values())
-        .filter_map(Value::as_object)
-        .flat_map(|f| f.keys().cloned())
-        .collect();
+    let fields = stages.as_object().into_iter().flat_map(|s| s.values()).filter_map(Value::as_object);
+    let mut names: Vec<String> = fields.flat_map(|f| f.keys().cloned()).collect();
     names.sort();
     let mut clashes: Vec<String> = names.windows(2).filter(|w| w[0] == w[1]).map(|w| w[0].clone()).collect();
-    clashes.dedup();
+    let by_hand = ScanArgs::augment_args(HoleArgs::augment_args(Common::augment_args(Command::default())));
+    clashes.extend(by_hand.get_arguments().filter_map(Arg::get_long).map(|long| long.replace('-', "_")));
     clashes
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::args::Cli;
+    use clap::CommandFactory;
+    use std::collections::BTreeSet;
+
+    /// clap itself looks for this in debug builds alone.
+    #[test]
+    fn no_command_has_two_options_of_one_name() {
+        for command in Cli::command().get_subcommands() {
+            let (mut names, mut ids) = (BTreeSet::new(), BTreeSet::new());
+            for arg in command.get_arguments() {
+                let long = arg.get_long().map(|l| format!("--{l}"));
+                for name in long.into_iter().chain(arg.get_short().map(|s| format!("-{s}"))) {
+                    assert!(names.insert(name.clone()), "planish {} has two options {name}", command.get_name());
+                }
+                assert!(ids.insert(arg.get_id().clone()), "planish {}: two ids {}", command.get_name(), arg.get_id());
+            }
+            assert!(names.contains("--report"), "{names:?}");
+        }
+    }
 }

@@ -150,3 +150,67 @@ fn a_plate_thinner_than_the_voxel_is_told_with_the_voxel_that_it_needs() {
     let told = text(&output.stderr);
     assert!(told.contains("thinner than the voxel") && told.contains("0.03"), "{told}");
 }
+
+/// A dome, scanned: the unit sphere above z = -.2 without a spot of .07 around, which is small enough to be closed.
+fn dome() -> String {
+    let n = 60_000;
+    let mut text = String::new();
+    for i in 0..n {
+        // Fibonacci points, uneven by a five-hundredth.
+        let z = 2.0 * (i as f64 + 0.5) / n as f64 - 1.0;
+        let (turn, r) = (i as f64 * std::f64::consts::PI * (3.0 - 5f64.sqrt()), (1.0 - z * z).sqrt());
+        let (x, y) = (r * turn.cos(), r * turn.sin());
+        if z >= -0.2 && 0.8 * x + 0.6 * z <= 0.07f64.cos() {
+            let s = 1.0 + 0.002 * (12.9898 * i as f64 + 78.233 * z).sin();
+            text += &format!("{:.6} {:.6} {:.6}\n", s * x, s * y, s * z);
+        }
+    }
+    text
+}
+
+#[test]
+fn a_scanned_dome_with_a_hole_has_one_boundary_as_it_is_two_open_and_a_lid_over_all_closed() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("dome.xyz"), dome()).unwrap();
+    let made = |options: &[&str]| {
+        let command = ["mesh", "dome.xyz", "-o", "dome.ply", "-q", "--report", "r.json"];
+        done(&[&command, options].concat(), folder.path());
+        let report: serde_json::Value =
+            serde_json::from_str(&fs::read_to_string(folder.path().join("r.json")).unwrap()).unwrap();
+        let closed = report["quality"]["scan.closed"].as_bool().unwrap();
+        let area = report["quality"]["mesh.area"].as_f64().unwrap();
+        done(&["info", "dome.ply", "--report", "r.json"], folder.path());
+        (closed, number(&folder.path().join("r.json"), "mesh.boundary_loops"), area)
+    };
+    let [plain, open, close] = [&[][..], &["--open"], &["--close"]].map(made);
+    assert_eq!((plain.0, plain.1), (false, 1.0));
+    assert_eq!((open.0, open.1), (false, 2.0));
+    // The sphere above z = -.2 has an area of 2.4 pi; a lid over its rim is 1.2 pi at most.
+    let dome = 2.4 * std::f64::consts::PI;
+    assert!(close.0 && (1.1..1.5).contains(&(close.2 / dome)), "{close:?}");
+    assert!(plain.2 < 1.05 * dome && open.2 < plain.2, "{plain:?} {open:?}");
+}
+
+#[test]
+fn holes_are_a_matter_of_scans_and_the_border_of_a_volume_has_an_option_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("part.toml"), PART).unwrap();
+    for option in ["--open", "--close"] {
+        let output = planish(&["mesh", "part.toml", option, "-o", "no.ply"], folder.path());
+        let told = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && told.starts_with(&format!("error: {option}: ")), "{told}");
+        assert!(told.contains(" - hint: ") && !folder.path().join("no.ply").exists(), "{told}");
+    }
+    // Half of a ball: the border of the volume cuts it.
+    let mut volume = b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 9 9 5\nencoding: raw\n\n".to_vec();
+    let far = |i: usize| [i % 9, i / 9 % 9, i / 81].iter().zip([4, 4, 0]).map(|(&a, b)| a.abs_diff(b).pow(2)).sum();
+    volume.extend((0..405).map(|i| (60 * usize::min(far(i), 16) / 16) as u8));
+    fs::write(folder.path().join("half.nrrd"), volume).unwrap();
+    for (value, watertight) in [("--volume-close", true), ("--volume-close=false", false)] {
+        // The option does not take the input for its value.
+        done(&["mesh", value, "half.nrrd", "--iso", "30", "-o", "half.ply", "--report", "r.json"], folder.path());
+        let report: serde_json::Value =
+            serde_json::from_str(&fs::read_to_string(folder.path().join("r.json")).unwrap()).unwrap();
+        assert_eq!(report["quality"]["mesh.watertight"], watertight, "{value}");
+    }
+}

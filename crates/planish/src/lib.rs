@@ -13,7 +13,7 @@
 //! let fitted = pipeline::fit(&ball, None, &params, &planish::Silent)?;
 //! assert_eq!(fitted.model.surfaces.len(), fitted.model.network.patches.len());
 //! // Surface plus relief is the grid again, to rounding.
-//! assert!(fitted.quality["relief.roundtrip_max_rel"].value() < 1e-12);
+//! assert!(fitted.quality["relief.rounding_max_rel"].value() < 1e-12);
 //! # Ok::<(), pipeline::PipelineError>(())
 //! ```
 

@@ -4,7 +4,7 @@ mod common;
 
 use planish::curve::{SnakeParams, SurfaceCurve, section};
 use planish::edit::network::{EditError, Editor, Holds};
-use planish::edit::{Carry, Edit, Ground, apply};
+use planish::edit::{ApplyError, Carry, Edit, Ground, apply};
 use planish::geom::Bvh;
 use planish::grid::{self, Family, FeatureCurve, FeatureError, GridParams, Sections, relax_with_features};
 use planish::layout::{LayoutParams, layout};
@@ -590,7 +590,7 @@ fn fits_on_both_sides_of_a_plane_of_symmetry_are_exact_mirror_images_and_bend_no
     }
     assert!(told.quality["seam.gap_max"].value() < 1e-9 * mesh.bounds().diagonal());
     // Displaced, the model is still the mesh.
-    assert!(told.quality["relief.roundtrip_max_rel"].value() < 1e-12);
+    assert!(told.quality["relief.rounding_max_rel"].value() < 1e-12);
     // Seams in the plane bend no more than those of free fits and half a degree.
     let mut free = Model { sketch: Default::default(), ..model.clone() };
     let unmirrored = pipeline::rework(&mut free, &PipelineParams::default(), &Silent).unwrap();
@@ -699,4 +699,38 @@ fn edits_come_back_from_json_and_a_wrong_one_leaves_the_drawing_as_it_was() {
         assert!(told.is_err(), "{wrong}");
         assert_eq!(drawing, Drawing::default());
     }
+}
+
+#[test]
+fn a_seam_over_a_crease_of_23_degrees_is_sharp_or_smooth_as_it_is_told() {
+    // A roof: z = -.2 |x| over a sheet, with a cut along its ridge.
+    let mut mesh = shapes::rectangle(2.0, 1.0, 40, 20);
+    let middle = mesh.bounds().center();
+    mesh.points.iter_mut().for_each(|p| p.z = -0.2 * (p.x - middle.x).abs());
+    let ridge = format!("[{},{},0]", middle.x, middle.y);
+    let network = one_patch(&mesh);
+    let cut = format!(r#"{{"edit":"cut","through":{ridge},"normal":[1,0,0]}}"#);
+    let told = |seam: &str| format!(r#"{{"edit":"continuity","curves":[{{"near":{ridge}}}],"seam":"{seam}"}}"#);
+    let start = Drawing { network, ..Drawing::default() };
+    let smooth = run(&mesh, start.clone(), &[&cut]);
+    let sharp = run(&mesh, smooth.clone(), &[&told("sharp")]);
+    assert_eq!(smooth.network.patches, sharp.network.patches);
+    assert_eq!(run(&mesh, sharp.clone(), &[&told("smooth")]), smooth);
+    let angle = |drawing: &Drawing| {
+        let (mesh, network) = (mesh.clone(), drawing.network.clone());
+        let mut model = Model { mesh, network, ..Model::default() };
+        let made = pipeline::rework(&mut model, &PipelineParams::default(), &Silent).unwrap();
+        assert_eq!(made.seams.len(), 1);
+        (made.seams[0].kind, made.seams[0].angle_mean_deg)
+    };
+    let crease = 2.0 * 0.2f64.atan().to_degrees();
+    let (smooth, sharp) = (angle(&smooth), angle(&sharp));
+    assert!(smooth.0 == CurveKind::Smooth && smooth.1 < 0.05 * crease, "{smooth:?}");
+    assert!(sharp.0 == CurveKind::Feature && (sharp.1 - crease).abs() < 0.5, "{sharp:?} for {crease}");
+    // The boundary has no seam.
+    let ground = Ground::new(&mesh);
+    let rim =
+        format!(r#"{{"edit":"continuity","curves":[{{"near":[{},0,-0.2]}}],"seam":"smooth"}}"#, mesh.bounds().min.x);
+    let wrong = apply(&mut start.clone(), &json(&rim), &ground, &|_| Err("no other".into()), &Silent).unwrap_err();
+    assert!(matches!(wrong, ApplyError::NoSeam { .. }), "{wrong}");
 }

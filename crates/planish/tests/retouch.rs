@@ -198,7 +198,7 @@ fn surfaces_beside_a_dragged_curve_are_fitted_on_the_seams_of_all_others_bit_for
         let (a, b) = (warm.quality[key].value(), from_nothing.quality[key].value());
         assert!(a <= 1.2 * b + 1e-12, "{key}: {a} {b}");
     }
-    assert!(warm.quality["relief.roundtrip_max_rel"].value() < 1e-12);
+    assert!(warm.quality["relief.rounding_max_rel"].value() < 1e-12);
 }
 
 /// An ellipsoid whose triangles are not symmetric in x, drawn as a box of six patches: two on the sides of the plane
@@ -282,7 +282,7 @@ fn patches_and_curves_across_the_plane_of_symmetry_become_their_own_images() {
     };
     let told = pipeline::rework(&mut model, &PipelineParams::default(), &Silent).unwrap();
     assert!(told.quality["seam.gap_max"].value() < 1e-14 * mesh.bounds().diagonal());
-    assert!(told.quality["relief.roundtrip_max_rel"].value() < 1e-12);
+    assert!(told.quality["relief.rounding_max_rel"].value() < 1e-12);
     let own: Vec<usize> = (0..6)
         .filter(|&p| {
             let s = &model.surfaces[p].control;

@@ -43,6 +43,13 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
         (Some(h), _) => Spacing::Voxel(h),
         (None, n) => Spacing::Resolution(n.map_or(RESOLUTION, |n| n.get())),
     };
+    match &source {
+        Source::Scan(_) => {}
+        Source::Grid(_) => {
+            args.holes.refuse("--volume-close tells whether the border of a volume closes the surface")?
+        }
+        Source::Mesh(_) | Source::Script(_) => args.holes.refuse("leave it out: the result is closed anyway")?,
+    }
     let memory = args.memory.map_or_else(default_memory, |gb| (gb * (1u64 << 30) as f64) as u64);
     let sampling = Sampling { spacing, memory };
     let mut scanned = None;

@@ -31,6 +31,7 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
         extra = Some(facts);
         (mesh, Some(tags))
     } else {
+        args.holes.refuse("close the holes of a mesh with `planish mesh` first")?;
         let (tagged, read) = session.step("read", || files::tagged_mesh(&args.input))?;
         before.push(read);
         tagged

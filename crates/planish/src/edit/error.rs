@@ -40,6 +40,12 @@ pub enum ApplyError {
     /// A magnet for a stroke that is not drawn to anything.
     #[error("a magnet draws magnetic strokes alone - hint: add mode = \"magnetic\", or leave the magnet away")]
     IdleMagnet,
+    /// A curve along which no two patches meet.
+    #[error("curve {curve} follows the boundary of the mesh and has no seam - hint: leave it out")]
+    NoSeam {
+        /// The curve.
+        curve: u32,
+    },
     /// A move further than the mesh is wide.
     #[error("a move by {:.1} times the diagonal leads off the mesh - hint: check the units", share)]
     TooFar {

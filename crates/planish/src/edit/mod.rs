@@ -23,8 +23,8 @@ mod work;
 
 pub use apply::apply;
 pub use change::{
-    AddCorner, Clear, DeleteCorner, DeleteCurves, DragCorner, DragCurve, Join, Mirror, Relax, Spline, SplitCurve,
-    SplitRegion, Symmetry, mirror_network,
+    AddCorner, Clear, Continuity, DeleteCorner, DeleteCurves, DragCorner, DragCurve, Join, Mirror, Relax, Seam, Spline,
+    SplitCurve, SplitRegion, Symmetry, mirror_network,
 };
 pub use draw::{Boundaries, Carry, Complete, Cut, Extend, FeatureLines, Paint, Project, carry_network};
 pub use error::ApplyError;
@@ -69,6 +69,8 @@ pub enum Edit {
     Clear(Clear),
     /// A corner dragged.
     DragCorner(DragCorner),
+    /// Seams along curves made smooth or sharp.
+    Continuity(Continuity),
     /// A curve pulled.
     DragCurve(DragCurve),
     /// Curves relaxed.
@@ -129,6 +131,7 @@ impl Edit {
             Edit::DeleteCorner(edit) => edit,
             Edit::Clear(edit) => edit,
             Edit::DragCorner(edit) => edit,
+            Edit::Continuity(edit) => edit,
             Edit::DragCurve(edit) => edit,
             Edit::Relax(edit) => edit,
             Edit::Spline(edit) => edit,
@@ -158,7 +161,7 @@ trait Command {
     /// Changes the drawing. On an error it may be left half-changed: [`apply`] puts back what it was.
     fn apply(&self, work: &mut Work) -> Result<(), ApplyError>;
 
-    /// True if it moves curves and corners and nothing else, so that patches keep their numbers.
+    /// True if curves and corners keep their numbers and what they join, so that patches keep theirs.
     fn only_moves(&self) -> bool {
         false
     }

@@ -64,7 +64,8 @@ pub struct GridParams {
     /// Grid points per vertex of the patches, over the whole network, to begin with.
     #[schemars(range(min = 0.01, max = 100.0), extend("unit" = "points per vertex"))]
     pub density: f64,
-    /// Grids that leave a vertex of the mesh further off than this are made finer, up to eight times.
+    /// Grids that leave a vertex of their patch further off than this are made finer, in up to three rounds: by 1.25 to
+    /// 2 times along a side in each, and until all grids together have three times the points that `density` gave them.
     #[schemars(range(min = 1e-6, max = 1.0), extend("unit" = "diagonal"))]
     pub miss: f64,
     /// Least number of points along a side.

@@ -39,7 +39,8 @@ const EVEN_BEND: f64 = 0.7;
 const FIRST_SHARE: f64 = 0.6;
 
 /// Resamples every patch of `network`, with sides as [`choose_sizes`] gives them and more where a grid misses its
-/// patch by more than `params.miss` of the diagonal of `input` or is folded, up to `params.max_side` and `params.max_points`.
+/// patch by more than `params.miss` of the diagonal of `input` or is folded: at most [`ROUNDS`] times, each up to
+/// [`FACTOR`] along a side, and up to [`GROWTH`] times the points of the start, `params.max_side` and `params.max_points`.
 ///
 /// Where a grid still misses more after a few rounds, it is what is reached: [`super::measure`] tells.
 /// # Errors

@@ -34,9 +34,9 @@ pub struct Corner {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CurveKind {
-    /// Runs over smooth surface; the seam along it is to be smooth.
+    /// Runs over smooth surface, or is wanted smooth; the seam along it is to be smooth.
     Smooth,
-    /// Follows a sharp edge; the seam along it is C0 on purpose.
+    /// Follows a sharp edge, or is wanted sharp; the seam along it is C0 on purpose.
     Feature,
     /// Follows the boundary of the mesh; it has one patch only.
     Boundary,

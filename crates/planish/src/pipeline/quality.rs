@@ -290,7 +290,7 @@ fn relief_figures(
     let each: Vec<(f64, f64, usize)> = each.collect::<Result<_, relief::ReliefError>>()?;
     let texels: usize = model.reliefs.iter().map(|r| r.vectors.len()).sum();
     quality.insert("relief.texels".into(), Figure::Count(texels as u64));
-    length(quality, "relief.roundtrip_max", each.iter().map(|e| e.0).fold(0.0, f64::max), diagonal);
+    length(quality, "relief.rounding_max", each.iter().map(|e| e.0).fold(0.0, f64::max), diagonal);
     length(quality, "relief.max", each.iter().map(|e| e.1).fold(0.0, f64::max), diagonal);
     let folding: usize = each.iter().map(|e| e.2).sum();
     if folding > 0 {

@@ -1,11 +1,13 @@
-//! Least squares: a grid of points to a clamped uniform bicubic B-spline.
+//! Penalised least squares: a grid of points to a clamped uniform bicubic B-spline, with a weight on its bends.
 //!
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §4.3.2 eq. 4.4 and §6.2: with nodes at
 //! uniform parameters, `P = B_u X B_v^T` separates into curve fits. The grid is read once, to form
 //! `B_u^T P B_v`; everything after that has the size of the control net.
 //!
 //! Departs from [K98]: the outer rings of control points can be given (exact seams), then the others are the
-//! least-squares solution for those.
+//! solution for those; and a term for the bends of the control net can be added to the distances of the nodes, as in
+//! P-splines (Eilers, Marx 1996, *Flexible Smoothing with B-splines and Penalties*), which [K98] §4.2.1 argues against.
+//! [`super::FitParams::smoothing`] says why it is there.
 
 use super::basis::{BasisRows, uniform_knots, uniform_parameters};
 use super::{FitError, Surface};

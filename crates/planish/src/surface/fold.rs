@@ -1,6 +1,6 @@
 //! Where a surface turns over against the grid that it was fitted to.
 //!
-//! A least-squares spline through rough data may swing back on itself between its nodes. That shows in its normal,
+//! A spline fitted to rough data may swing back on itself between its nodes. That shows in its normal,
 //! which there points against the mean normal of the grid around.
 
 use super::Surface;

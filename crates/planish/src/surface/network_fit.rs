@@ -37,8 +37,9 @@ pub struct FitParams {
     /// reached. Spans of a cell or two follow the noise of a scan and swing between its points.
     #[schemars(range(min = 1.0, max = 1e3), extend("unit" = "cells"))]
     pub cells_per_span: f64,
-    /// Weight of bends of the control net against the distances of the grid's points: 0 for plain least squares;
-    /// more leaves more of the detail to the relief.
+    /// Weight of bends of the control net against the distances of the grid's points: 0 for plain least squares, but
+    /// inside patches that would fold; more leaves more of the detail to the relief. A hundredth of what the points of a
+    /// span weigh keeps control points still that few points decide, and the noise of a scan out of them.
     #[schemars(range(min = 0.0, max = 1e4))]
     pub smoothing: f64,
 }

@@ -2,6 +2,7 @@
 
 mod add_corner;
 mod clear;
+mod continuity;
 mod delete_corner;
 mod delete_curves;
 mod drag_corner;
@@ -16,6 +17,7 @@ mod symmetry;
 
 pub use add_corner::AddCorner;
 pub use clear::Clear;
+pub use continuity::{Continuity, Seam};
 pub use delete_corner::DeleteCorner;
 pub use delete_curves::DeleteCurves;
 pub use drag_corner::DragCorner;
