@@ -19,7 +19,7 @@ use crate::mend::{self, Repairs};
 use crate::mesh::{CompareError, FeatureTags, MeshError, TriMesh};
 use crate::model::{Model, Sketch};
 use crate::network::{self, ImprintError, Network, PatchMesh};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use crate::pipeline::record::Clock;
 use crate::relief::{self, ReliefError};
 use crate::surface::{self, FitError, FitParams, SeamQuality, StitchParams};
@@ -97,7 +97,7 @@ pub enum PipelineError {
     Compare(#[from] CompareError),
     /// The observer no longer wanted the result.
     #[error("cancelled")]
-    Cancelled,
+    Cancelled(#[from] Cancelled),
 }
 
 /// Fits a model to a mesh.
@@ -106,7 +106,7 @@ pub enum PipelineError {
 /// * `network` - on the mesh as [`mend::repair`] leaves it; `None` for an automatic one
 ///
 /// # Errors
-/// The first stage that fails; a cancelled stage always as [`PipelineError::Cancelled`].
+/// The first stage that fails; [`Cancelled::is_cause_of`] tells one that was stopped.
 pub fn fit(
     input: &TriMesh,
     network: Option<Network>,
@@ -126,7 +126,7 @@ pub fn fit_tagged(
     params: &PipelineParams,
     observer: &dyn PipelineObserver,
 ) -> Result<Fitted, PipelineError> {
-    run(input, tags, network, params, observer).map_err(|e| or_cancelled(e, observer))
+    run(input, tags, network, params, observer)
 }
 
 fn run(
@@ -202,7 +202,7 @@ pub fn layout_tagged(
         let network = draw(input, tags, &mesh, params, clock)?;
         Ok::<_, PipelineError>((mesh, repairs, network))
     };
-    let (mesh, repairs, network) = draft(&mut clock).map_err(|e| or_cancelled(e, observer))?;
+    let (mesh, repairs, network) = draft(&mut clock)?;
     let (mut quality, mut warnings) = (Quality::new(), Vec::new());
     quality::mesh_figures(&mesh, &network, &repairs, &mut quality, &mut warnings);
     quality::network_figures(&network, &mut quality);
@@ -220,7 +220,7 @@ pub fn refit(
     observer: &dyn PipelineObserver,
 ) -> Result<Vec<StageRecord>, PipelineError> {
     let mut clock = Clock::new(observer, &WEIGHTS);
-    surfaces(model, params, &mut clock).map_err(|e| or_cancelled(e, observer))?;
+    surfaces(model, params, &mut clock)?;
     Ok(clock.records)
 }
 
@@ -268,7 +268,7 @@ pub fn rework_from(
     let mut clock = Clock::new(observer, &WEIGHTS);
     let before =
         (std::mem::take(&mut model.grids), std::mem::take(&mut model.surfaces), std::mem::take(&mut model.reliefs));
-    let made = remade(model, earlier, params, &mut clock).map_err(|e| or_cancelled(e, observer));
+    let made = remade(model, earlier, params, &mut clock);
     if made.is_err() {
         (model.grids, model.surfaces, model.reliefs) = before;
     }
@@ -352,7 +352,7 @@ pub struct Assessed {
 /// If the parts of the model do not belong together.
 pub fn assess(model: &Model, observer: &dyn PipelineObserver) -> Result<Assessed, PipelineError> {
     let mut clock = Clock::new(observer, &WEIGHTS);
-    let measured = measure(model, &mut clock).map_err(|e| or_cancelled(e, observer))?;
+    let measured = measure(model, &mut clock)?;
     let quality::Measured { quality, seams, warnings } = measured;
     Ok(Assessed { stages: clock.records, quality, seams, warnings })
 }
@@ -362,11 +362,6 @@ fn measure(model: &Model, clock: &mut Clock) -> Result<quality::Measured, Pipeli
     let patches = clock.stage("imprint", |_| network::imprint(mesh, network), |p| [("patches", p.len())])?;
     let repairs = Repairs::default();
     clock.stage("measure", |o| quality::measure(model, &patches, &repairs, o), |m| [("seams", m.seams.len())])
-}
-
-/// A stage that was stopped fails with an error of its own; to the caller it is always the same.
-fn or_cancelled(error: PipelineError, observer: &dyn PipelineObserver) -> PipelineError {
-    if observer.cancelled() { PipelineError::Cancelled } else { error }
 }
 
 fn repair(input: &TriMesh, clock: &mut Clock) -> Result<(TriMesh, Repairs), PipelineError> {

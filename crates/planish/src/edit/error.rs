@@ -1,5 +1,6 @@
 //! Why an edit was not made.
 
+use crate::observe::Cancelled;
 use super::network::EditError;
 use crate::curve::CurveError;
 use crate::grid::FeatureError;
@@ -124,5 +125,5 @@ pub enum ApplyError {
     NotADrawing,
     /// Stopped by the observer.
     #[error("cancelled")]
-    Cancelled,
+    Cancelled(#[from] Cancelled),
 }

@@ -48,6 +48,7 @@ pub use solid::Solid;
 pub use sweep::{Milling, Move, Tool};
 pub use winding::Winding;
 
+use crate::observe::Cancelled;
 use crate::geom::Aabb;
 use crate::mesh::MeshError;
 use glam::DVec3;
@@ -68,8 +69,8 @@ pub enum FieldError {
         what: String,
     },
     /// The observer wants no result any more.
-    #[error("sampling cancelled")]
-    Cancelled,
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// On which side of the surface a point lies.

@@ -107,9 +107,7 @@ fn refined<E: From<GridError>>(
     // What was wrong with the patches that asked for the last round.
     let mut before: Vec<Option<Fault>> = vec![None; patches.len()];
     for round in 0..ROUNDS {
-        if observer.cancelled() {
-            return Err(GridError::Cancelled.into());
-        }
+        observer.check().map_err(GridError::from)?;
         let fault = |p: usize, grid: &Grid| {
             let folds = folds(grid, &patches[p]);
             let floor = if folds > 0 { FOLDED * allowed } else { 0.0 };

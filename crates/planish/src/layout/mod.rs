@@ -30,7 +30,7 @@ use crate::layout::refine::Refined;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
 use crate::network::imprint::{self, Shared};
 use crate::network::{Corner, Curve, Network, Patch, Side};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
@@ -102,7 +102,7 @@ pub enum LayoutError {
     },
     /// Stopped by the observer.
     #[error("cancelled")]
-    Cancelled,
+    Cancelled(#[from] Cancelled),
 }
 
 /// Lays a conforming network of four-sided patches on `mesh`, an oriented manifold with or without boundary.

@@ -324,9 +324,7 @@ pub(super) fn partition(
 ) -> Result<(Vec<u32>, usize), LayoutError> {
     let mut sites = ground.sample(count, reach);
     for _ in 0..LLOYD_ROUNDS {
-        if observer.cancelled() {
-            return Err(LayoutError::Cancelled);
-        }
+        observer.check()?;
         let (label, _) = ground.cells(&sites);
         sites = ground.middles(&label, sites.len());
     }
@@ -334,9 +332,7 @@ pub(super) fn partition(
     let mut is_site = vec![false; label.len()];
     sites.iter().for_each(|&f| is_site[f as usize] = true);
     for round in 0.. {
-        if observer.cancelled() {
-            return Err(LayoutError::Cancelled);
-        }
+        observer.check()?;
         let mut wanted = ground.wanted(&label, &distance, sites.len(), round >= GENTLE_ROUNDS);
         wanted.retain(|&f| !std::mem::replace(&mut is_site[f as usize], true));
         if wanted.is_empty() {

@@ -6,7 +6,7 @@
 
 use super::{TriMesh, check};
 use crate::geom::{Aabb, Bvh, random};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -52,8 +52,8 @@ pub enum CompareError {
     #[error("0 samples asked for; at least 1 is needed")]
     NoSamples,
     /// The observer wants no result any more.
-    #[error("comparison cancelled")]
-    Cancelled,
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// Spread of distances, world units unless said.
@@ -202,9 +202,7 @@ fn measure(
     let seed = random::bits(params.seed, pass);
     let mut result = Vec::with_capacity(params.samples);
     while result.len() < params.samples {
-        if observer.cancelled() {
-            return Err(CompareError::Cancelled);
-        }
+        observer.check()?;
         observer.progress((pass as f64 + result.len() as f64 / params.samples as f64) / 2.0);
         let range = result.len()..(result.len() + CHUNK).min(params.samples);
         result.par_extend(range.into_par_iter().map(|n| {

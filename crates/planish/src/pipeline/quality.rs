@@ -5,7 +5,7 @@ use crate::mend::Repairs;
 use crate::mesh::{self, CompareParams, Comparison, TriMesh};
 use crate::model::Model;
 use crate::network::{CurveKind, Network, PatchMesh};
-use crate::observe::Observer;
+use crate::observe::{Observer, Part};
 use crate::surface::basis::uniform_parameters;
 use crate::surface::{self, SeamQuality, Surface};
 use crate::{grid, relief};
@@ -50,10 +50,10 @@ pub(super) fn measure(
     let worst = model.surfaces.par_iter().zip(&model.grids).map(|(s, g)| surface::deviation_of(s, g).rms);
     length(&mut quality, "surface.patch_rms_max", worst.reduce(|| 0.0, f64::max), diagonal);
     let base = surface_mesh(model)?;
-    distances(&mut quality, "surface", &compare(&model.mesh, &base, &Share(observer, 0.1, 0.45))?, diagonal);
+    distances(&mut quality, "surface", &compare(&model.mesh, &base, &Part::new(observer, 0.1, 0.45))?, diagonal);
     drop(base);
     let displaced = displaced_mesh(model)?;
-    distances(&mut quality, "displaced", &compare(&model.mesh, &displaced, &Share(observer, 0.55, 0.45))?, diagonal);
+    distances(&mut quality, "displaced", &compare(&model.mesh, &displaced, &Part::new(observer, 0.55, 0.45))?, diagonal);
     relief_figures(model, diagonal, &mut quality, &mut warnings)?;
     observer.progress(1.0);
     Ok(Measured { quality, seams, warnings })
@@ -116,18 +116,6 @@ fn cuts_to_measure(model: &Model) -> usize {
 
 fn compare(input: &TriMesh, result: &TriMesh, observer: &dyn Observer) -> Result<Comparison, PipelineError> {
     Ok(mesh::compare(input, result, &CompareParams::default(), observer)?)
-}
-
-/// A share of a stage's progress: it starts at `.1` and is `.2` long.
-struct Share<'a>(&'a dyn Observer, f64, f64);
-
-impl Observer for Share<'_> {
-    fn progress(&self, fraction: f64) {
-        self.0.progress(self.1 + self.2 * fraction);
-    }
-    fn cancelled(&self) -> bool {
-        self.0.cancelled()
-    }
 }
 
 /// Smooth seams first, the widest angle first; then the seams on features.

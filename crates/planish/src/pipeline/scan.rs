@@ -10,7 +10,7 @@ use crate::grid::GridParams;
 use crate::mend::finish;
 use crate::mesh::sets::Sets;
 use crate::mesh::{FeatureTags, TriMesh};
-use crate::observe::Observer;
+use crate::observe::{Observer, Part};
 use crate::sharp::{self, ScanScale};
 use crate::surface::{FitParams, Resolution};
 use glam::DVec3;
@@ -90,7 +90,7 @@ pub fn voxel_for(samples: &Samples) -> f64 {
 /// # Errors
 /// [`ScanError`].
 pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> Result<ScanMeshed, ScanError> {
-    let samples = cloud::clean(scan, &params.clean, &Share { observer, from: 0.0, to: 0.6 })?;
+    let samples = cloud::clean(scan, &params.clean, &Part::new(observer, 0.0, 0.6))?;
     let closed = params.close.unwrap_or_else(|| samples.closed.first().copied().unwrap_or(false));
     let field = SampleField::new(&samples, closed);
     let spacing = match (params.voxel, params.resolution) {
@@ -99,7 +99,7 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
         (None, None) => Spacing::Voxel(voxel_for(&samples)),
     };
     let sampling = Sampling { spacing, memory: params.memory };
-    let mut meshed = contour::from_field(&field, sampling, &params.contour, &Share { observer, from: 0.6, to: 0.95 })?;
+    let mut meshed = contour::from_field(&field, sampling, &params.contour, &Part::new(observer, 0.6, 0.35))?;
     let mut lids = 0;
     if !closed {
         let points: Vec<DVec3> = scan.points.iter().copied().filter(|p| p.is_finite()).collect();
@@ -158,21 +158,6 @@ pub fn params_for(made: &ScanMeshed) -> PipelineParams {
         fit: FitParams { resolution, smoothing, ..usual.fit },
         grid: GridParams { density, ..usual.grid },
         ..usual
-    }
-}
-
-struct Share<'a> {
-    observer: &'a dyn Observer,
-    from: f64,
-    to: f64,
-}
-
-impl Observer for Share<'_> {
-    fn progress(&self, fraction: f64) {
-        self.observer.progress(self.from + (self.to - self.from) * fraction);
-    }
-    fn cancelled(&self) -> bool {
-        self.observer.cancelled()
     }
 }
 

@@ -25,7 +25,7 @@ use super::{FitError, Surface};
 use crate::grid::Grid;
 use crate::linalg::{Banded, BandedCholesky};
 use crate::network::{CurveKind, Network};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -125,7 +125,7 @@ pub fn stitch(
             }
         })
         .collect();
-    let stop = || if observer.cancelled() { Err(FitError::Cancelled) } else { Ok(()) };
+    let stop = || observer.check();
     stop()?;
     // The inside for the moved curves: what the normals are taken from.
     let projected: Vec<Option<(Surface, Vec<DVec3>)>> = network
@@ -143,7 +143,7 @@ pub fn stitch(
         })
         .collect();
     let (filled, projections): (Vec<Surface>, Vec<Vec<DVec3>>) =
-        projected.into_iter().collect::<Option<Vec<_>>>().ok_or(FitError::Cancelled)?.into_iter().unzip();
+        projected.into_iter().collect::<Option<Vec<_>>>().ok_or(Cancelled)?.into_iter().unzip();
     observer.progress(0.5);
     let fields: Vec<Result<Vec<DVec3>, FitError>> = (0..uses.len())
         .into_par_iter()

@@ -107,9 +107,7 @@ pub fn virtual_scan(
     let pixels = (wanted.round() as usize).clamp(8, MOST);
     let mut scan = VirtualScan::default();
     for (k, station) in stations.iter().enumerate() {
-        if observer.cancelled() {
-            return Err(CloudError::Cancelled);
-        }
+        observer.check()?;
         observer.progress(k as f64 / stations.len() as f64);
         scan.cloud.scanners.push(station.placed(station.eye));
         for hit in station.look(truth, &tree, &thinning, pixels) {

@@ -5,6 +5,7 @@
 //! cells around the tip of a limb point in all directions; only a fold turns a corner over against both. The corner
 //! of a cell at a corner of the patch is left out, for its angle is that of the patch's curves, be it 180 degrees.
 
+use crate::observe::Observer;
 use super::{Net, cell_corners, turns_over};
 use crate::grid::Fault;
 use crate::grid::chart::locate::Spot;
@@ -104,7 +105,7 @@ fn cells_around(cols: usize, k: usize) -> [usize; 4] {
 ///
 /// Source: Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov 2021: the squares of the edges over twice the
 /// area, where an area that is not positive is taken for a small one; the smaller, the less is folded.
-pub fn open_folds(net: &mut Net, strictly: bool, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<bool, Fault> {
+pub fn open_folds(net: &mut Net, strictly: bool, observer: &dyn Observer) -> Result<bool, Fault> {
     let mut before = (net.points.len() as f64 * FEW) as usize;
     for round in 0..ROUNDS {
         let folded = folded_cells(net);
@@ -117,9 +118,7 @@ pub fn open_folds(net: &mut Net, strictly: bool, cancelled: &(dyn Fn() -> bool +
         before = before.min((folded.len() as f64 * WORTH) as usize).max(HANDFUL);
         let region = Region::new(net, &folded, RINGS + round);
         for _ in 0..SWEEPS {
-            if cancelled() {
-                return Err(Fault::Cancelled);
-            }
+            observer.check()?;
             if region.sweep(net, strictly) < STILL {
                 break;
             }
