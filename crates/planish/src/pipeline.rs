@@ -142,7 +142,7 @@ fn run(
         Some(network) => network,
         None => draw(input, tags, &mesh, &params.layout, &mut clock)?,
     };
-    let patches = clock.stage("imprint", |_| network::imprint(&mesh, &network), |p| [("patches", p.len())])?;
+    let patches = clock.stage("imprint", |o| network::imprint(&mesh, &network, o), |p| [("patches", p.len())])?;
     let grids = clock.stage(
         "grids",
         |o| grid::resample(&mesh, &network, &patches, &params.grid, o),
@@ -283,7 +283,7 @@ fn remade(
     clock: &mut Clock,
 ) -> Result<quality::Measured, PipelineError> {
     let (mesh, network) = (&model.mesh, &model.network);
-    let patches = clock.stage("imprint", |_| network::imprint(mesh, network), |p| [("patches", p.len())])?;
+    let patches = clock.stage("imprint", |o| network::imprint(mesh, network, o), |p| [("patches", p.len())])?;
     let drawn = (&model.sketch.features[..], &model.sketch.sections[..]);
     model.grids = clock.stage(
         "grids",
@@ -359,13 +359,13 @@ pub fn assess(model: &Model, observer: &dyn PipelineObserver) -> Result<Assessed
 
 fn measure(model: &Model, clock: &mut Clock) -> Result<quality::Measured, PipelineError> {
     let (mesh, network) = (&model.mesh, &model.network);
-    let patches = clock.stage("imprint", |_| network::imprint(mesh, network), |p| [("patches", p.len())])?;
+    let patches = clock.stage("imprint", |o| network::imprint(mesh, network, o), |p| [("patches", p.len())])?;
     let repairs = Repairs::default();
     clock.stage("measure", |o| quality::measure(model, &patches, &repairs, o), |m| [("seams", m.seams.len())])
 }
 
 fn repair(input: &TriMesh, clock: &mut Clock) -> Result<(TriMesh, Repairs), PipelineError> {
-    Ok(clock.stage("repair", |_| mend::repair(input), |(mesh, _)| [("triangles", mesh.triangles.len())])?)
+    Ok(clock.stage("repair", |o| mend::repair(input, o), |(mesh, _)| [("triangles", mesh.triangles.len())])?)
 }
 
 fn draw(
@@ -400,13 +400,7 @@ fn surfaces(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Re
     symmetric(false, &mut smooth);
     let reliefs = clock.stage(
         "relief",
-        |_| {
-            grids
-                .par_iter()
-                .zip(&smooth)
-                .map(|(grid, surface)| relief::bake(grid, surface))
-                .collect::<Result<Vec<_>, _>>()
-        },
+        |o| relief::bake_network(grids, &smooth, o),
         |reliefs| [("texels", reliefs.iter().map(|r| r.vectors.len()).sum())],
     )?;
     (model.surfaces, model.reliefs) = (smooth, reliefs);

@@ -54,7 +54,7 @@ fn the_boundary_of_a_sheet_with_four_corners_is_one_patch_and_without_corners_no
     let mesh = shapes::rectangle(2.0, 1.0, 20, 10);
     let network = one_patch(&mesh);
     assert_eq!((network.corners.len(), network.curves.len(), network.patches.len()), (4, 4, 1));
-    assert!(imprint(&mesh, &network).is_ok());
+    assert!(imprint(&mesh, &network, &Silent).is_ok());
     let bare = run(&mesh, Drawing::default(), &["{\"edit\":\"boundaries\"}"]).network;
     let adjacency = Adjacency::new(&mesh);
     let mut editor = Editor::new(&mesh, &adjacency, bare);
@@ -102,7 +102,7 @@ fn two_planes_cut_a_sphere_into_patches_and_faults_are_told_on_the_way() {
     let found = editor.diagnose();
     assert!(found.is_finished() && found.patches.len() == 6, "{found:?}");
     assert_eq!(editor.glance().patches, found.patches);
-    assert!(imprint(&mesh, &editor.network).is_ok());
+    assert!(imprint(&mesh, &editor.network, &Silent).is_ok());
 }
 
 #[test]
@@ -237,7 +237,7 @@ fn regions_of_3_5_and_6_sides_are_split_into_four_sided_patches_and_neighbours_f
     }
     let found = editor.diagnose();
     assert!(found.is_finished(), "{:?}", found.faults);
-    assert!(imprint(&mesh, &editor.network).is_ok());
+    assert!(imprint(&mesh, &editor.network, &Silent).is_ok());
     assert!(matches!(editor.split_region(0, None), Err(EditError::NoSplit { sides: 4, .. })));
 }
 
@@ -260,7 +260,7 @@ fn the_rest_of_a_network_is_completed_around_curves_that_stay_within_a_millionth
     editor.complete(&LayoutParams { patches: 40, ..LayoutParams::default() }, &Silent).unwrap();
     let found = editor.diagnose();
     assert!(found.is_finished(), "{:?}", found.faults);
-    assert!(imprint(&mesh, &editor.network).is_ok());
+    assert!(imprint(&mesh, &editor.network, &Silent).is_ok());
     let all: Vec<DVec3> = editor.network.curves.iter().flat_map(|c| &c.points).map(|p| p.position(&mesh)).collect();
     for p in drawn.iter().flatten() {
         let away = all.iter().map(|q| q.distance(*p)).fold(f64::INFINITY, f64::min);
@@ -315,7 +315,7 @@ fn networks_completed_around_two_cuts_and_two_strokes_on_rough_meshes_are_finish
             let adjacency = Adjacency::new(mesh);
             let found = Editor::new(mesh, &adjacency, drawn.network.clone()).diagnose();
             assert!(found.is_finished(), "{name} {seed}: {:?}", found.faults);
-            assert!(imprint(mesh, &drawn.network).is_ok(), "{name} {seed}");
+            assert!(imprint(mesh, &drawn.network, &Silent).is_ok(), "{name} {seed}");
         }
     }
 }
@@ -362,7 +362,7 @@ fn distance_to(curve: &[DVec3], p: DVec3) -> f64 {
 fn grids_follow_1_to_4_feature_curves_of_both_families_exactly_without_a_fold() {
     for (u, v) in [(1, 0), (0, 1), (1, 1), (2, 2), (3, 2), (4, 4)] {
         let (mesh, network, features) = bumpy(u, v);
-        let patches = imprint(&mesh, &network).unwrap();
+        let patches = imprint(&mesh, &network, &Silent).unwrap();
         let made = relax_with_features(
             &mesh,
             &patches[0],
@@ -411,7 +411,7 @@ fn grids_follow_1_to_4_feature_curves_of_both_families_exactly_without_a_fold() 
 #[test]
 fn a_section_is_refined_alone_and_curves_of_one_family_that_cross_are_refused_with_the_place() {
     let (mesh, network, mut features) = bumpy(1, 2);
-    let patches = imprint(&mesh, &network).unwrap();
+    let patches = imprint(&mesh, &network, &Silent).unwrap();
     let run = |features: &[FeatureCurve], sections: &Sections| {
         relax_with_features(&mesh, &patches[0], features, (41, 31), sections, &GridParams::default(), &Silent)
     };
@@ -447,7 +447,7 @@ fn patches_beside_a_feature_curve_share_its_nodes_and_the_model_has_no_gaps() {
     let fitted = pipeline::fit(&mesh, None, &params, &Silent).unwrap();
     let mut model: Model = fitted.model;
     let bvh = Bvh::new(&model.mesh);
-    let patches = imprint(&model.mesh, &model.network).unwrap();
+    let patches = imprint(&model.mesh, &model.network, &Silent).unwrap();
     // Across the first patch, at a third of one side and a half of the other.
     let at = |k: usize, share: f64| {
         let chain = &patches[0].sides[k];
@@ -494,7 +494,7 @@ fn slanted_feature_curves_of_both_families_on_a_torus_leave_no_fold_in_their_pat
     let mesh = shapes::torus(2.0, 0.7, 72, 36);
     let network = layout(&mesh, &LayoutParams { patches: 16, ..Default::default() }, &Silent).unwrap();
     let bvh = Bvh::new(&mesh);
-    let patches = imprint(&mesh, &network).unwrap();
+    let patches = imprint(&mesh, &network, &Silent).unwrap();
     for patch in [0, 5] {
         for (family, sides) in [(Family::V, [0, 2]), (Family::U, [3, 1])] {
             for shares in [[0.33, 0.5], [0.25, 0.4], [0.7, 0.6]] {
@@ -520,7 +520,7 @@ fn points_slide_along_feature_curves_so_that_iso_curves_cross_them_with_half_the
     // A flat patch whose middle v curve leans: nodes at even distances on it would bend the rows.
     let mesh = shapes::rectangle(2.0, 1.0, 60, 30);
     let network = one_patch(&mesh);
-    let patches = imprint(&mesh, &network).unwrap();
+    let patches = imprint(&mesh, &network, &Silent).unwrap();
     let bvh = Bvh::new(&mesh);
     let low = mesh.bounds().min;
     // An S: dense to one side below, to the other above.
@@ -662,7 +662,7 @@ fn a_network_is_carried_to_another_shape_of_its_class_and_stays_finished() {
     };
     apply(&mut drawing, &edit, &ground, &others, &Silent).unwrap();
     assert_eq!(drawing.network.patches.len(), network.patches.len());
-    assert!(imprint(&to, &drawing.network).is_ok());
+    assert!(imprint(&to, &drawing.network, &Silent).is_ok());
     let missing = Edit::Carry(Carry { from: "nothing".into(), landmarks: Vec::new() });
     let before = drawing.clone();
     assert!(apply(&mut drawing, &missing, &ground, &others, &Silent).unwrap_err().to_string().contains("nothing"));

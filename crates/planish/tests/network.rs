@@ -36,7 +36,7 @@ fn length(mesh: &TriMesh, network: &Network, kind: CurveKind) -> f64 {
 fn every_layout_is_disks_that_cover_the_mesh_to_1e_9_of_its_area() {
     for (name, mesh, euler) in surfaces() {
         let network = layout(&mesh, &params(24), &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let patches = imprint(&mesh, &network).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let patches = imprint(&mesh, &network, &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(patches.len(), network.patches.len());
         let area = |m: &TriMesh| (0..m.triangles.len()).map(|t| m.area(t)).sum::<f64>();
         let parts: Vec<f64> = patches.iter().map(|p| area(&p.mesh)).collect();
@@ -80,7 +80,7 @@ fn corners_of_a_torus_of_60_patches_are_square_within_20_degrees_in_the_mean() {
     let network = layout(&mesh, &params(60), &Silent).expect("a torus has a layout");
     assert!(network.patches.len().abs_diff(60) <= 12, "{} patches", network.patches.len());
     let mut off = Vec::new();
-    for patch in imprint(&mesh, &network).expect("disks") {
+    for patch in imprint(&mesh, &network, &Silent).expect("disks") {
         for k in 0..4 {
             let (out, back) = (&patch.sides[k], &patch.sides[(k + 3) % 4]);
             let at = |v: u32| patch.mesh.points[v as usize];
@@ -96,7 +96,7 @@ fn corners_of_a_torus_of_60_patches_are_square_within_20_degrees_in_the_mean() {
 /// Angles of the corners of patches a twentieth of their sides away, degrees.
 fn near_corners(mesh: &TriMesh, network: &Network) -> Vec<f64> {
     let mut angles = Vec::new();
-    for patch in imprint(mesh, network).expect("disks") {
+    for patch in imprint(mesh, network, &Silent).expect("disks") {
         for k in 0..4 {
             let points = |side: &[u32]| side.iter().map(|&v| patch.mesh.points[v as usize]).collect::<Vec<DVec3>>();
             let (out, mut back) = (points(&patch.sides[k]), points(&patch.sides[(k + 3) % 4]));
@@ -154,7 +154,7 @@ fn a_sheet_of_24_patches_with_36_pinholes_has_at_most_8_more_once_they_are_close
     let pierced = layout(&mesh, &params(24), &Silent).unwrap().patches.len();
     assert!(pierced <= sheet + 16 * 36, "{pierced} patches, {sheet} without holes");
     let mut tags = FeatureTags::from_edges(mesh.points.len(), []);
-    assert_eq!(close_holes(&mut mesh, &mut tags, 1.0), 36);
+    assert_eq!(close_holes(&mut mesh, &mut tags, 1.0, &Silent), 36);
     assert_eq!(diagnose(&mesh).boundary_loops, 1);
     let closed = layout(&mesh, &params(24), &Silent).unwrap().patches.len();
     assert!(closed <= sheet + 8, "{closed} patches, {sheet} without holes");
@@ -175,7 +175,7 @@ fn a_mesh_of_two_triangles_has_a_layout_of_one_patch() {
     let square = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
     let mesh = TriMesh::new(square.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
     let network = layout(&mesh, &params(1), &Silent).expect("a square has a layout");
-    let patches = imprint(&mesh, &network).expect("disks");
+    let patches = imprint(&mesh, &network, &Silent).expect("disks");
     assert!((1..=4).contains(&patches.len()), "{} patches", patches.len());
 }
 
@@ -207,7 +207,7 @@ fn square_with(extra: Vec<Curve>) -> (TriMesh, Network) {
 #[test]
 fn an_imprinted_square_is_the_square() {
     let (mesh, network) = square_with(Vec::new());
-    let patches = imprint(&mesh, &network).expect("one disk");
+    let patches = imprint(&mesh, &network, &Silent).expect("one disk");
     assert_eq!(patches[0].mesh.triangles.len(), 2);
     assert!(patches[0].sides.iter().all(|s| s.len() == 2));
 }
@@ -225,7 +225,7 @@ fn curves_that_cross_are_named_with_the_place() {
         inside([0.5, 0.3, 0.2], [0.2, 0.1, 0.7]),
     ];
     let (mesh, network) = square_with(crossed);
-    match imprint(&mesh, &network) {
+    match imprint(&mesh, &network, &Silent) {
         Err(ImprintError::Crossing { curves, .. }) => assert!(curves.len() >= 2, "{curves:?}"),
         other => panic!("{other:?}"),
     }
@@ -237,7 +237,7 @@ fn a_part_that_no_patch_covers_is_refused() {
     let first = mesh.points.len() as u32;
     mesh.points.extend([DVec3::Z, DVec3::Z + DVec3::X, DVec3::Z + DVec3::Y]);
     mesh.triangles.push([first, first + 1, first + 2]);
-    assert!(matches!(imprint(&mesh, &network), Err(ImprintError::Uncovered { faces: 1, .. })));
+    assert!(matches!(imprint(&mesh, &network, &Silent), Err(ImprintError::Uncovered { faces: 1, .. })));
 }
 
 #[test]
@@ -245,7 +245,7 @@ fn real_meshes_have_layouts_of_disks_with_no_patch_above_8_times_the_mean() {
     for name in ["fandisk", "goathead", "casting"] {
         let Some(mesh) = common::data_mesh(&format!("{name}.ply")) else { continue };
         let network = layout(&mesh, &params(100), &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let areas: Vec<f64> = imprint(&mesh, &network)
+        let areas: Vec<f64> = imprint(&mesh, &network, &Silent)
             .unwrap_or_else(|e| panic!("{name}: {e}"))
             .iter()
             .map(|p| (0..p.mesh.triangles.len()).map(|t| p.mesh.area(t)).sum())

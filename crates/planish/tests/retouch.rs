@@ -44,13 +44,13 @@ fn edited(share: f64) -> (TriMesh, Adjacency, Network, Network, u32) {
 #[test]
 fn patches_cut_anew_beside_a_dragged_curve_are_those_of_the_whole_mesh_bit_for_bit() {
     let (mesh, adjacency, before, after, curve) = edited(0.08);
-    let old = imprint(&mesh, &before).unwrap();
+    let old = imprint(&mesh, &before, &Silent).unwrap();
     let which = changed_patches(&before, &after).expect("the same network");
     assert_eq!(which.len(), 2);
     assert!(which.iter().all(|&p| after.patches[p].sides.iter().any(|s| s.curve == curve)));
     let near: Vec<&PatchMesh> = which.iter().map(|&p| &old[p]).collect();
-    let made = reimprint(&mesh, &adjacency, &after, &near, &which).unwrap();
-    let whole = imprint(&mesh, &after).unwrap();
+    let made = reimprint(&mesh, &adjacency, &after, &near, &which, &Silent).unwrap();
+    let whole = imprint(&mesh, &after, &Silent).unwrap();
     for (&p, one) in which.iter().zip(&made) {
         assert_eq!(one.mesh, whole[p].mesh);
         assert_eq!(
@@ -60,7 +60,7 @@ fn patches_cut_anew_beside_a_dragged_curve_are_those_of_the_whole_mesh_bit_for_b
     }
     // Told patches that do not hold the new curve, it cuts the whole mesh and says the same.
     let far = (0..old.len()).find(|p| !which.contains(p)).unwrap();
-    let made = reimprint(&mesh, &adjacency, &after, &[&old[far]], &which).unwrap();
+    let made = reimprint(&mesh, &adjacency, &after, &[&old[far]], &which, &Silent).unwrap();
     assert!(which.iter().zip(&made).all(|(&p, one)| one.mesh == whole[p].mesh));
     // Another curve more is another network.
     let mut split = Editor::new(&mesh, &adjacency, after.clone());
@@ -72,11 +72,11 @@ fn patches_cut_anew_beside_a_dragged_curve_are_those_of_the_whole_mesh_bit_for_b
 /// Grids before an edit, and after it made from nothing and by following.
 fn both(share: f64, threads: usize) -> (TriMesh, Vec<PatchMesh>, Vec<Grid>, Vec<Grid>) {
     let (mesh, _, before, after, _) = edited(share);
-    let old = imprint(&mesh, &before).unwrap();
+    let old = imprint(&mesh, &before, &Silent).unwrap();
     let params = GridParams::default();
     let sizes = grid::choose_sizes(&before, &old, &params);
     let which = changed_patches(&before, &after).unwrap();
-    let whole = imprint(&mesh, &after).unwrap();
+    let whole = imprint(&mesh, &after, &Silent).unwrap();
     let pick = |list: &[PatchMesh]| -> Vec<PatchMesh> { which.iter().map(|&p| list[p].clone()).collect() };
     let (old, new) = (pick(&old), pick(&whole));
     let sizes: Vec<_> = which.iter().map(|&p| sizes[p]).collect();
@@ -135,7 +135,7 @@ fn a_grid_of_a_patch_that_grew_by_a_third_is_made_from_nothing() {
         };
         let edits =
             [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0), r#"{"edit":"boundaries"}"#.into()];
-        imprint(mesh, &drawn(mesh, &edits).network).unwrap()
+        imprint(mesh, &drawn(mesh, &edits).network, &Silent).unwrap()
     };
     let (small, large) = (sheet(1.0), sheet(1.33));
     let params = GridParams::default();
@@ -168,7 +168,7 @@ fn surfaces_beside_a_dragged_curve_are_fitted_on_the_seams_of_all_others_bit_for
     pipeline::rework(&mut model, &params, &Silent).unwrap();
     let earlier = Earlier::of(&model).expect("grids");
     let which = changed_patches(&before, &after).unwrap();
-    let patches = imprint(&mesh, &after).unwrap();
+    let patches = imprint(&mesh, &after, &Silent).unwrap();
     let some: Vec<PatchMesh> = which.iter().map(|&p| patches[p].clone()).collect();
     let old: Vec<Grid> = which.iter().map(|&p| model.grids[p].clone()).collect();
     let mut grids = model.grids.clone();
@@ -179,7 +179,7 @@ fn surfaces_beside_a_dragged_curve_are_fitted_on_the_seams_of_all_others_bit_for
     assert_eq!(made.iter().map(|m| m.0).collect::<Vec<_>>(), which);
     let mut surfaces = model.surfaces.clone();
     made.into_iter().for_each(|(p, s)| surfaces[p] = s);
-    let seams = surface::measure_seams(&after, &surfaces);
+    let seams = surface::measure_seams(&after, &surfaces, &Silent);
     assert!(seams.iter().all(|s| s.gap_max < 1e-14));
     // As near to the new grids as surfaces were to the old ones, and half as much again.
     for &p in &which {
@@ -238,7 +238,7 @@ fn patches_and_curves_across_the_plane_of_symmetry_become_their_own_images() {
         let first = drawn(&mesh, &edits);
         // The family that the numbers of the sides ask for is not known beforehand.
         let mut fitting = first.clone();
-        let patches = imprint(&mesh, &first.network).unwrap();
+        let patches = imprint(&mesh, &first.network, &Silent).unwrap();
         for f in &mut fitting.sketch.features {
             let sides = &patches[f.patch as usize].sides;
             let at = |p: &planish::mesh::FacePoint| p.position(&mesh);

@@ -11,6 +11,7 @@ use crate::summary::Summary;
 use planish::edit::{self, ApplyError, Edit, Ground, Made, Redo, Undo};
 use planish::model::{Drawing, HistoryEntry, Model};
 use planish::network::{Diagnosis, diagnose};
+use planish::observe::Cancelled;
 use planish::pipeline::{self, Earlier, PipelineParams, Warning};
 use planish_io::report::{EditRow, RelaxedRow, Report, count, number};
 use serde::Deserialize;
@@ -144,7 +145,7 @@ fn start(session: &Session, args: &EditArgs) -> Result<Model, Failure> {
         return Ok(model);
     }
     let input = files::mesh(&args.input)?;
-    let (mesh, _) = planish::mend::repair(&input).map_err(|e| Failure::input(&args.input, e))?;
+    let (mesh, _) = planish::mend::repair(&input, &crate::progress::Interrupt).map_err(|e| Failure::input(&args.input, e))?;
     Ok(Model { mesh, units: session.units(), ..Model::default() })
 }
 
@@ -320,7 +321,7 @@ fn one(
 fn told(script: &Path, k: usize, line: usize, edit: &Edit, wrong: Wrong) -> Failure {
     let name = format!("{}, line {line}", edit.name());
     match wrong {
-        Wrong::Apply(ApplyError::Cancelled) => Failure::interrupted(),
+        Wrong::Apply(e) if Cancelled::is_cause_of(&e) => Failure::interrupted(),
         Wrong::Apply(e) => {
             Failure::input(script, format!("step {} ({name}): {}", k + 1, super::with_hint(&e.to_string())))
         }

@@ -70,7 +70,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
                     Ok(meshed)
                 }
                 Err(ScanError::Mesh(e)) => Err(Trouble::Meshing(e)),
-                Err(ScanError::Cloud(e)) => Err(Trouble::Cloud(e)),
+                Err(e) => Err(Trouble::Scan(e)),
             }
         }
         Source::Mesh(mesh) => contour::from_mesh(mesh, sampling, &params, o).map_err(Trouble::Meshing),
@@ -85,7 +85,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     }
     let made = made.map_err(|e| match e {
         Trouble::Meshing(e) => failure(args, &source, e),
-        Trouble::Cloud(e) => Failure::input(&args.input, super::with_hint(&e.to_string())),
+        Trouble::Scan(e) => Failure::input(&args.input, super::with_hint(&e.to_string())),
     })?;
     let (mut mesh, tags) = (std::borrow::Cow::Borrowed(&made.extracted.mesh), &made.extracted.tags);
     let scan = if let Source::Scan(scan) = &source { Some(scan) } else { None };
@@ -121,7 +121,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
 /// What can go wrong with one of the sources.
 enum Trouble {
     Meshing(MeshingError),
-    Cloud(planish::cloud::CloudError),
+    Scan(ScanError),
 }
 
 /// Reads whatever the input is, by its extension.

@@ -329,5 +329,5 @@ fn write_products(staged: &Staged, output: &Path, model: &Model, options: &Write
     planish_io::write_model(staged.path("model.planish"), model).map_err(|e| wrong("model.planish", &e))?;
     planish_io::write_step(staged.path("surface.step"), &step).map_err(|e| wrong("surface.step", &e))?;
     planish_io::write_relief(staged.path("relief"), &model.reliefs, model.units).map_err(|e| wrong("relief", &e))?;
-    mesh("preview.glb", &pipeline::displaced_mesh(model).map_err(Failure::fault)?)
+    mesh("preview.glb", &pipeline::displaced_mesh(model, &crate::progress::Interrupt).map_err(Failure::fault)?)
 }

@@ -8,7 +8,7 @@ use crate::geom::Bvh;
 use crate::grid::check_features;
 use crate::mesh::{FacePoint, TriMesh, sharp_edges};
 use crate::model::Drawing;
-use crate::network::{CurveKind, PatchMesh, imprint};
+use crate::network::{ImprintError, CurveKind, PatchMesh, imprint};
 use crate::observe::Observer;
 use glam::DVec3;
 use std::sync::OnceLock;
@@ -192,7 +192,10 @@ impl Work<'_, '_> {
     /// The finished patch that a place lies in, and its number.
     pub(super) fn patch_at(&self, place: &FacePoint) -> Result<(u32, PatchMesh), ApplyError> {
         let nowhere = || ApplyError::NoPatch { place: place.position(self.mesh()).to_array() };
-        let mut cut = imprint(self.mesh(), &self.drawing.network).map_err(|_| nowhere())?;
+        let mut cut = imprint(self.mesh(), &self.drawing.network, self.observer).map_err(|e| match e {
+            ImprintError::Cancelled(c) => c.into(),
+            _ => nowhere(),
+        })?;
         let p = place.position(self.mesh());
         // The patch with the part of the face that is nearest to the place.
         let near = cut.iter().enumerate().flat_map(|(k, patch)| {

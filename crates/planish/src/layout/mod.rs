@@ -144,7 +144,7 @@ pub(crate) fn layout_around(
     let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
     let side = (area / params.patches.max(1) as f64).sqrt();
     let mut edge = EDGE_TO_SIDE * side;
-    let mut sharp = lines::feature_lines(mesh, &adjacency, tagged, params);
+    let mut sharp = lines::feature_lines(mesh, &adjacency, tagged, params, observer)?;
     sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
     let mut fixed = vec![false; mesh.points.len()];
     for h in 0..sharp.len() as u32 {

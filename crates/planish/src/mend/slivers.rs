@@ -1,5 +1,6 @@
 //! Triangles without height: removed by collapsing or flipping edges, so that the surface stays whole.
 
+use crate::observe::{Cancelled, Observer};
 use super::repairs::Repairs;
 use crate::geom::{Aabb, tolerance};
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
@@ -9,14 +10,21 @@ use glam::DVec3;
 const PASSES: usize = 12;
 
 /// Removes triangles lower than the library's tolerance from an oriented manifold.
-pub(super) fn remove(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &[u32], done: &mut Repairs) {
+pub(super) fn remove(
+    mesh: &TriMesh,
+    triangles: &mut Vec<[u32; 3]>,
+    source: &[u32],
+    done: &mut Repairs,
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
     let at = |v: u32| mesh.points[source[v as usize] as usize];
     let flat = tolerance::length(Aabb::of(&mesh.points).diagonal());
     for pass in 0..=PASSES {
+        observer.check()?;
         let low: Vec<usize> = (0..triangles.len()).filter(|&t| height(triangles[t].map(at)).0 <= flat).collect();
         done.degenerate_left = low.len();
         if low.is_empty() || pass == PASSES {
-            return;
+            break;
         }
         let adjacency = Adjacency::of(triangles, source.len());
         let mut touched = vec![false; source.len()];
@@ -33,9 +41,10 @@ pub(super) fn remove(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &[u3
             !gone[t - 1]
         });
         if !changed {
-            return;
+            break;
         }
     }
+    Ok(())
 }
 
 /// Height over the longest edge, and the number of that edge.

@@ -26,6 +26,7 @@ pub use soup::check;
 pub use tags::{FEATURE, FeatureKind, FeatureTags};
 pub use walk::{CurvePlace, move_point_on_curve, move_point_on_surface};
 
+use crate::observe::Cancelled;
 use crate::geom::Aabb;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -74,6 +75,9 @@ pub enum MeshError {
     /// Nothing is left.
     #[error("no triangle with three different vertices; a mesh with faces is needed")]
     Empty,
+    /// The observer no longer wanted the result.
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 impl TriMesh {

@@ -10,7 +10,7 @@ use crate::grid::GridParams;
 use crate::mend::finish;
 use crate::mesh::sets::Sets;
 use crate::mesh::{FeatureTags, TriMesh};
-use crate::observe::{Observer, Part};
+use crate::observe::{Cancelled, Observer, Part};
 use crate::sharp::{self, ScanScale};
 use crate::surface::{FitParams, Resolution};
 use glam::DVec3;
@@ -25,6 +25,9 @@ pub enum ScanError {
     /// No surface.
     #[error(transparent)]
     Mesh(#[from] MeshingError),
+    /// The observer no longer wanted the result.
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// How a scan is meshed.
@@ -104,18 +107,21 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
     if !closed {
         let points: Vec<DVec3> = scan.points.iter().copied().filter(|p| p.is_finite()).collect();
         let contour::Extracted { mesh, tags, .. } = &mut meshed.extracted;
-        lids = finish(mesh, tags, &points, meshed.lattice.step.x, params.close.is_none());
+        lids = finish(mesh, tags, &points, meshed.lattice.step.x, params.close.is_none(), observer)?;
     }
     let contour::Extracted { mesh, tags, .. } = &mut meshed.extracted;
     let cell = meshed.lattice.step.x;
-    sharp::mend_lines(mesh, tags);
-    sharp::fair_lines(mesh, tags, &ScanScale { noise: samples.noise, spacing: samples.spacing, cell });
-    sharp::split_bent(mesh, tags, BENT * fit_tolerance(&samples) * samples.diagonal);
+    observer.progress(0.96);
+    sharp::mend_lines(mesh, tags, observer)?;
+    let scale = ScanScale { noise: samples.noise, spacing: samples.spacing, cell };
+    sharp::fair_lines(mesh, tags, &scale, observer)?;
+    observer.progress(0.98);
+    sharp::split_bent(mesh, tags, BENT * fit_tolerance(&samples) * samples.diagonal, observer)?;
     tags.mark(mesh);
-    let mut reached = reach(scan, &meshed.extracted.mesh);
+    let mut reached = reach(scan, &meshed.extracted.mesh, observer)?;
     let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags, &reached);
     if specks > 0 {
-        reached = reach(scan, &meshed.extracted.mesh);
+        reached = reach(scan, &meshed.extracted.mesh, observer)?;
     }
     let n = reached.len().max(1) as f64;
     let squares = reached.iter().map(|r| r.0 * r.0).sum::<f64>();
@@ -190,15 +196,19 @@ fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags, reached: &[(f64, u32)
 }
 
 /// Distance of raw points to a mesh, and the face that is closest.
-fn reach(scan: &Cloud, mesh: &TriMesh) -> Vec<(f64, u32)> {
+fn reach(scan: &Cloud, mesh: &TriMesh, observer: &dyn Observer) -> Result<Vec<(f64, u32)>, Cancelled> {
     if mesh.triangles.is_empty() {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     let bvh = Bvh::new(mesh);
     let step = scan.points.len().div_ceil(MEASURED).max(1);
     let finite: Vec<_> = scan.points.iter().step_by(step).filter(|p| p.is_finite()).collect();
-    let hits = finite.par_iter().map(|p| bvh.closest(**p));
-    hits.map(|hit| (hit.distance, hit.place.face)).collect()
+    let one = |p: &&DVec3| {
+        observer.check()?;
+        let hit = bvh.closest(**p);
+        Ok((hit.distance, hit.place.face))
+    };
+    finite.par_iter().map(one).collect()
 }
 
 /// The figures and warnings of a scan that was meshed.

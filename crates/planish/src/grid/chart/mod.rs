@@ -502,7 +502,7 @@ pub mod tests {
             (0..n).rev().map(|j| j * n).collect(),
         ];
         let patch = PatchMesh { mesh: input.clone(), origin, face_origin, sides };
-        flatten(&input, &patch, &SideStops::default(), [2, 2], &Silent).expect("a flat chart")
+        flatten(&input, &patch, &SideStops::default(), [2, 2], &crate::Silent).expect("a flat chart")
     }
 
     #[test]

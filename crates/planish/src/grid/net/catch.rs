@@ -147,7 +147,7 @@ mod tests {
             chart.points.iter().filter(|&&p| bvh.closest(p).distance > 0.01).count()
         };
         let before = missed(&net);
-        catch(&mut net, 0.01, &Silent).expect("not cancelled");
+        catch(&mut net, 0.01, &crate::Silent).expect("not cancelled");
         assert!(3 * missed(&net) < before, "{} of {before}", missed(&net));
         assert!((0..64).all(|c| !crate::grid::net::turns_over(&net.uv, 9, c)));
     }

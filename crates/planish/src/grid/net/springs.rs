@@ -96,7 +96,7 @@ mod tests {
         let bump = |s: f64, t: f64| (-30.0 * ((s - 0.6).powi(2) + (t - 0.45).powi(2))).exp();
         let chart = chart(|s, t| DVec3::new(s, t, 1.5 * bump(s, t)));
         for (cols, rows) in [(9, 9), (40, 71), (130, 100)] {
-            let spots = relax(&chart, cols, rows, &GridParams::default(), 1e-3, &Silent).expect("a grid");
+            let spots = relax(&chart, cols, rows, &GridParams::default(), 1e-3, &crate::Silent).expect("a grid");
             let uv: Vec<_> = spots.iter().map(|&s| chart.uv_of(s)).collect();
             let turned = (0..(cols - 1) * (rows - 1)).filter(|&c| turns_over(&uv, cols, c)).count();
             assert_eq!(turned, 0, "{cols} x {rows}");
