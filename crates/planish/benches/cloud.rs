@@ -219,7 +219,7 @@ fn row(kind: &str, mesh: &TriMesh, level: f64) -> Option<BTreeMap<&'static str, 
         let start = Instant::now();
         let tags = &made.meshed.extracted.tags;
         let params = pipeline::params_for(&made);
-        match pipeline::fit_tagged(got, Some(tags), None, &params, &Silent) {
+        match pipeline::fit(got, Some(tags), None, &params, &Silent) {
             Ok(fitted) => {
                 // A tenth of a percent, at noise above that two tenths.
                 let within = if level > 0.15 { 2e-3 } else { 1e-3 } * diagonal;

@@ -9,7 +9,7 @@ use planish::curve::{
 use planish::edit::network::{Editor, Holds};
 use planish::geom::{Bvh, random};
 use planish::grid::{self, Grid, GridParams};
-use planish::layout::{LayoutParams, layout};
+use planish::layout::{Known, LayoutParams, layout};
 use planish::mesh::{self, Adjacency, FacePoint, TriMesh};
 use planish::network::{CurveKind, PatchMesh, changed_patches, imprint, reimprint};
 use planish::synthetic::shapes;
@@ -310,7 +310,8 @@ fn one_patch(wanted: &dyn Fn(&str) -> bool) {
     let which = changed_patches(&before, &editor.network).expect("the same network");
     let near: Vec<&PatchMesh> = which.iter().map(|&p| &old[p]).collect();
     let (whole, patches) = least(|| imprint(&mesh, &editor.network, &Silent).expect("patches"));
-    let (cutting, _) = least(|| reimprint(&mesh, &adjacency, &editor.network, &near, &which, &Silent).expect("patches"));
+    let (cutting, _) =
+        least(|| reimprint(&mesh, &adjacency, &editor.network, &near, &which, &Silent).expect("patches"));
     tell(
         id,
         &format!(
@@ -374,7 +375,7 @@ fn follows(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
         return;
     }
     let adjacency = Adjacency::new(mesh);
-    let before = layout(mesh, &LayoutParams::default(), &Silent).expect("a network");
+    let before = layout(mesh, Known::default(), &LayoutParams::default(), &Silent).expect("a network");
     let old = imprint(mesh, &before, &Silent).expect("patches");
     let params = GridParams::default();
     let sizes = grid::choose_sizes(&before, &old, &params);

@@ -10,7 +10,7 @@
 //!
 //! let ball = shapes::sphere(10.0, 4);
 //! let params = PipelineParams { layout: LayoutParams { patches: 24, ..Default::default() }, ..Default::default() };
-//! let fitted = pipeline::fit(&ball, None, &params, &planish::Silent)?;
+//! let fitted = pipeline::fit(&ball, None, None, &params, &planish::Silent)?;
 //! assert_eq!(fitted.model.surfaces.len(), fitted.model.network.patches.len());
 //! // Surface plus relief is the grid again, to rounding.
 //! assert!(fitted.quality["relief.rounding_max_rel"].value() < 1e-12);

@@ -13,14 +13,16 @@ pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
 pub use scan::{ScanError, ScanMeshed, ScanParams, mesh_scan, params_for, sample_figures, scan_figures, voxel_for};
 pub use truth::{EdgesFound, edges_found, truth_figures};
 
+use crate::cloud::{self, Cleaned, Cloud, CloudError};
 use crate::grid::{self, FeatureError, Grid, GridError, GridParams};
-use crate::layout::{self, LayoutError, LayoutParams};
+use crate::layout::{self, Known, LayoutError, LayoutParams};
 use crate::mend::{self, Repairs};
 use crate::mesh::{CompareError, FeatureTags, MeshError, TriMesh};
 use crate::model::{Model, Sketch};
 use crate::network::{self, ImprintError, Network, PatchMesh};
 use crate::observe::{Cancelled, Observer};
 use crate::pipeline::record::Clock;
+use crate::pipeline::scan::run_figures;
 use crate::relief::{self, ReliefError};
 use crate::surface::{self, FitError, FitParams, SeamQuality, StitchParams};
 use rayon::prelude::*;
@@ -40,6 +42,99 @@ pub struct PipelineParams {
     /// The seams between them.
     pub stitch: StitchParams,
 }
+
+/// What a run starts from.
+#[derive(Debug)]
+pub enum Input<'a> {
+    /// Points: they are cleaned and meshed first.
+    Scan(&'a Cloud),
+    /// A mesh.
+    Mesh {
+        /// Any triangle mesh; it is repaired first.
+        mesh: &'a TriMesh,
+        /// Its sharp edges where they are known: an automatic network follows them.
+        tags: Option<&'a FeatureTags>,
+        /// A network on the mesh as [`mend::repair`] leaves it; `None` for an automatic one.
+        network: Option<Network>,
+    },
+}
+
+impl<'a> From<&'a TriMesh> for Input<'a> {
+    fn from(mesh: &'a TriMesh) -> Input<'a> {
+        Input::Mesh { mesh, tags: None, network: None }
+    }
+}
+
+/// Parameters of a run.
+pub struct RunParams<'a> {
+    /// How a scan is meshed.
+    pub scan: ScanParams,
+    /// Parameters of the stages after the mesh. The function is given those that suit the input (the noise of a scan has a
+    /// say in them; for a mesh they are the defaults) and sets what is wanted otherwise.
+    pub stages: Box<dyn Fn(PipelineParams) -> PipelineParams + 'a>,
+}
+
+impl Default for RunParams<'_> {
+    fn default() -> Self {
+        RunParams { scan: ScanParams::default(), stages: Box::new(|suited| suited) }
+    }
+}
+
+/// What [`run`] makes.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// The model with its figures, those of the scan among them.
+    pub fitted: Fitted,
+    /// The parameters of the stages after the mesh.
+    pub params: PipelineParams,
+    /// What became of a scan.
+    pub scan: Option<Scanned>,
+}
+
+/// A scan on its way to a model.
+#[derive(Clone, Debug)]
+pub struct Scanned {
+    /// The samples and the mesh that was made of them.
+    pub meshed: ScanMeshed,
+    /// The points on the surface of the samples, and which are outliers.
+    pub points: Cleaned,
+}
+
+/// Everything, from a scan or a mesh to a model.
+/// # Errors
+/// The first stage that fails; [`Cancelled::is_cause_of`] tells one that was stopped.
+pub fn run(input: Input, params: &RunParams, observer: &dyn PipelineObserver) -> Result<Run, PipelineError> {
+    let cloud = match input {
+        Input::Mesh { mesh, tags, network } => {
+            let params = (params.stages)(PipelineParams::default());
+            let fitted = fit(mesh, tags, network, &params, observer)?;
+            return Ok(Run { fitted, params, scan: None });
+        }
+        Input::Scan(cloud) => cloud,
+    };
+    let weights = [&SCAN_WEIGHTS[..], &WEIGHTS].concat();
+    let mut clock = Clock::new(observer, &weights);
+    let scan = &params.scan;
+    let meshed = clock.stage(
+        "mesh",
+        |o| mesh_scan(cloud, scan, o),
+        |m| [("triangles", m.meshed.extracted.mesh.triangles.len())],
+    )?;
+    let points = clock.stage(
+        "points",
+        |o| cloud::project(cloud, &meshed.samples, scan.clean.outlier, &scan.points, o),
+        |p| [("points", p.cloud.points.len())],
+    )?;
+    let params = (params.stages)(params_for(&meshed));
+    let (mesh, tags) = (&meshed.meshed.extracted.mesh, &meshed.meshed.extracted.tags);
+    let mut fitted = fit_with(mesh, Some(tags), None, &params, &mut clock)?;
+    // Outliers are no part of the shape: its size is that of the mesh.
+    run_figures(&meshed, &points, mesh.bounds().diagonal(), &mut fitted);
+    Ok(Run { fitted, params, scan: Some(Scanned { meshed, points }) })
+}
+
+/// Stages from a scan to its mesh, with their shares of the time in the measure of [`WEIGHTS`].
+const SCAN_WEIGHTS: [(&str, f64); 2] = [("mesh", 60.0), ("points", 5.0)];
 
 /// Stages in their order, each with its usual share of the time.
 const WEIGHTS: [(&str, f64); 8] = [
@@ -95,6 +190,12 @@ pub enum PipelineError {
     /// The result cannot be measured.
     #[error(transparent)]
     Compare(#[from] CompareError),
+    /// The scan gives no mesh.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
+    /// The points of the scan cannot be brought to its surface.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
     /// The observer no longer wanted the result.
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),
@@ -103,58 +204,47 @@ pub enum PipelineError {
 /// Fits a model to a mesh.
 ///
 /// * `input` - any triangle mesh; it is repaired first
+/// * `tags` - its sharp edges where they are known: an automatic network follows them
 /// * `network` - on the mesh as [`mend::repair`] leaves it; `None` for an automatic one
 ///
 /// # Errors
 /// The first stage that fails; [`Cancelled::is_cause_of`] tells one that was stopped.
 pub fn fit(
     input: &TriMesh,
-    network: Option<Network>,
-    params: &PipelineParams,
-    observer: &dyn PipelineObserver,
-) -> Result<Fitted, PipelineError> {
-    fit_tagged(input, None, network, params, observer)
-}
-
-/// As [`fit`]; an automatic network follows the sharp edges of `tags` where there are any.
-/// # Errors
-/// As [`fit`].
-pub fn fit_tagged(
-    input: &TriMesh,
     tags: Option<&FeatureTags>,
     network: Option<Network>,
     params: &PipelineParams,
     observer: &dyn PipelineObserver,
 ) -> Result<Fitted, PipelineError> {
-    run(input, tags, network, params, observer)
+    fit_with(input, tags, network, params, &mut Clock::new(observer, &WEIGHTS))
 }
 
-fn run(
+/// As [`fit`], with the clock of a longer run.
+fn fit_with(
     input: &TriMesh,
     tags: Option<&FeatureTags>,
     network: Option<Network>,
     params: &PipelineParams,
-    observer: &dyn PipelineObserver,
+    clock: &mut Clock,
 ) -> Result<Fitted, PipelineError> {
-    let mut clock = Clock::new(observer, &WEIGHTS);
-    let (mesh, repairs) = repair(input, &mut clock)?;
+    let (mesh, repairs) = repair(input, clock)?;
     let network = match network {
         Some(network) => network,
-        None => draw(input, tags, &mesh, &params.layout, &mut clock)?,
+        None => draw(input, tags, &mesh, &params.layout, clock)?,
     };
     let patches = clock.stage("imprint", |o| network::imprint(&mesh, &network, o), |p| [("patches", p.len())])?;
     let grids = clock.stage(
         "grids",
-        |o| grid::resample(&mesh, &network, &patches, &params.grid, o),
+        |o| grid::resample(&mesh, &network, &patches, (&[], &[]), &params.grid, o),
         |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;
     let mut model = Model { mesh, network, grids, ..Model::default() };
-    surfaces(&mut model, params, &mut clock)?;
+    surfaces(&mut model, params, clock)?;
     let measured =
         clock.stage("measure", |o| quality::measure(&model, &patches, &repairs, o), |m| [("seams", m.seams.len())])?;
     Ok(Fitted {
         model,
-        stages: clock.records,
+        stages: std::mem::take(&mut clock.records),
         quality: measured.quality,
         seams: measured.seams,
         warnings: measured.warnings,
@@ -176,21 +266,11 @@ pub struct Drafted {
     pub warnings: Vec<Warning>,
 }
 
-/// The stages up to the network, for one that is edited before it goes on to [`fit`].
+/// The stages up to the network, for one that is edited before it goes on to [`fit`]; it follows the sharp
+/// edges of `tags` where there are any.
 /// # Errors
 /// As [`fit`].
 pub fn layout(
-    input: &TriMesh,
-    params: &LayoutParams,
-    observer: &dyn PipelineObserver,
-) -> Result<Drafted, PipelineError> {
-    layout_tagged(input, None, params, observer)
-}
-
-/// As [`layout`]; the network follows the sharp edges of `tags` where there are any.
-/// # Errors
-/// As [`fit`].
-pub fn layout_tagged(
     input: &TriMesh,
     tags: Option<&FeatureTags>,
     params: &LayoutParams,
@@ -224,19 +304,6 @@ pub fn refit(
     Ok(clock.records)
 }
 
-/// Makes grids, surfaces, seams and reliefs of a model whose network or feature curves were edited, and measures it.
-///
-/// On an error the model is what it was.
-/// # Errors
-/// As [`fit`]; the network must part the whole mesh into four-sided patches.
-pub fn rework(
-    model: &mut Model,
-    params: &PipelineParams,
-    observer: &dyn PipelineObserver,
-) -> Result<Assessed, PipelineError> {
-    rework_from(model, None, params, observer)
-}
-
 /// What a model was before an edit, as far as its grids can be made from it.
 #[derive(Clone, Debug)]
 pub struct Earlier {
@@ -253,13 +320,16 @@ impl Earlier {
     }
 }
 
-/// As [`rework`]; where an edit since `earlier` moved a few curves and nothing else, grids of the patches beside them
-/// follow ([`grid::follow`]) and all others are kept. `earlier` must have been made with the same grid parameters.
+/// Makes grids, surfaces, seams and reliefs of a model whose network or feature curves were edited, and measures it.
 ///
-/// If a grid that followed is folded or misses its patch by more than is allowed, all are made from nothing.
+/// * `earlier` - the model before the edit, made with the same grid parameters. Where the edit moved a few curves and nothing
+///   else, grids of the patches beside them follow ([`grid::follow`]) and all others are kept; if one that followed is folded
+///   or misses its patch by more than is allowed, all are made from nothing, as they are with `None`.
+///
+/// On an error the model is what it was.
 /// # Errors
-/// As [`fit`].
-pub fn rework_from(
+/// As [`fit`]; the network must part the whole mesh into four-sided patches.
+pub fn rework(
     model: &mut Model,
     earlier: Option<&Earlier>,
     params: &PipelineParams,
@@ -293,10 +363,7 @@ fn remade(
             {
                 return Ok(grids);
             }
-            match drawn {
-                ([], []) => Ok(grid::resample(mesh, network, &patches, &params.grid, o)?),
-                _ => Ok(grid::resample_with_features(mesh, network, &patches, drawn, &params.grid, o)?),
-            }
+            Ok(grid::resample(mesh, network, &patches, drawn, &params.grid, o)?)
         },
         |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;
@@ -377,7 +444,11 @@ fn draw(
 ) -> Result<Network, PipelineError> {
     let tagged = tags.map(|tags| tags.half_edges(input, mesh)).unwrap_or_default();
     let counts = |n: &Network| [("patches", n.patches.len())];
-    Ok(clock.stage("layout", |o| layout::layout_tagged(mesh, &tagged, params, o), counts)?)
+    Ok(clock.stage(
+        "layout",
+        |o| layout::layout(mesh, Known { sharp: &tagged, ..Known::default() }, params, o),
+        counts,
+    )?)
 }
 
 /// The stages from the grids to the reliefs.

@@ -3,8 +3,10 @@
 //! Each stage runs once to the end, then again and again with an observer that wants no more at random moments of that
 //! time. One moment has several tries of which the best counts: another program may hold up one of them, but a stage that
 //! does not ask is late in all.
+#![allow(clippy::print_stdout)]
 
-use planish::mesh::{CompareParams, DecimateParams, SmoothParams, TriMesh, compare, decimate, smooth};
+use planish::layout::Known;
+use planish::mesh::{CompareParams, DecimateParams, DecimateTarget, SmoothParams, TriMesh, compare, decimate, smooth};
 use planish::observe::{Cancelled, Observer};
 use planish::pipeline::{self, Fitted, PipelineObserver, PipelineParams, ScanParams, StageRecord};
 use planish::synthetic::{self, ScannerParams, shapes, virtual_scan};
@@ -112,7 +114,7 @@ fn smoothing_ends_within_200_ms() {
 #[test]
 fn decimation_ends_within_200_ms() {
     let mesh = shapes::sphere(1.0, 7);
-    let params = DecimateParams { ratio: Some(0.1), ..DecimateParams::default() };
+    let params = DecimateParams { target: DecimateTarget::Ratio(0.1), ..DecimateParams::default() };
     stops("decimate", |o| decimate(&mesh, None, &params, o));
 }
 
@@ -132,7 +134,7 @@ fn extraction_ends_within_200_ms() {
 #[test]
 fn layout_ends_within_200_ms() {
     let mesh = part(60_000);
-    stops("layout", |o| layout::layout(&mesh, &[], &Default::default(), o));
+    stops("layout", |o| layout::layout(&mesh, Known::default(), &Default::default(), o));
 }
 
 #[test]

@@ -116,7 +116,8 @@ fn closed_networks_give_closed_meshes_with_euler_number_2_or_0() {
         assert_eq!(topology(&mesh), (euler, 0));
         let adjacency = Adjacency::new(&mesh);
         assert!(adjacency.opposite.iter().all(|&h| h != NONE));
-        let smooth = relief::surface_mesh(&work.network, &surfaces, &relief::span_shapes(&surfaces, 4), &Silent).unwrap();
+        let smooth =
+            relief::surface_mesh(&work.network, &surfaces, &relief::span_shapes(&surfaces, 4), &Silent).unwrap();
         assert_eq!(topology(&smooth), (euler, 0));
     }
 }

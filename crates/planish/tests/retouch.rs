@@ -7,7 +7,7 @@ use planish::curve::SnakeParams;
 use planish::edit::network::{Editor, Holds};
 use planish::edit::{Ground, apply};
 use planish::grid::{self, Grid, GridParams};
-use planish::layout::{LayoutParams, layout};
+use planish::layout::{Known, LayoutParams, layout};
 use planish::mesh::{Adjacency, TriMesh};
 use planish::model::{Drawing, Model};
 use planish::network::{CurveKind, Network, PatchMesh, changed_patches, imprint, reimprint};
@@ -24,7 +24,8 @@ fn edited(share: f64) -> (TriMesh, Adjacency, Network, Network, u32) {
         *p *= 1.0 + 0.05 * (5.0 * p.x).sin() * (4.0 * p.y).cos() + 0.01 * (23.0 * p.z + 11.0 * p.x).sin();
     }
     let adjacency = Adjacency::new(&mesh);
-    let before = layout(&mesh, &LayoutParams { patches: 24, ..LayoutParams::default() }, &Silent).unwrap();
+    let before =
+        layout(&mesh, Known::default(), &LayoutParams { patches: 24, ..LayoutParams::default() }, &Silent).unwrap();
     let length = |c: usize| {
         let at: Vec<DVec3> = before.curves[c].points.iter().map(|p| p.position(&mesh)).collect();
         at.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>()
@@ -165,7 +166,7 @@ fn surfaces_beside_a_dragged_curve_are_fitted_on_the_seams_of_all_others_bit_for
     let (mesh, _, before, after, curve) = edited(0.05);
     let params = PipelineParams::default();
     let mut model = Model { mesh: mesh.clone(), network: before.clone(), ..Model::default() };
-    pipeline::rework(&mut model, &params, &Silent).unwrap();
+    pipeline::rework(&mut model, None, &params, &Silent).unwrap();
     let earlier = Earlier::of(&model).expect("grids");
     let which = changed_patches(&before, &after).unwrap();
     let patches = imprint(&mesh, &after, &Silent).unwrap();
@@ -179,7 +180,7 @@ fn surfaces_beside_a_dragged_curve_are_fitted_on_the_seams_of_all_others_bit_for
     assert_eq!(made.iter().map(|m| m.0).collect::<Vec<_>>(), which);
     let mut surfaces = model.surfaces.clone();
     made.into_iter().for_each(|(p, s)| surfaces[p] = s);
-    let seams = surface::measure_seams(&after, &surfaces, &Silent);
+    let seams = surface::measure_seams(&after, &surfaces, &Silent).unwrap();
     assert!(seams.iter().all(|s| s.gap_max < 1e-14));
     // As near to the new grids as surfaces were to the old ones, and half as much again.
     for &p in &which {
@@ -191,9 +192,9 @@ fn surfaces_beside_a_dragged_curve_are_fitted_on_the_seams_of_all_others_bit_for
     let kept = model.grids.clone();
     model.network = after;
     let mut cold = model.clone();
-    let warm = pipeline::rework_from(&mut model, Some(&earlier), &params, &Silent).unwrap();
+    let warm = pipeline::rework(&mut model, Some(&earlier), &params, &Silent).unwrap();
     assert!((0..kept.len()).all(|p| (model.grids[p] == kept[p]) != which.contains(&p)));
-    let from_nothing = pipeline::rework(&mut cold, &params, &Silent).unwrap();
+    let from_nothing = pipeline::rework(&mut cold, None, &params, &Silent).unwrap();
     for key in ["displaced.rms", "seam.gap_max", "grid.folds"] {
         let (a, b) = (warm.quality[key].value(), from_nothing.quality[key].value());
         assert!(a <= 1.2 * b + 1e-12, "{key}: {a} {b}");
@@ -280,7 +281,7 @@ fn patches_and_curves_across_the_plane_of_symmetry_become_their_own_images() {
         sketch: mirrored.sketch.clone(),
         ..Model::default()
     };
-    let told = pipeline::rework(&mut model, &PipelineParams::default(), &Silent).unwrap();
+    let told = pipeline::rework(&mut model, None, &PipelineParams::default(), &Silent).unwrap();
     assert!(told.quality["seam.gap_max"].value() < 1e-14 * mesh.bounds().diagonal());
     assert!(told.quality["relief.rounding_max_rel"].value() < 1e-12);
     let own: Vec<usize> = (0..6)

@@ -359,7 +359,7 @@ fn a_patch_without_feature_curves_gets_the_cells_that_are_given() {
     let mut drawing = start;
     make(&ground, &mut drawing, r#"{"edit":"sections","at":[1.0,0.5,0.2],"u":[37],"v":[23]}"#).unwrap();
     let mut model = Model { mesh, network: drawing.network, sketch: drawing.sketch, ..Model::default() };
-    pipeline::rework(&mut model, &PipelineParams::default(), &Silent).unwrap();
+    pipeline::rework(&mut model, None, &PipelineParams::default(), &Silent).unwrap();
     assert_eq!((model.grids[0].cols, model.grids[0].rows), (38, 24));
     let patches = imprint(&model.mesh, &model.network, &Silent).unwrap();
     assert_eq!(grid::measure(&model.grids[0], &patches[0]).folds, 0);

@@ -354,8 +354,10 @@ fn features_stay_sharp_while_the_smooth_seams_between_them_become_smooth() {
     let (mean, max) = angles(&work, &after);
     // Beside the rims the slopes of the grids have a say.
     assert!(mean < 0.03 && max < 0.1, "{mean} {max}");
-    for (a, b) in
-        surface::measure_seams(&work.network, &before, &Silent).unwrap().iter().zip(surface::measure_seams(&work.network, &after, &Silent).unwrap())
+    for (a, b) in surface::measure_seams(&work.network, &before, &Silent)
+        .unwrap()
+        .iter()
+        .zip(surface::measure_seams(&work.network, &after, &Silent).unwrap())
     {
         assert_eq!(a.curve, b.curve);
         if a.kind == CurveKind::Feature {

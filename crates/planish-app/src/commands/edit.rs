@@ -66,7 +66,7 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
     let finished = found.is_finished() && !model.network.patches.is_empty();
     if finished && !args.no_fit && model.grids.is_empty() {
         let wrong = |e| pipeline_failure(&args.input, None, e);
-        let made = pipeline::rework_from(&mut model, earlier.as_ref(), &params, &session.bars).map_err(wrong)?;
+        let made = pipeline::rework(&mut model, earlier.as_ref(), &params, &session.bars).map_err(wrong)?;
         report.stages.extend(made.stages);
         report.quality = made.quality;
         report.warnings.extend(made.warnings);
@@ -145,7 +145,8 @@ fn start(session: &Session, args: &EditArgs) -> Result<Model, Failure> {
         return Ok(model);
     }
     let input = files::mesh(&args.input)?;
-    let (mesh, _) = planish::mend::repair(&input, &crate::progress::Interrupt).map_err(|e| Failure::input(&args.input, e))?;
+    let (mesh, _) =
+        planish::mend::repair(&input, &crate::progress::Interrupt).map_err(|e| Failure::input(&args.input, e))?;
     Ok(Model { mesh, units: session.units(), ..Model::default() })
 }
 

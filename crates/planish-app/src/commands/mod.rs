@@ -115,6 +115,7 @@ fn pipeline_failure(input: &Path, network: Option<&Path>, error: PipelineError) 
         e if Cancelled::is_cause_of(&e) => Failure::interrupted(),
         // With a network of the user's own, what it causes is told of that file.
         PipelineError::Network(e) if network.is_some() => Failure::input(network.unwrap_or(input), e),
+        e @ (PipelineError::Scan(_) | PipelineError::Cloud(_)) => Failure::input(input, with_hint(&e.to_string())),
         e => Failure::input(input, with_hint(&e.to_string())).hint("look for faults with `planish info`"),
     }
 }

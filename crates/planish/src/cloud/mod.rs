@@ -269,8 +269,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
         })
         .collect();
     let of_site: Vec<u32> = fits.iter().map(|f| f.site).collect();
-    let cells =
-        cells::cells(&points, &tree, &sites, &samples, &of_site, &part(0.9, 1.0))?;
+    let cells = cells::cells(&points, &tree, &sites, &samples, &of_site, &part(0.9, 1.0))?;
     // What was chosen by its residuals is moved to where the surface is last.
     for (s, &site) in samples.iter_mut().zip(&of_site) {
         s.quadric = s.quadric.sharpened(s.center, sites.noise(site as usize));

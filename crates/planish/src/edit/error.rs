@@ -1,9 +1,9 @@
 //! Why an edit was not made.
 
-use crate::observe::Cancelled;
 use super::network::EditError;
 use crate::curve::CurveError;
 use crate::grid::FeatureError;
+use crate::observe::Cancelled;
 
 /// Why an edit was not made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

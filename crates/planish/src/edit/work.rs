@@ -8,7 +8,7 @@ use crate::geom::Bvh;
 use crate::grid::check_features;
 use crate::mesh::{FacePoint, TriMesh, sharp_edges};
 use crate::model::Drawing;
-use crate::network::{ImprintError, CurveKind, PatchMesh, imprint};
+use crate::network::{CurveKind, ImprintError, PatchMesh, imprint};
 use crate::observe::Observer;
 use glam::DVec3;
 use std::sync::OnceLock;

@@ -48,9 +48,9 @@ pub use solid::Solid;
 pub use sweep::{Milling, Move, Tool};
 pub use winding::Winding;
 
-use crate::observe::Cancelled;
 use crate::geom::Aabb;
 use crate::mesh::MeshError;
+use crate::observe::Cancelled;
 use glam::DVec3;
 
 /// Why a field cannot be made or sampled.

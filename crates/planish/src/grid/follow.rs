@@ -101,11 +101,7 @@ fn follow_patch(
 }
 
 /// The net with the moves that bring its coarse net to rest, blended between the coarse nodes.
-fn settled_coarsely<'a>(
-    net: Net<'a>,
-    params: &GridParams,
-    observer: &dyn Observer,
-) -> Result<Net<'a>, Fault> {
+fn settled_coarsely<'a>(net: Net<'a>, params: &GridParams, observer: &dyn Observer) -> Result<Net<'a>, Fault> {
     let (cols, rows) = (net.cols, net.rows);
     if cols.min(rows) <= 2 * COARSE * COARSE {
         return Ok(net);

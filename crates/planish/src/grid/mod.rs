@@ -27,7 +27,7 @@ pub use feature::network::{check_features, family_of, relax_network};
 pub use feature::{Family, FeatureCurve, FeatureError};
 pub use follow::follow;
 pub use quality::{GridQuality, measure};
-pub use resample::{resample, resample_with_features};
+pub use resample::resample;
 pub use sizes::choose_sizes;
 
 use crate::grid::chart::locate::Spot;

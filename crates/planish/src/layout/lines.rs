@@ -4,10 +4,10 @@
 //! face to the next and flat a few faces further out. So an edge has to be sharp twice: between its two faces,
 //! and between the mean normals of the surface to its left and right.
 
-use crate::observe::{Cancelled, Observer};
 use super::LayoutParams;
 use crate::mesh::sets::Sets;
 use crate::mesh::{Adjacency, NONE, TriMesh, next, sharp_edges};
+use crate::observe::{Cancelled, Observer};
 use crate::sharp::{bridge_gaps, cut_spikes};
 use glam::DVec3;
 use rayon::prelude::*;

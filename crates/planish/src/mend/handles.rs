@@ -8,10 +8,10 @@
 //!    and Whittlesey 2005, *Greedy Optimal Homotopy and Homology Generators*)
 //! 3. the surface is cut along it, and both rims are filled with the triangles of least area (`lids`)
 
-use crate::observe::{Cancelled, Observer};
 use crate::geom::Aabb;
 use crate::mesh::sets::Sets;
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -3,9 +3,9 @@
 //! A hole is told from the rim of a piece by what lies around it: more surface than fits within its rim, and a surface that
 //! looks the way a lid would. The end of a pipe is no hole, for its sides look away from its axis.
 
-use crate::observe::{Cancelled, Observer};
 use super::lids::{Lid, least_area, lid};
 use crate::mesh::{Adjacency, FeatureKind, FeatureTags, TriMesh, boundary_loops, components, next};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 

@@ -7,11 +7,11 @@
 //!    off along a line of one temperature ([`mend::trim`]): the steps of the rim, its tongues and spikes
 //! 2. small holes are closed before, so that they do not grow, and after ([`mend::close_holes`])
 
-use crate::observe::{Cancelled, Observer};
 use super::part_fans;
 use crate::geom::KdTree;
 use crate::mend;
 use crate::mesh::{self, FeatureTags, TriMesh};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 

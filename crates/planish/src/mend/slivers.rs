@@ -1,9 +1,9 @@
 //! Triangles without height: removed by collapsing or flipping edges, so that the surface stays whole.
 
-use crate::observe::{Cancelled, Observer};
 use super::repairs::Repairs;
 use crate::geom::{Aabb, tolerance};
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 
 /// Each pass can free only triangles that do not touch each other; clusters of them are short in practice.

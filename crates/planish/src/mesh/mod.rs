@@ -26,8 +26,8 @@ pub use soup::check;
 pub use tags::{FEATURE, FeatureKind, FeatureTags};
 pub use walk::{CurvePlace, move_point_on_curve, move_point_on_surface};
 
-use crate::observe::Cancelled;
 use crate::geom::Aabb;
+use crate::observe::Cancelled;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 

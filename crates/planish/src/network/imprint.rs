@@ -6,10 +6,10 @@
 //!    curves as constraints; points of an edge are sorted along it, so both faces agree;
 //! 3. the faces on both sides of the curves are flooded and named after the patch they belong to.
 
-use crate::observe::{Cancelled, Observer};
 use super::disk::{self, Disk};
 use super::{Network, PatchMesh};
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
@@ -238,11 +238,7 @@ pub(crate) enum Shared {
 /// Cuts `mesh` along the curves of `network` into one exact disk sub-mesh per patch.
 /// # Errors
 /// `ImprintError` names the curve or patch that is not in order, with its place; [`ImprintError::Cancelled`].
-pub fn imprint(
-    mesh: &TriMesh,
-    network: &Network,
-    observer: &dyn Observer,
-) -> Result<Vec<PatchMesh>, ImprintError> {
+pub fn imprint(mesh: &TriMesh, network: &Network, observer: &dyn Observer) -> Result<Vec<PatchMesh>, ImprintError> {
     let adjacency = Adjacency::new(mesh);
     let faces = mesh.triangles.len();
     let mut curves: Vec<Vec<Place>> = Vec::with_capacity(network.curves.len());

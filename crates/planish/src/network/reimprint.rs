@@ -4,10 +4,10 @@
 //! ones; a ring of faces more holds every place of their curves, in whatever face it is given. Chains of all curves
 //! over these faces are cut in the same order as [`imprint`] would, and the patches come out the same, bit for bit.
 
-use crate::observe::Observer;
 use super::imprint::{Chain, cut_out, place_of};
 use super::{ImprintError, Network, PatchMesh, imprint};
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh};
+use crate::observe::Observer;
 
 /// The patches of `network` whose curves are not those of `before`, rising; nothing if the two do not have the same
 /// corners, curves and patches in number and order.

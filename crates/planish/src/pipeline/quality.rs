@@ -1,15 +1,15 @@
 //! Figures of quality of a model against its mesh, and what a user should know about them.
 
 use super::{Figure, PipelineError, Quality, Warning};
+use crate::grid::{self, Grid};
 use crate::mend::Repairs;
 use crate::mesh::{self, CompareParams, Comparison, TriMesh};
 use crate::model::Model;
 use crate::network::{CurveKind, Network, PatchMesh};
 use crate::observe::{Cancelled, Observer, Part};
+use crate::relief;
 use crate::surface::basis::uniform_parameters;
 use crate::surface::{self, SeamQuality, Surface};
-use crate::grid::{self, Grid};
-use crate::relief;
 use rayon::prelude::*;
 
 /// Quads per knot span and direction, at most, in the mesh that stands for a surface when distances are measured:
@@ -59,7 +59,12 @@ pub(super) fn measure(
     distances(&mut quality, "surface", &compare(&model.mesh, &base, &Part::new(observer, 0.1, 0.45))?, diagonal);
     drop(base);
     let displaced = displaced_mesh(model, observer)?;
-    distances(&mut quality, "displaced", &compare(&model.mesh, &displaced, &Part::new(observer, 0.55, 0.45))?, diagonal);
+    distances(
+        &mut quality,
+        "displaced",
+        &compare(&model.mesh, &displaced, &Part::new(observer, 0.55, 0.45))?,
+        diagonal,
+    );
     relief_figures(model, diagonal, &mut quality, &mut warnings, observer)?;
     observer.progress(1.0);
     Ok(Measured { quality, seams, warnings })
@@ -84,11 +89,7 @@ pub fn surface_mesh(model: &Model, observer: &dyn Observer) -> Result<TriMesh, P
 /// The smooth surfaces of a model as one mesh, with `cuts` quads per knot span and direction.
 /// # Errors
 /// If the parts of the model do not belong together.
-pub fn surface_mesh_cut(
-    model: &Model,
-    cuts: usize,
-    observer: &dyn Observer,
-) -> Result<TriMesh, PipelineError> {
+pub fn surface_mesh_cut(model: &Model, cuts: usize, observer: &dyn Observer) -> Result<TriMesh, PipelineError> {
     let shapes = relief::span_shapes(&model.surfaces, cuts);
     Ok(relief::surface_mesh(&model.network, &model.surfaces, &shapes, observer)?)
 }
@@ -119,7 +120,8 @@ fn cuts_to_measure(model: &Model, observer: &dyn Observer) -> Result<usize, Canc
         observer.check()?;
         Ok(squares(s, surface::deviation_of(s, g).rms))
     };
-    let each: Result<Vec<(f64, usize, f64)>, Cancelled> = model.surfaces.par_iter().zip(&model.grids).map(one).collect();
+    let each: Result<Vec<(f64, usize, f64)>, Cancelled> =
+        model.surfaces.par_iter().zip(&model.grids).map(one).collect();
     let each = each?;
     let count = each.iter().map(|e| e.1).sum::<usize>().max(1) as f64;
     let leave = (each.iter().map(|e| e.0).sum::<f64>() / count).sqrt();

@@ -1,8 +1,8 @@
 //! From a scan to a mesh: samples, their field, its surface.
 
 use super::record::Figure;
-use super::{PipelineParams, Quality, Warning};
-use crate::cloud::{self, CleanParams, Cloud, CloudError, Samples};
+use super::{Fitted, PipelineParams, Quality, Warning};
+use crate::cloud::{self, CleanParams, Cleaned, Cloud, CloudError, ProjectParams, Samples};
 use crate::contour::{self, ContourParams, Meshed, MeshingError, Sampling};
 use crate::field::{SampleField, Spacing};
 use crate::geom::Bvh;
@@ -15,6 +15,8 @@ use crate::sharp::{self, ScanScale};
 use crate::surface::{FitParams, Resolution};
 use glam::DVec3;
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Why a scan gives no mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -31,21 +33,38 @@ pub enum ScanError {
 }
 
 /// How a scan is meshed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
 pub struct ScanParams {
-    /// The samples.
+    /// The samples
     pub clean: CleanParams,
-    /// The extraction.
+    /// The extraction
     pub contour: ContourParams,
-    /// Edge of a cell, world units; from spacing and noise if `None`.
-    pub voxel: Option<f64>,
-    /// Cells along the longest side, if no edge is given.
-    pub resolution: Option<usize>,
-    /// Bytes that may be used.
-    pub memory: u64,
-    /// Close holes (`Some(true)`), leave them open (`Some(false)`), or as the scan is: those of a closed one are closed, of
-    /// an open one the small ones.
+    /// The points that come along with the mesh
+    pub points: ProjectParams,
+    /// Size of the cells; from spacing and noise of the scan if not given
+    pub cells: Option<Spacing>,
+    /// Close all holes (true), leave them open (false), or as the scan is if not given: those of a closed one are closed,
+    /// of an open one the small ones
+    #[schemars(extend("by_hand" = true))]
     pub close: Option<bool>,
+    /// Memory that may be used
+    #[schemars(extend("unit" = "bytes", "by_hand" = true))]
+    pub memory: u64,
+}
+
+impl Default for ScanParams {
+    /// Eight gigabytes.
+    fn default() -> ScanParams {
+        ScanParams {
+            clean: CleanParams::default(),
+            contour: ContourParams::default(),
+            points: ProjectParams::default(),
+            cells: None,
+            close: None,
+            memory: 8 << 30,
+        }
+    }
 }
 
 /// What [`mesh_scan`] makes.
@@ -96,11 +115,7 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
     let samples = cloud::clean(scan, &params.clean, &Part::new(observer, 0.0, 0.6))?;
     let closed = params.close.unwrap_or_else(|| samples.closed.first().copied().unwrap_or(false));
     let field = SampleField::new(&samples, closed);
-    let spacing = match (params.voxel, params.resolution) {
-        (Some(h), _) => Spacing::Voxel(h),
-        (None, Some(n)) => Spacing::Resolution(n),
-        (None, None) => Spacing::Voxel(voxel_for(&samples)),
-    };
+    let spacing = params.cells.unwrap_or_else(|| Spacing::Voxel(voxel_for(&samples)));
     let sampling = Sampling { spacing, memory: params.memory };
     let mut meshed = contour::from_field(&field, sampling, &params.contour, &Part::new(observer, 0.6, 0.35))?;
     let mut lids = 0;
@@ -221,6 +236,21 @@ pub fn scan_figures(made: &ScanMeshed, quality: &mut Quality, warnings: &mut Vec
         quality.insert(format!("scan.to_mesh_{key}"), Figure::Number(x));
         quality.insert(format!("scan.to_mesh_{key}_rel"), Figure::Number(x / made.samples.diagonal));
     }
+}
+
+/// The figures and warnings of a scan in a run, among those of its model.
+/// * `diagonal` - of the mesh
+pub(super) fn run_figures(made: &ScanMeshed, points: &Cleaned, diagonal: f64, fitted: &mut Fitted) {
+    let mut found = Quality::new();
+    scan_figures(made, &mut found, &mut fitted.warnings);
+    found.insert("scan.outliers".into(), Figure::Count(points.outliers as u64));
+    found.insert("scan.moved_rms".into(), Figure::Number(points.moved_rms));
+    for key in ["scan.noise", "scan.spacing", "scan.moved_rms", "scan.to_mesh_rms", "scan.to_mesh_mean"] {
+        if let Some(x) = found.get(key).map(|f| f.value()) {
+            found.insert(format!("{key}_rel"), Figure::Number(x / diagonal));
+        }
+    }
+    fitted.quality.extend(found);
 }
 
 /// The figures of samples alone.

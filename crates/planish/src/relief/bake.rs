@@ -3,8 +3,8 @@
 use super::frame::at_nodes;
 use super::{Relief, ReliefError};
 use crate::grid::Grid;
-use crate::surface::Surface;
 use crate::observe::Observer;
+use crate::surface::Surface;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -43,11 +43,7 @@ pub fn displace(surface: &Surface, relief: &Relief) -> Result<Vec<DVec3>, Relief
 /// The displacement maps of all patches, in their order ([`bake`]).
 /// # Errors
 /// The first that cannot be baked; [`ReliefError::Cancelled`].
-pub fn bake_network(
-    grids: &[Grid],
-    surfaces: &[Surface],
-    observer: &dyn Observer,
-) -> Result<Vec<Relief>, ReliefError> {
+pub fn bake_network(grids: &[Grid], surfaces: &[Surface], observer: &dyn Observer) -> Result<Vec<Relief>, ReliefError> {
     let done = AtomicUsize::new(0);
     let one = |(grid, surface): (&Grid, &Surface)| {
         observer.check()?;

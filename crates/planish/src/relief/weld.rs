@@ -5,11 +5,11 @@
 //! Departs from [K98]: no averaging of boundary rows. A node on a curve or corner is one vertex because the network
 //! says so, whatever its distance; its position is that of the first patch that has it.
 
-use crate::observe::{Cancelled, Observer};
 use super::{Relief, ReliefError, displace};
 use crate::grid::Grid;
 use crate::mesh::{Attribute, TriMesh};
 use crate::network::Network;
+use crate::observe::{Cancelled, Observer};
 use crate::surface::basis::uniform_parameters;
 use crate::surface::{FitError, Surface, check, node};
 use glam::DVec3;

@@ -8,10 +8,10 @@
 //! Triangles*, 2001, has cubics of the same normals. On a line what is across its tangent takes the place of what is across
 //! the surface.
 
-use crate::observe::{Cancelled, Observer};
 use super::lines::Lines;
 use crate::mesh::intersect::intersections_of;
 use crate::mesh::{FeatureKind, FeatureTags, TriMesh, next, previous};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 

@@ -3,8 +3,8 @@
 //! Noise hides a few edges of a line, or shifts it by an edge. A gap costs more than its length: a line with a loose end is
 //! taken for surface detail, or two patches run into one another there.
 
-use crate::observe::{Cancelled, Observer};
 use crate::mesh::{Adjacency, FeatureTags, NONE, TriMesh, next, path, previous};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};

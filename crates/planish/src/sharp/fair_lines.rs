@@ -8,13 +8,13 @@
 //! 3. who turns a triangle over, or makes two meet, goes back half of the way, or all of it;
 //! 4. vertices in the way are merged into their neighbours ([`merging`](super::merging)), and who went back tries again.
 
-use crate::observe::{Cancelled, Observer};
 use super::flanks::{Flank, Plane, ScanScale};
 use super::lines::{Lines, Seen};
 use super::merging::{Fault, Merging};
 use super::rounded::{self, meet};
 use crate::mesh::intersect::intersections_of;
 use crate::mesh::{FeatureTags, TriMesh};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -229,12 +229,7 @@ fn wishes(
 }
 
 /// Moves vertices as far as the triangles allow, and marks them.
-fn settle(
-    mesh: &mut TriMesh,
-    wishes: &Wishes,
-    moved: &mut [bool],
-    observer: &dyn Observer,
-) -> Result<(), Cancelled> {
+fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool], observer: &dyn Observer) -> Result<(), Cancelled> {
     let before = mesh.points.clone();
     let mut share = vec![0.0; mesh.points.len()];
     let is_there = |v: u32, p: DVec3| before[v as usize].distance(p) <= THERE * wishes.cell;

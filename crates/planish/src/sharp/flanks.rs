@@ -7,9 +7,9 @@
 //!
 //! A flank is a polynomial over its tangent plane: a plane, one that bends along the line, or a quadric.
 
-use crate::observe::{Cancelled, Observer};
 use super::lines::{Lines, Seen};
 use crate::linalg::solve_dense;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 

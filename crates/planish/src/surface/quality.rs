@@ -3,12 +3,12 @@
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §6.2 eq. 6.1 (parametric distance) and
 //! §8.1.1 (normals along a seam; here their angle in degrees).
 
-use crate::observe::{Cancelled, Observer};
 use super::basis::{BasisRows, uniform_parameters};
 use super::sides::place;
 use super::{RowSampler, Surface};
 use crate::grid::Grid;
 use crate::network::{CurveKind, Network};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -12,24 +12,33 @@ use crate::mesh::TriMesh;
 use crate::observe::Observer;
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// How a virtual scan is made. Lengths are fractions of the diagonal of the shape.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
 pub struct ScannerParams {
-    /// Stations around the shape.
+    /// Stations around the shape
+    #[schemars(range(min = 1, max = 160))]
     pub stations: usize,
-    /// Points of all stations, about.
+    /// Points of all stations, about
+    #[schemars(range(min = 5_000, max = 5_000_000))]
     pub points: usize,
-    /// Standard deviation along the ray, of the diagonal.
+    /// Standard deviation of the points along the ray
+    #[schemars(range(min = 0.0, max = 0.1), extend("unit" = "diagonal"))]
     pub noise: f64,
-    /// Share of the hits whose range is wrong.
+    /// Share of the hits whose range is wrong
+    #[schemars(range(min = 0.0, max = 0.5), extend("unit" = "share"))]
     pub outliers: f64,
-    /// Standard deviation of the misplacement of a station along each axis, of the diagonal.
+    /// Standard deviation of the misplacement of a station along each axis
+    #[schemars(range(min = 0.0, max = 0.1), extend("unit" = "diagonal"))]
     pub shift: f64,
-    /// Standard deviation of its turn about the middle of the shape, degrees.
+    /// Standard deviation of the turn of a station about the middle of the shape
+    #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "degrees"))]
     pub turn_deg: f64,
-    /// Seed of everything random.
+    /// Seed of everything random
     pub seed: u64,
 }
 

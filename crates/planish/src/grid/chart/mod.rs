@@ -15,7 +15,6 @@ pub(crate) mod locate;
 pub(crate) mod loosen;
 pub(crate) mod walk;
 
-use crate::observe::{Cancelled, Observer};
 use super::chart::locate::orientation;
 use super::chart::loosen::loosen;
 use super::{Fault, SideStops, side};
@@ -23,6 +22,7 @@ use crate::geom::tolerance;
 use crate::linalg::SparseCholesky;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
 use crate::network::PatchMesh;
+use crate::observe::{Cancelled, Observer};
 use glam::{DVec2, DVec3};
 
 /// Bounds of a cotangent weight: below, the weight would no longer hold a vertex; above, the slivers of scans would

@@ -3,7 +3,6 @@
 //!
 //! Goes beyond [K98], whose grids catch a ridge only by being finer.
 
-use crate::observe::Observer;
 use super::fold::{place, turns_around, worst_corner};
 use super::{Net, cell_corners};
 use crate::geom::{Bvh, closest_in_triangle};
@@ -12,6 +11,7 @@ use crate::grid::chart::Chart;
 use crate::grid::chart::locate::Spot;
 use crate::grid::quality::{halves, surface};
 use crate::mesh::NONE;
+use crate::observe::Observer;
 use rayon::prelude::*;
 
 /// Sweeps over the missed vertices; each sees the points that the one before moved.

@@ -3,9 +3,9 @@
 //! The arc-length force F_arc of [K98] eq. 5.1 in its limit: each point of a curve goes part of the way to its
 //! place at equal arc length. Lines and columns take turns.
 
-use crate::observe::Observer;
 use super::Net;
 use crate::grid::Fault;
+use crate::observe::Observer;
 use glam::DVec2;
 
 /// Part of the way that a round goes.

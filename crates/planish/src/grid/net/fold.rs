@@ -5,10 +5,10 @@
 //! cells around the tip of a limb point in all directions; only a fold turns a corner over against both. The corner
 //! of a cell at a corner of the patch is left out, for its angle is that of the patch's curves, be it 180 degrees.
 
-use crate::observe::Observer;
 use super::{Net, cell_corners, turns_over};
 use crate::grid::Fault;
 use crate::grid::chart::locate::Spot;
+use crate::observe::Observer;
 use glam::DVec3;
 
 /// Cells to each side over which the normal is averaged.

@@ -6,9 +6,9 @@
 //! bend of both curves. Unknowns are moves `(a, b)` in cells along the net's own tangents; points then walk over
 //! the surface (MovePointOnSurface), and a move that would turn a cell over is shortened.
 
-use crate::observe::{Cancelled, Observer};
 use super::{Net, PARALLEL_LENGTH};
 use crate::grid::{Fault, GridParams};
+use crate::observe::{Cancelled, Observer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 

@@ -4,7 +4,6 @@
 //! holds it in a small spot, so the coarsest grid is first drawn into such parts by [`even`], which measures along
 //! the curves and not between their points. Then [`settle`] balances spacing against angles at every resolution.
 
-use crate::observe::Observer;
 use super::Net;
 use super::catch::catch;
 use super::even::{even, unevenness};
@@ -13,6 +12,7 @@ use super::settle::{CG_STEPS, settle};
 use crate::grid::chart::Chart;
 use crate::grid::chart::locate::Spot;
 use crate::grid::{Fault, GridParams};
+use crate::observe::Observer;
 
 /// Cells along the longer direction from which a grid is not made coarser.
 const COARSEST: usize = 32;
