@@ -1,7 +1,17 @@
-//! The whole way from a mesh to a model: the only file that knows the order of the stages.
+//! The whole way from a scan or a mesh to a model: the only room that knows the order of the stages.
 //!
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, fig. 1.3: curves, grids, surfaces,
-//! displacement maps; before it the repair of the mesh and an automatic network, after it the measuring.
+//! displacement maps; before it a mesh of the scan, its repair and an automatic network, after it the measuring.
+//!
+//! 1. [`run`], everything: a scan is meshed ([`mesh_scan`]), its points are brought to the surface, and the parameters of
+//!    what follows are those that suit its noise ([`params_for`])
+//! 2. [`fit`], from a mesh on: repair, layout, imprint, grids, surfaces, seams, relief, measure. [`layout()`] stops at the
+//!    network, for one that is edited before
+//! 3. [`rework`], a model whose curves were edited: from the imprint on; [`refit`], surfaces, seams and relief anew on the
+//!    grids that are there; [`assess`], the measuring alone
+//!
+//! A [`PipelineObserver`] hears which stage runs and how far the run is, and may stop it; [`StageRecord`] keeps what each
+//! took and made, [`Quality`] what came of it.
 
 mod quality;
 mod record;
