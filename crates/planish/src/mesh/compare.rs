@@ -108,7 +108,7 @@ pub fn compare(
     for (which, mesh) in [('a', a), ('b', b)] {
         check(mesh).map_err(|error| CompareError::Mesh { which, error })?;
     }
-    let (a, b) = (Side::new(a, 'a')?, Side::new(b, 'b')?);
+    let (a, b) = (Side::new(a, 'a', observer)?, Side::new(b, 'b', observer)?);
     let diagonal = Aabb::of(&a.mesh.points).diagonal();
     let ab = measure(&a, &b, params, 0, observer)?;
     let ba = measure(&b, &a, params, 1, observer)?;
@@ -144,12 +144,13 @@ struct Side {
 }
 
 impl Side {
-    fn new(mesh: &TriMesh, which: char) -> Result<Side, CompareError> {
+    fn new(mesh: &TriMesh, which: char, observer: &dyn Observer) -> Result<Side, CompareError> {
         let triangles: Vec<[u32; 3]> =
             (0..mesh.triangles.len()).filter(|&t| mesh.area(t) > 0.0).map(|t| mesh.triangles[t]).collect();
         if triangles.is_empty() {
             return Err(CompareError::NoArea { which, triangles: mesh.triangles.len() });
         }
+        observer.check()?;
         // Only the vertices in use, so that the box is that of the surface.
         let mut id = vec![u32::MAX; mesh.points.len()];
         let mut points = Vec::new();
@@ -173,7 +174,7 @@ impl Side {
                 total
             })
             .collect();
-        let bvh = Bvh::new(&mesh);
+        let bvh = Bvh::watched(&mesh, observer)?;
         Ok(Side { mesh, sums, bvh })
     }
 

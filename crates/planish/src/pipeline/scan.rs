@@ -215,7 +215,7 @@ fn reach(scan: &Cloud, mesh: &TriMesh, observer: &dyn Observer) -> Result<Vec<(f
     if mesh.triangles.is_empty() {
         return Ok(Vec::new());
     }
-    let bvh = Bvh::new(mesh);
+    let bvh = Bvh::watched(mesh, observer)?;
     let step = scan.points.len().div_ceil(MEASURED).max(1);
     let finite: Vec<_> = scan.points.iter().step_by(step).filter(|p| p.is_finite()).collect();
     let one = |p: &&DVec3| {

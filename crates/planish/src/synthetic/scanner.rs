@@ -9,7 +9,7 @@
 use crate::cloud::{Cloud, CloudError};
 use crate::geom::{Bvh, KdTree, random};
 use crate::mesh::TriMesh;
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -101,14 +101,17 @@ pub fn virtual_scan(
     if truth.triangles.is_empty() || params.stations == 0 {
         return Err(nothing);
     }
-    let tree = Bvh::new(truth);
+    let tree = Bvh::watched(truth, observer)?;
     let bounds = truth.bounds();
     let (center, size) = (bounds.center(), bounds.diagonal());
-    let (places, thinning) = chosen(truth, &tree, params);
+    let (places, thinning) = chosen(truth, &tree, params, observer)?;
     let stations: Vec<Station> =
         places.into_iter().enumerate().map(|(k, out)| Station::new(k, out, center, size, params)).collect();
-    let seen: f64 =
-        stations.iter().map(|s| s.look(truth, &tree, &thinning, TRIAL).iter().map(|h| h.chance).sum::<f64>()).sum();
+    let mut seen = 0.0;
+    for station in &stations {
+        observer.check()?;
+        seen += station.look(truth, &tree, &thinning, TRIAL).iter().map(|h| h.chance).sum::<f64>();
+    }
     if seen == 0.0 {
         return Err(nothing);
     }
@@ -140,7 +143,12 @@ pub fn virtual_scan(
 }
 
 /// Directions from the middle to the stations, and what is kept where many of them see the same.
-fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> (Vec<DVec3>, Thinning) {
+fn chosen(
+    truth: &TriMesh,
+    tree: &Bvh,
+    params: &ScannerParams,
+    observer: &dyn Observer,
+) -> Result<(Vec<DVec3>, Thinning), Cancelled> {
     let bounds = truth.bounds();
     let (center, size) = (bounds.center(), bounds.diagonal());
     let start = TAU * random::unit(params.seed, u64::MAX);
@@ -168,9 +176,10 @@ fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> (Vec<DVec3>, T
             (a * (1.0 - r) + b * (r * (1.0 - draw(2))) + c * (r * draw(2)), truth.normal(t))
         })
         .collect();
-    let chances: Vec<Vec<f32>> = places
+    let chances: Result<Vec<Vec<f32>>, Cancelled> = places
         .par_iter()
         .map(|&out| {
+            observer.check()?;
             let eye = center + out * AWAY * size;
             let sees = |&(p, n): &(DVec3, DVec3)| {
                 let (far, ray) = ((p - eye).length(), (p - eye).normalize());
@@ -179,9 +188,10 @@ fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> (Vec<DVec3>, T
                     && tree.first_hit(eye, ray, f64::INFINITY).is_some_and(|h| h.distance > far - 1e-6 * size);
                 if clear { chance as f32 } else { 0.0 }
             };
-            spots.iter().map(sees).collect()
+            Ok(spots.iter().map(sees).collect())
         })
         .collect();
+    let chances = chances?;
     let mut seen = vec![0f32; SPOTS];
     let mut density = vec![0.0; SPOTS];
     let places = (0..params.stations)
@@ -202,7 +212,7 @@ fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> (Vec<DVec3>, T
             places[best]
         })
         .collect();
-    (places, Thinning::new(spots, density))
+    Ok((places, Thinning::new(spots, density)))
 }
 
 /// How much of the hits around each spot is kept.
