@@ -13,8 +13,9 @@ use planish::field;
 use planish::grid::GridParams;
 use planish::layout::LayoutParams;
 use planish::mesh::{DecimateParams, SmoothParams};
-use planish::pipeline::PipelineParams;
+use planish::pipeline::{PipelineParams, RunParams, ScanParams};
 use planish::surface::{FitParams, StitchParams};
+use planish::synthetic::ScannerParams;
 use planish_io::Up;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -91,11 +92,12 @@ pub struct Demo {
     /// Folder for the products; made if missing
     #[arg(short, long, value_name = "DIR", default_value = "planish-demo")]
     pub output: PathBuf,
-    /// Points of the synthetic scan, about
-    #[arg(long, value_name = "N", default_value_t = 60_000, value_parser = clap::value_parser!(u32).range(5_000..=5_000_000))]
-    pub points: u32,
     #[command(flatten)]
     pub common: Common,
+    #[command(flatten)]
+    pub scanner: StageOptions<ScannerParams>,
+    #[command(flatten)]
+    pub meshing: MeshingArgs,
 }
 
 /// `planish run`
@@ -109,8 +111,6 @@ pub struct Run {
     pub output: PathBuf,
     #[command(flatten)]
     pub scan: ScanArgs,
-    #[command(flatten)]
-    pub holes: HoleArgs,
     /// Network to use instead of an automatic one
     #[arg(long, value_name = "NETWORK.json")]
     pub network: Option<PathBuf>,
@@ -121,6 +121,10 @@ pub struct Run {
     pub common: Common,
     #[command(flatten)]
     pub stages: AllStages,
+    #[command(flatten)]
+    pub meshing: MeshingArgs,
+    #[command(flatten)]
+    pub points: StageOptions<ProjectParams>,
 }
 
 /// `planish clean`
@@ -156,25 +160,79 @@ pub struct Mesh {
     /// The mesh: .ply (with feature tags), .obj, .stl or .glb
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// Edge of a cell, in units of the input; for .npy the distance between samples
-    #[arg(long, value_name = "H", value_parser = positive, conflicts_with = "resolution")]
-    pub voxel: Option<f64>,
-    /// Cells along the longest side [default: 129]
-    #[arg(long, value_name = "N")]
-    pub resolution: Option<NonZeroUsize>,
-    /// Memory that may be used, GB [default: three quarters of the machine's]
-    #[arg(long, value_name = "GB", value_parser = positive)]
-    pub memory: Option<f64>,
     #[command(flatten)]
     pub common: Common,
     #[command(flatten)]
-    pub contour: StageOptions<ContourParams>,
+    pub meshing: MeshingArgs,
     #[command(flatten)]
     pub volume: StageOptions<field::GridParams>,
     #[command(flatten)]
     pub scan: ScanArgs,
+}
+
+/// How a scan becomes a mesh.
+#[derive(Args, Clone, Debug)]
+pub struct MeshingArgs {
+    #[command(flatten)]
+    scan: StageOptions<ScanParams>,
+    #[command(flatten)]
+    clean: StageOptions<CleanParams>,
+    #[command(flatten)]
+    contour: StageOptions<ContourParams>,
     #[command(flatten)]
     pub holes: HoleArgs,
+    /// Memory that may be used, GB [default: three quarters of the machine's]
+    #[arg(long, value_name = "GB", value_parser = positive)]
+    memory: Option<f64>,
+}
+
+impl MeshingArgs {
+    /// The parameters, with the given options in place.
+    /// # Errors
+    /// If a stage refuses a value.
+    pub fn params(&self) -> Result<ScanParams, Failure> {
+        let memory = self.memory.map_or_else(default_memory, |gb| (gb * (1u64 << 30) as f64) as u64);
+        Ok(ScanParams {
+            clean: self.clean.params(None)?,
+            contour: self.contour.params(None)?,
+            close: self.holes.choice(),
+            memory,
+            ..self.scan.params(None)?
+        })
+    }
+
+    /// Refuses options of scans for an input that is none.
+    /// # Errors
+    /// If one of them is given.
+    pub fn refuse(&self, hint: &'static str) -> Result<(), Failure> {
+        let first = self.scan.first_given().or_else(|| self.clean.first_given()).or_else(|| self.contour.first_given());
+        match first {
+            Some(flag) => Err(Failure::usage(flag, "is for scans, and the input is none").hint(hint)),
+            None => self.holes.refuse(hint),
+        }
+    }
+
+    /// Refuses what only scans have: cleaning, and holes.
+    /// # Errors
+    /// If one of them is given.
+    pub fn refuse_cleaning(&self, hint: &'static str) -> Result<(), Failure> {
+        match self.clean.first_given() {
+            Some(flag) => Err(Failure::usage(flag, "is for scans, and the input is none").hint("leave it out")),
+            None => self.holes.refuse(hint),
+        }
+    }
+}
+
+/// Share of the machine's memory that may be used unless the user says.
+const MEMORY_SHARE: f64 = 0.75;
+/// What a machine has if nobody knows.
+const MEMORY_GUESS: u64 = 8 << 30;
+
+fn default_memory() -> u64 {
+    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let total =
+        text.lines().find_map(|l| l.strip_prefix("MemTotal:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
+    (total.map_or(MEMORY_GUESS, |kb| kb << 10) as f64 * MEMORY_SHARE) as u64
 }
 
 /// `planish smooth`
@@ -367,6 +425,13 @@ impl AllStages {
         })
     }
 
+    /// The parameters of a run: those that suit the input, with the given options in place. That the stages accept these is
+    /// known from [`AllStages::params`]: no stage refuses a value for what stands beside it.
+    pub fn run_params(&self, scan: ScanParams, seed: Option<u64>) -> RunParams<'_> {
+        let stages = move |suited: PipelineParams| self.params_suiting(suited.clone(), seed).unwrap_or(suited);
+        RunParams { scan, stages: Box::new(stages) }
+    }
+
     /// True if no option of any stage is given.
     pub fn none_given(&self) -> bool {
         self.layout.first_given().is_none()
@@ -404,6 +469,16 @@ impl StageParams for DecimateParams {
 impl StageParams for CleanParams {
     const STAGE: &'static str = "clean";
     const HEADING: &'static str = "Samples of a scan";
+}
+
+impl StageParams for ScanParams {
+    const STAGE: &'static str = "scan";
+    const HEADING: &'static str = "Cells";
+}
+
+impl StageParams for ScannerParams {
+    const STAGE: &'static str = "scanner";
+    const HEADING: &'static str = "The synthetic scan; lengths as shares of the diagonal of the part";
 }
 
 impl StageParams for ProjectParams {

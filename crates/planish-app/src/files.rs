@@ -105,6 +105,7 @@ pub fn check_extension(path: &Path, wanted: &[&str]) -> Result<(), Failure> {
 /// If the file is no network, or one of another mesh.
 pub fn optional_network(path: Option<&Path>, input: &TriMesh) -> Result<Option<Network>, Failure> {
     let Some(path) = path else { return Ok(None) };
-    let (repaired, _) = planish::mend::repair(input).map_err(|e| Failure::input(path, e))?;
+    let (repaired, _) =
+        planish::mend::repair(input, &crate::progress::Interrupt).map_err(|e| Failure::input(path, e))?;
     planish_io::read_network(path, &repaired).map(Some).map_err(|e| Failure::input(path, e))
 }

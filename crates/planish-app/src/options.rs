@@ -18,10 +18,11 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use std::marker::PhantomData;
 
-/// Fields that common options set: they get no flag of their own.
+/// Fields that common options set: they get no flag of their own. Nor do those whose schema says `by_hand`, which groups of
+/// options in `args` set.
 const COMMON_FIELDS: [&str; 1] = ["seed"];
 
-/// A stage's parameter struct, with the name it has in [`PipelineParams`].
+/// A stage's parameter struct, with its name: that of its options in [`PipelineParams`] and in what is told of them.
 pub trait StageParams: Default + Serialize + DeserializeOwned + JsonSchema {
     /// Name of the stage.
     const STAGE: &'static str;
@@ -127,7 +128,7 @@ struct Field {
 enum Kind {
     Flag,
     Whole { min: Option<f64>, max: Option<f64> },
-    Real { min: Option<f64>, max: Option<f64> },
+    Real { min: Option<f64>, max: Option<f64>, above: Option<f64> },
     Choice(Vec<String>),
     Wholes { count: Option<usize> },
 }
@@ -186,9 +187,9 @@ impl Field {
                 Ok(n) if !outside(n as f64, min, max) => Ok(n.into()),
                 _ => wrong(&range(min, max).replace("a number", "a whole number")),
             },
-            Kind::Real { min, max } => match text.parse::<f64>() {
-                Ok(x) if x.is_finite() && !outside(x, min, max) => Ok(x.into()),
-                _ => wrong(&range(min, max)),
+            Kind::Real { min, max, above } => match text.parse::<f64>() {
+                Ok(x) if x.is_finite() && !outside(x, min, max) && above.is_none_or(|a| x > a) => Ok(x.into()),
+                _ => wrong(&above.map_or_else(|| range(min, max), |a| format!("a number above {a} is needed"))),
             },
         }
     }
@@ -202,7 +203,8 @@ fn fields<P: StageParams>() -> Vec<Field> {
     let clashes = clashing_names();
     let Some(properties) = schema["properties"].as_object() else { return Vec::new() };
     let mut found = Vec::new();
-    for (name, property) in properties.iter().filter(|(name, _)| !COMMON_FIELDS.contains(&name.as_str())) {
+    let is_set_elsewhere = |name: &str, property: &Value| COMMON_FIELDS.contains(&name) || property["by_hand"] == true;
+    for (name, property) in properties.iter().filter(|(name, p)| !is_set_elsewhere(name, p)) {
         let id = format!("{}.{name}", P::STAGE);
         let variants = variants_of(property, schema);
         if let Some((kind, optional)) = kind_of(property, schema) {
@@ -247,6 +249,9 @@ fn help_of(property: &Value, default: &Value) -> String {
 
 /// The variants of an enum field whose variants carry one value each: name, description, kind.
 fn variants_of(property: &Value, schema: &Value) -> Vec<(String, Value, Kind)> {
+    // One that may be absent.
+    let inner = property["anyOf"].as_array().and_then(|any| any.iter().find(|p| p["$ref"].is_string()));
+    let property = inner.unwrap_or(property);
     let property = match property["$ref"].as_str().and_then(|r| r.rsplit('/').next()) {
         Some(name) => &schema["$defs"][name],
         None => property,
@@ -291,7 +296,7 @@ fn kind_of(property: &Value, schema: &Value) -> Option<(Kind, bool)> {
     let kind = match types.into_iter().find(|t| *t != "null")? {
         "boolean" => Kind::Flag,
         "integer" => Kind::Whole { min, max },
-        "number" => Kind::Real { min, max },
+        "number" => Kind::Real { min, max, above: property["exclusiveMinimum"].as_f64() },
         _ => return None,
     };
     Some((kind, nullable))

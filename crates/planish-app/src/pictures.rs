@@ -60,8 +60,8 @@ pub fn pictures(
     };
     // One quad per sample is as fine as can be seen.
     let cuts = (QUADS / pipeline::span_count(model).max(1)).isqrt().clamp(1, CUTS_PER_SPAN);
-    let base = pipeline::surface_mesh_cut(model, cuts).map_err(Failure::fault)?;
-    let displaced = pipeline::displaced_mesh(model).map_err(Failure::fault)?;
+    let base = pipeline::surface_mesh_cut(model, cuts, &crate::progress::Interrupt).map_err(Failure::fault)?;
+    let displaced = pipeline::displaced_mesh(model, &crate::progress::Interrupt).map_err(Failure::fault)?;
     let unit = report.input.units.as_str();
     let mut pictures = Vec::new();
     let mut add = |title: &str, caption: String, png: Vec<u8>| {
@@ -151,7 +151,7 @@ pub fn drawing(mesh: &TriMesh, drawing: &Drawing, view: &View) -> Result<Vec<u8>
         None => close_up(Camera::fit(&mesh.bounds(), toward, up, ASPECT), mesh),
     };
     let palette = render::even_colors(network.patches.len());
-    let cut = planish::network::imprint(mesh, network).ok();
+    let cut = planish::network::imprint(mesh, network, &crate::progress::Interrupt).ok();
     let (mut all, mut colors) = (TriMesh::default(), Vec::new());
     for (patch, color) in cut.iter().flatten().zip(&palette) {
         let first = all.points.len() as u32;

@@ -54,6 +54,16 @@ pub fn interrupted() -> bool {
     CANCELLED.load(Ordering::SeqCst)
 }
 
+/// Watches for Ctrl-C alone, in steps that need no bar of their own.
+pub struct Interrupt;
+
+impl Observer for Interrupt {
+    fn progress(&self, _fraction: f64) {}
+    fn cancelled(&self) -> bool {
+        interrupted()
+    }
+}
+
 /// Bars for the stages of a command: one per stage that takes longer than half a second, on stderr when it
 /// is a terminal.
 pub struct Bars {

@@ -210,3 +210,38 @@ fn holes_are_a_matter_of_scans_and_the_border_of_a_volume_has_an_option_of_its_o
         assert_eq!(report["quality"]["mesh.watertight"], watertight, "{value}");
     }
 }
+
+/// 6 000 points spread evenly over a ball of radius 1, as text.
+fn ball_of_points() -> String {
+    let place = |n: usize| {
+        let (z, turn) = (1.0 - (2 * n + 1) as f64 / 6000.0, 2.399963229728653 * n as f64);
+        let r = (1.0 - z * z).sqrt();
+        format!("{} {} {z}\n", r * turn.cos(), r * turn.sin())
+    };
+    (0..6000).map(place).collect()
+}
+
+#[test]
+fn cells_and_cleaning_of_a_scan_can_be_set_in_run_and_mesh_and_are_refused_for_a_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("r.json");
+    fs::write(folder.path().join("ball.xyz"), ball_of_points()).unwrap();
+    let triangles = |options: &[&str]| {
+        done(&[&["mesh", "ball.xyz", "-o", "ball.ply", "--report", "r.json", "-q"], options].concat(), folder.path());
+        number(&report, "mesh.triangles")
+    };
+    let (fine, coarse) = (triangles(&["--voxel", "0.1"]), triangles(&["--voxel", "0.2", "--outlier", "6"]));
+    assert!(fine > 3.0 * coarse, "{fine} and {coarse} triangles");
+    done(&["run", "ball.xyz", "-o", "out", "--voxel", "0.2", "--report", "r.json", "-q"], folder.path());
+    assert_eq!(number(&report, "mesh.triangles"), coarse);
+    for option in [["--voxel", "0.2"], ["--outlier", "6"], ["--spacing", "0.1"]] {
+        let output = planish(&[&["run", "ball.ply", "-o", "no"], option.as_slice()].concat(), folder.path());
+        let told = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && told.contains(option[0]), "{told}");
+    }
+    for wrong in [["--voxel", "0"], ["--resolution", "0"], ["--outlier", "1"]] {
+        let output = planish(&[&["run", "ball.xyz", "-o", "no"], wrong.as_slice()].concat(), folder.path());
+        assert_eq!(output.status.code(), Some(2), "{wrong:?}");
+    }
+    assert!(!folder.path().join("no").exists());
+}

@@ -9,7 +9,7 @@ use planish::curve::{
 use planish::edit::network::{Editor, Holds};
 use planish::geom::{Bvh, random};
 use planish::grid::{self, Grid, GridParams};
-use planish::layout::{LayoutParams, layout};
+use planish::layout::{Known, LayoutParams, layout};
 use planish::mesh::{self, Adjacency, FacePoint, TriMesh};
 use planish::network::{CurveKind, PatchMesh, changed_patches, imprint, reimprint};
 use planish::synthetic::shapes;
@@ -300,7 +300,7 @@ fn one_patch(wanted: &dyn Fn(&str) -> bool) {
     assert!(editor.diagnose().is_finished());
     let params = SnakeParams { fairness: 0.1, curvature: 1.0, ..SnakeParams::default() };
     let before = editor.network.clone();
-    let old = imprint(&mesh, &before).expect("patches");
+    let old = imprint(&mesh, &before, &Silent).expect("patches");
     let grid_params = GridParams::default();
     let sizes = grid::choose_sizes(&before, &old, &grid_params);
     let old_grids = grid::relax(&mesh, &old, &sizes, &grid_params, &Silent).expect("grids");
@@ -309,8 +309,9 @@ fn one_patch(wanted: &dyn Fn(&str) -> bool) {
     let drag = milliseconds(start);
     let which = changed_patches(&before, &editor.network).expect("the same network");
     let near: Vec<&PatchMesh> = which.iter().map(|&p| &old[p]).collect();
-    let (whole, patches) = least(|| imprint(&mesh, &editor.network).expect("patches"));
-    let (cutting, _) = least(|| reimprint(&mesh, &adjacency, &editor.network, &near, &which).expect("patches"));
+    let (whole, patches) = least(|| imprint(&mesh, &editor.network, &Silent).expect("patches"));
+    let (cutting, _) =
+        least(|| reimprint(&mesh, &adjacency, &editor.network, &near, &which, &Silent).expect("patches"));
     tell(
         id,
         &format!(
@@ -374,8 +375,8 @@ fn follows(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
         return;
     }
     let adjacency = Adjacency::new(mesh);
-    let before = layout(mesh, &LayoutParams::default(), &Silent).expect("a network");
-    let old = imprint(mesh, &before).expect("patches");
+    let before = layout(mesh, Known::default(), &LayoutParams::default(), &Silent).expect("a network");
+    let old = imprint(mesh, &before, &Silent).expect("patches");
     let params = GridParams::default();
     let sizes = grid::choose_sizes(&before, &old, &params);
     let (mut patches, mut old_grids) = (Vec::new(), Vec::new());
@@ -393,7 +394,7 @@ fn follows(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
         }
         let which = changed_patches(&before, &editor.network).expect("the same network");
         let near: Vec<&PatchMesh> = which.iter().map(|&p| &old[p]).collect();
-        let Ok(made) = reimprint(mesh, &adjacency, &editor.network, &near, &which) else { continue };
+        let Ok(made) = reimprint(mesh, &adjacency, &editor.network, &near, &which, &Silent) else { continue };
         let sizes: Vec<(usize, usize)> = which.iter().map(|&p| sizes[p]).collect();
         let some: Vec<PatchMesh> = which.iter().map(|&p| old[p].clone()).collect();
         old_grids.extend(grid::relax(mesh, &some, &sizes, &params, &Silent).expect("grids"));
@@ -448,7 +449,7 @@ fn main() {
     let mut inputs = vec![("sphere".to_string(), ball)];
     for file in ["armadillo", "dragon"] {
         if let Some(mesh) = common::data_mesh(&format!("{file}.ply")) {
-            inputs.push((file.to_string(), mend::repair(&mesh).expect("a mesh").0));
+            inputs.push((file.to_string(), mend::repair(&mesh, &Silent).expect("a mesh").0));
         }
     }
     one_patch(&wanted);

@@ -40,7 +40,8 @@ fn main() {
         let part = synthetic::demo(SEED, wanted);
         let mut least = Seconds::new();
         for round in 0..rounds {
-            let fitted = pipeline::fit(&part, None, &PipelineParams::default(), &Silent).expect("the part is sound");
+            let fitted =
+                pipeline::fit(&part, None, None, &PipelineParams::default(), &Silent).expect("the part is sound");
             keep(&mut least, &fitted.stages);
             if round == 0 && name == REFIT.0 {
                 seconds.insert(format!("refit/control_12x12/{name}"), refit(fitted.model, REFIT.1));

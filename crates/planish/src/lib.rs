@@ -4,16 +4,19 @@
 //! nothing of those after it ([`pipeline`] alone knows their order).
 //!
 //! ```
-//! use planish::synthetic::shapes;
 //! use planish::layout::LayoutParams;
-//! use planish::pipeline::{self, PipelineParams};
+//! use planish::pipeline::{self, Input, PipelineParams, RunParams};
+//! use planish::synthetic::shapes;
 //!
 //! let ball = shapes::sphere(10.0, 4);
-//! let params = PipelineParams { layout: LayoutParams { patches: 24, ..Default::default() }, ..Default::default() };
-//! let fitted = pipeline::fit(&ball, None, &params, &planish::Silent)?;
-//! assert_eq!(fitted.model.surfaces.len(), fitted.model.network.patches.len());
+//! // What is wanted otherwise than suits the input: a scan would be `Input::Scan(&cloud)`.
+//! let stages = |suited: PipelineParams| PipelineParams { layout: LayoutParams { patches: 24, ..suited.layout }, ..suited };
+//! let params = RunParams { stages: Box::new(stages), ..RunParams::default() };
+//! let run = pipeline::run(Input::from(&ball), &params, &planish::Silent)?;
+//! let model = &run.fitted.model;
+//! assert_eq!(model.surfaces.len(), model.network.patches.len());
 //! // Surface plus relief is the grid again, to rounding.
-//! assert!(fitted.quality["relief.rounding_max_rel"].value() < 1e-12);
+//! assert!(run.fitted.quality["relief.rounding_max_rel"].value() < 1e-12);
 //! # Ok::<(), pipeline::PipelineError>(())
 //! ```
 

@@ -3,12 +3,31 @@
 /// Watches a running stage.
 ///
 /// Every long stage has the shape `stage(input, &Params, &dyn Observer) -> Result<Output, StageError>`; it
-/// reports a fraction of itself and asks [`Observer::cancelled`] at least every 200 ms.
+/// reports a fraction of itself and asks [`Observer::check`] at least every 200 ms.
 pub trait Observer: Sync {
     /// The stage has done `fraction` (0 to 1) of its own work.
     fn progress(&self, fraction: f64);
-    /// True when the result is no longer wanted; the stage then returns its `Cancelled` error.
+    /// True when the result is no longer wanted.
     fn cancelled(&self) -> bool;
+    /// Whether the result is still wanted, for `observer.check()?`.
+    /// # Errors
+    /// [`Cancelled`] if it is not; each stage's error has a variant that it becomes.
+    fn check(&self) -> Result<(), Cancelled> {
+        if self.cancelled() { Err(Cancelled) } else { Ok(()) }
+    }
+}
+
+/// The observer no longer wanted the result: the one reason of every stage that was stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("cancelled")]
+pub struct Cancelled;
+
+impl Cancelled {
+    /// True if `error` says nothing but that its stage was stopped, in whichever stage that was.
+    pub fn is_cause_of(error: &(dyn std::error::Error + 'static)) -> bool {
+        let mut chain = std::iter::successors(Some(error), |e| e.source());
+        chain.any(|e| e.is::<Cancelled>())
+    }
 }
 
 /// An observer that does nothing.

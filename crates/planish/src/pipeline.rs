@@ -1,7 +1,17 @@
-//! The whole way from a mesh to a model: the only file that knows the order of the stages.
+//! The whole way from a scan or a mesh to a model: the only room that knows the order of the stages.
 //!
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, fig. 1.3: curves, grids, surfaces,
-//! displacement maps; before it the repair of the mesh and an automatic network, after it the measuring.
+//! displacement maps; before it a mesh of the scan, its repair and an automatic network, after it the measuring.
+//!
+//! 1. [`run`], everything: a scan is meshed ([`mesh_scan`]), its points are brought to the surface, and the parameters of
+//!    what follows are those that suit its noise ([`params_for`])
+//! 2. [`fit`], from a mesh on: repair, layout, imprint, grids, surfaces, seams, relief, measure. [`layout()`] stops at the
+//!    network, for one that is edited before
+//! 3. [`rework`], a model whose curves were edited: from the imprint on; [`refit`], surfaces, seams and relief anew on the
+//!    grids that are there; [`assess`], the measuring alone
+//!
+//! A [`PipelineObserver`] hears which stage runs and how far the run is, and may stop it; [`StageRecord`] keeps what each
+//! took and made, [`Quality`] what came of it.
 
 mod quality;
 mod record;
@@ -13,14 +23,16 @@ pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
 pub use scan::{ScanError, ScanMeshed, ScanParams, mesh_scan, params_for, sample_figures, scan_figures, voxel_for};
 pub use truth::{EdgesFound, Zone, edge_reach, edges_found, truth_figures, zone};
 
+use crate::cloud::{self, Cleaned, Cloud, CloudError};
 use crate::grid::{self, FeatureError, Grid, GridError, GridParams};
-use crate::layout::{self, LayoutError, LayoutParams};
+use crate::layout::{self, Known, LayoutError, LayoutParams};
 use crate::mend::{self, Repairs};
 use crate::mesh::{CompareError, FeatureTags, MeshError, TriMesh};
 use crate::model::{Model, Sketch};
 use crate::network::{self, ImprintError, Network, PatchMesh};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use crate::pipeline::record::Clock;
+use crate::pipeline::scan::run_figures;
 use crate::relief::{self, ReliefError};
 use crate::surface::{self, FitError, FitParams, SeamQuality, StitchParams};
 use rayon::prelude::*;
@@ -40,6 +52,99 @@ pub struct PipelineParams {
     /// The seams between them.
     pub stitch: StitchParams,
 }
+
+/// What a run starts from.
+#[derive(Debug)]
+pub enum Input<'a> {
+    /// Points: they are cleaned and meshed first.
+    Scan(&'a Cloud),
+    /// A mesh.
+    Mesh {
+        /// Any triangle mesh; it is repaired first.
+        mesh: &'a TriMesh,
+        /// Its sharp edges where they are known: an automatic network follows them.
+        tags: Option<&'a FeatureTags>,
+        /// A network on the mesh as [`mend::repair`] leaves it; `None` for an automatic one.
+        network: Option<Network>,
+    },
+}
+
+impl<'a> From<&'a TriMesh> for Input<'a> {
+    fn from(mesh: &'a TriMesh) -> Input<'a> {
+        Input::Mesh { mesh, tags: None, network: None }
+    }
+}
+
+/// Parameters of a run.
+pub struct RunParams<'a> {
+    /// How a scan is meshed.
+    pub scan: ScanParams,
+    /// Parameters of the stages after the mesh. The function is given those that suit the input (the noise of a scan has a
+    /// say in them; for a mesh they are the defaults) and sets what is wanted otherwise.
+    pub stages: Box<dyn Fn(PipelineParams) -> PipelineParams + 'a>,
+}
+
+impl Default for RunParams<'_> {
+    fn default() -> Self {
+        RunParams { scan: ScanParams::default(), stages: Box::new(|suited| suited) }
+    }
+}
+
+/// What [`run`] makes.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// The model with its figures, those of the scan among them.
+    pub fitted: Fitted,
+    /// The parameters of the stages after the mesh.
+    pub params: PipelineParams,
+    /// What became of a scan.
+    pub scan: Option<Scanned>,
+}
+
+/// A scan on its way to a model.
+#[derive(Clone, Debug)]
+pub struct Scanned {
+    /// The samples and the mesh that was made of them.
+    pub meshed: ScanMeshed,
+    /// The points on the surface of the samples, and which are outliers.
+    pub points: Cleaned,
+}
+
+/// Everything, from a scan or a mesh to a model.
+/// # Errors
+/// The first stage that fails; [`Cancelled::is_cause_of`] tells one that was stopped.
+pub fn run(input: Input, params: &RunParams, observer: &dyn PipelineObserver) -> Result<Run, PipelineError> {
+    let cloud = match input {
+        Input::Mesh { mesh, tags, network } => {
+            let params = (params.stages)(PipelineParams::default());
+            let fitted = fit(mesh, tags, network, &params, observer)?;
+            return Ok(Run { fitted, params, scan: None });
+        }
+        Input::Scan(cloud) => cloud,
+    };
+    let weights = [&SCAN_WEIGHTS[..], &WEIGHTS].concat();
+    let mut clock = Clock::new(observer, &weights);
+    let scan = &params.scan;
+    let meshed = clock.stage(
+        "mesh",
+        |o| mesh_scan(cloud, scan, o),
+        |m| [("triangles", m.meshed.extracted.mesh.triangles.len())],
+    )?;
+    let points = clock.stage(
+        "points",
+        |o| cloud::project(cloud, &meshed.samples, scan.clean.outlier, &scan.points, o),
+        |p| [("points", p.cloud.points.len())],
+    )?;
+    let params = (params.stages)(params_for(&meshed));
+    let (mesh, tags) = (&meshed.meshed.extracted.mesh, &meshed.meshed.extracted.tags);
+    let mut fitted = fit_with(mesh, Some(tags), None, &params, &mut clock)?;
+    // Outliers are no part of the shape: its size is that of the mesh.
+    run_figures(&meshed, &points, mesh.bounds().diagonal(), &mut fitted);
+    Ok(Run { fitted, params, scan: Some(Scanned { meshed, points }) })
+}
+
+/// Stages from a scan to its mesh, with their shares of the time in the measure of [`WEIGHTS`].
+const SCAN_WEIGHTS: [(&str, f64); 2] = [("mesh", 60.0), ("points", 5.0)];
 
 /// Stages in their order, each with its usual share of the time.
 const WEIGHTS: [(&str, f64); 8] = [
@@ -95,66 +200,61 @@ pub enum PipelineError {
     /// The result cannot be measured.
     #[error(transparent)]
     Compare(#[from] CompareError),
+    /// The scan gives no mesh.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
+    /// The points of the scan cannot be brought to its surface.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
     /// The observer no longer wanted the result.
     #[error("cancelled")]
-    Cancelled,
+    Cancelled(#[from] Cancelled),
 }
 
 /// Fits a model to a mesh.
 ///
 /// * `input` - any triangle mesh; it is repaired first
+/// * `tags` - its sharp edges where they are known: an automatic network follows them
 /// * `network` - on the mesh as [`mend::repair`] leaves it; `None` for an automatic one
 ///
 /// # Errors
-/// The first stage that fails; a cancelled stage always as [`PipelineError::Cancelled`].
+/// The first stage that fails; [`Cancelled::is_cause_of`] tells one that was stopped.
 pub fn fit(
     input: &TriMesh,
-    network: Option<Network>,
-    params: &PipelineParams,
-    observer: &dyn PipelineObserver,
-) -> Result<Fitted, PipelineError> {
-    fit_tagged(input, None, network, params, observer)
-}
-
-/// As [`fit`]; an automatic network follows the sharp edges of `tags` where there are any.
-/// # Errors
-/// As [`fit`].
-pub fn fit_tagged(
-    input: &TriMesh,
     tags: Option<&FeatureTags>,
     network: Option<Network>,
     params: &PipelineParams,
     observer: &dyn PipelineObserver,
 ) -> Result<Fitted, PipelineError> {
-    run(input, tags, network, params, observer).map_err(|e| or_cancelled(e, observer))
+    fit_with(input, tags, network, params, &mut Clock::new(observer, &WEIGHTS))
 }
 
-fn run(
+/// As [`fit`], with the clock of a longer run.
+fn fit_with(
     input: &TriMesh,
     tags: Option<&FeatureTags>,
     network: Option<Network>,
     params: &PipelineParams,
-    observer: &dyn PipelineObserver,
+    clock: &mut Clock,
 ) -> Result<Fitted, PipelineError> {
-    let mut clock = Clock::new(observer, &WEIGHTS);
-    let (mesh, repairs) = repair(input, &mut clock)?;
+    let (mesh, repairs) = repair(input, clock)?;
     let network = match network {
         Some(network) => network,
-        None => draw(input, tags, &mesh, &params.layout, &mut clock)?,
+        None => draw(input, tags, &mesh, &params.layout, clock)?,
     };
-    let patches = clock.stage("imprint", |_| network::imprint(&mesh, &network), |p| [("patches", p.len())])?;
+    let patches = clock.stage("imprint", |o| network::imprint(&mesh, &network, o), |p| [("patches", p.len())])?;
     let grids = clock.stage(
         "grids",
-        |o| grid::resample(&mesh, &network, &patches, &params.grid, o),
+        |o| grid::resample(&mesh, &network, &patches, (&[], &[]), &params.grid, o),
         |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;
     let mut model = Model { mesh, network, grids, ..Model::default() };
-    surfaces(&mut model, params, &mut clock)?;
+    surfaces(&mut model, params, clock)?;
     let measured =
         clock.stage("measure", |o| quality::measure(&model, &patches, &repairs, o), |m| [("seams", m.seams.len())])?;
     Ok(Fitted {
         model,
-        stages: clock.records,
+        stages: std::mem::take(&mut clock.records),
         quality: measured.quality,
         seams: measured.seams,
         warnings: measured.warnings,
@@ -176,21 +276,11 @@ pub struct Drafted {
     pub warnings: Vec<Warning>,
 }
 
-/// The stages up to the network, for one that is edited before it goes on to [`fit`].
+/// The stages up to the network, for one that is edited before it goes on to [`fit`]; it follows the sharp
+/// edges of `tags` where there are any.
 /// # Errors
 /// As [`fit`].
 pub fn layout(
-    input: &TriMesh,
-    params: &LayoutParams,
-    observer: &dyn PipelineObserver,
-) -> Result<Drafted, PipelineError> {
-    layout_tagged(input, None, params, observer)
-}
-
-/// As [`layout`]; the network follows the sharp edges of `tags` where there are any.
-/// # Errors
-/// As [`fit`].
-pub fn layout_tagged(
     input: &TriMesh,
     tags: Option<&FeatureTags>,
     params: &LayoutParams,
@@ -202,7 +292,7 @@ pub fn layout_tagged(
         let network = draw(input, tags, &mesh, params, clock)?;
         Ok::<_, PipelineError>((mesh, repairs, network))
     };
-    let (mesh, repairs, network) = draft(&mut clock).map_err(|e| or_cancelled(e, observer))?;
+    let (mesh, repairs, network) = draft(&mut clock)?;
     let (mut quality, mut warnings) = (Quality::new(), Vec::new());
     quality::mesh_figures(&mesh, &network, &repairs, &mut quality, &mut warnings);
     quality::network_figures(&network, &mut quality);
@@ -220,21 +310,8 @@ pub fn refit(
     observer: &dyn PipelineObserver,
 ) -> Result<Vec<StageRecord>, PipelineError> {
     let mut clock = Clock::new(observer, &WEIGHTS);
-    surfaces(model, params, &mut clock).map_err(|e| or_cancelled(e, observer))?;
+    surfaces(model, params, &mut clock)?;
     Ok(clock.records)
-}
-
-/// Makes grids, surfaces, seams and reliefs of a model whose network or feature curves were edited, and measures it.
-///
-/// On an error the model is what it was.
-/// # Errors
-/// As [`fit`]; the network must part the whole mesh into four-sided patches.
-pub fn rework(
-    model: &mut Model,
-    params: &PipelineParams,
-    observer: &dyn PipelineObserver,
-) -> Result<Assessed, PipelineError> {
-    rework_from(model, None, params, observer)
 }
 
 /// What a model was before an edit, as far as its grids can be made from it.
@@ -253,13 +330,16 @@ impl Earlier {
     }
 }
 
-/// As [`rework`]; where an edit since `earlier` moved a few curves and nothing else, grids of the patches beside them
-/// follow ([`grid::follow`]) and all others are kept. `earlier` must have been made with the same grid parameters.
+/// Makes grids, surfaces, seams and reliefs of a model whose network or feature curves were edited, and measures it.
 ///
-/// If a grid that followed is folded or misses its patch by more than is allowed, all are made from nothing.
+/// * `earlier` - the model before the edit, made with the same grid parameters. Where the edit moved a few curves and nothing
+///   else, grids of the patches beside them follow ([`grid::follow`]) and all others are kept; if one that followed is folded
+///   or misses its patch by more than is allowed, all are made from nothing, as they are with `None`.
+///
+/// On an error the model is what it was.
 /// # Errors
-/// As [`fit`].
-pub fn rework_from(
+/// As [`fit`]; the network must part the whole mesh into four-sided patches.
+pub fn rework(
     model: &mut Model,
     earlier: Option<&Earlier>,
     params: &PipelineParams,
@@ -268,7 +348,7 @@ pub fn rework_from(
     let mut clock = Clock::new(observer, &WEIGHTS);
     let before =
         (std::mem::take(&mut model.grids), std::mem::take(&mut model.surfaces), std::mem::take(&mut model.reliefs));
-    let made = remade(model, earlier, params, &mut clock).map_err(|e| or_cancelled(e, observer));
+    let made = remade(model, earlier, params, &mut clock);
     if made.is_err() {
         (model.grids, model.surfaces, model.reliefs) = before;
     }
@@ -283,7 +363,7 @@ fn remade(
     clock: &mut Clock,
 ) -> Result<quality::Measured, PipelineError> {
     let (mesh, network) = (&model.mesh, &model.network);
-    let patches = clock.stage("imprint", |_| network::imprint(mesh, network), |p| [("patches", p.len())])?;
+    let patches = clock.stage("imprint", |o| network::imprint(mesh, network, o), |p| [("patches", p.len())])?;
     let drawn = (&model.sketch.features[..], &model.sketch.sections[..]);
     model.grids = clock.stage(
         "grids",
@@ -293,10 +373,7 @@ fn remade(
             {
                 return Ok(grids);
             }
-            match drawn {
-                ([], []) => Ok(grid::resample(mesh, network, &patches, &params.grid, o)?),
-                _ => Ok(grid::resample_with_features(mesh, network, &patches, drawn, &params.grid, o)?),
-            }
+            Ok(grid::resample(mesh, network, &patches, drawn, &params.grid, o)?)
         },
         |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;
@@ -352,25 +429,20 @@ pub struct Assessed {
 /// If the parts of the model do not belong together.
 pub fn assess(model: &Model, observer: &dyn PipelineObserver) -> Result<Assessed, PipelineError> {
     let mut clock = Clock::new(observer, &WEIGHTS);
-    let measured = measure(model, &mut clock).map_err(|e| or_cancelled(e, observer))?;
+    let measured = measure(model, &mut clock)?;
     let quality::Measured { quality, seams, warnings } = measured;
     Ok(Assessed { stages: clock.records, quality, seams, warnings })
 }
 
 fn measure(model: &Model, clock: &mut Clock) -> Result<quality::Measured, PipelineError> {
     let (mesh, network) = (&model.mesh, &model.network);
-    let patches = clock.stage("imprint", |_| network::imprint(mesh, network), |p| [("patches", p.len())])?;
+    let patches = clock.stage("imprint", |o| network::imprint(mesh, network, o), |p| [("patches", p.len())])?;
     let repairs = Repairs::default();
     clock.stage("measure", |o| quality::measure(model, &patches, &repairs, o), |m| [("seams", m.seams.len())])
 }
 
-/// A stage that was stopped fails with an error of its own; to the caller it is always the same.
-fn or_cancelled(error: PipelineError, observer: &dyn PipelineObserver) -> PipelineError {
-    if observer.cancelled() { PipelineError::Cancelled } else { error }
-}
-
 fn repair(input: &TriMesh, clock: &mut Clock) -> Result<(TriMesh, Repairs), PipelineError> {
-    Ok(clock.stage("repair", |_| mend::repair(input), |(mesh, _)| [("triangles", mesh.triangles.len())])?)
+    Ok(clock.stage("repair", |o| mend::repair(input, o), |(mesh, _)| [("triangles", mesh.triangles.len())])?)
 }
 
 fn draw(
@@ -382,7 +454,11 @@ fn draw(
 ) -> Result<Network, PipelineError> {
     let tagged = tags.map(|tags| tags.half_edges(input, mesh)).unwrap_or_default();
     let counts = |n: &Network| [("patches", n.patches.len())];
-    Ok(clock.stage("layout", |o| layout::layout_tagged(mesh, &tagged, params, o), counts)?)
+    Ok(clock.stage(
+        "layout",
+        |o| layout::layout(mesh, Known { sharp: &tagged, ..Known::default() }, params, o),
+        counts,
+    )?)
 }
 
 /// The stages from the grids to the reliefs.
@@ -405,13 +481,7 @@ fn surfaces(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Re
     symmetric(false, &mut smooth);
     let reliefs = clock.stage(
         "relief",
-        |_| {
-            grids
-                .par_iter()
-                .zip(&smooth)
-                .map(|(grid, surface)| relief::bake(grid, surface))
-                .collect::<Result<Vec<_>, _>>()
-        },
+        |o| relief::bake_network(grids, &smooth, o),
         |reliefs| [("texels", reliefs.iter().map(|r| r.vectors.len()).sum())],
     )?;
     (model.surfaces, model.reliefs) = (smooth, reliefs);

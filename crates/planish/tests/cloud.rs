@@ -479,5 +479,5 @@ fn a_cancelled_cleaning_ends_as_cancelled() {
         }
     }
     let result = cloud::clean(&Cloud::new(sphere(5000)), &CleanParams::default(), &Stop);
-    assert_eq!(result.unwrap_err(), CloudError::Cancelled);
+    assert_eq!(result.unwrap_err(), CloudError::Cancelled(planish::observe::Cancelled));
 }

@@ -7,7 +7,7 @@ use planish::edit::network::{EditError, Editor, Holds};
 use planish::edit::{ApplyError, Carry, Edit, Ground, apply};
 use planish::geom::Bvh;
 use planish::grid::{self, Family, FeatureCurve, FeatureError, GridParams, Sections, relax_with_features};
-use planish::layout::{LayoutParams, layout};
+use planish::layout::{Known, LayoutParams, layout};
 use planish::mesh::{Adjacency, FacePoint, TriMesh};
 use planish::model::{Drawing, HistoryEntry, Model};
 use planish::network::{CurveKind, Fault, Network, imprint};
@@ -54,7 +54,7 @@ fn the_boundary_of_a_sheet_with_four_corners_is_one_patch_and_without_corners_no
     let mesh = shapes::rectangle(2.0, 1.0, 20, 10);
     let network = one_patch(&mesh);
     assert_eq!((network.corners.len(), network.curves.len(), network.patches.len()), (4, 4, 1));
-    assert!(imprint(&mesh, &network).is_ok());
+    assert!(imprint(&mesh, &network, &Silent).is_ok());
     let bare = run(&mesh, Drawing::default(), &["{\"edit\":\"boundaries\"}"]).network;
     let adjacency = Adjacency::new(&mesh);
     let mut editor = Editor::new(&mesh, &adjacency, bare);
@@ -102,7 +102,7 @@ fn two_planes_cut_a_sphere_into_patches_and_faults_are_told_on_the_way() {
     let found = editor.diagnose();
     assert!(found.is_finished() && found.patches.len() == 6, "{found:?}");
     assert_eq!(editor.glance().patches, found.patches);
-    assert!(imprint(&mesh, &editor.network).is_ok());
+    assert!(imprint(&mesh, &editor.network, &Silent).is_ok());
 }
 
 #[test]
@@ -150,7 +150,8 @@ fn a_stroke_that_is_drawn_to_a_corner_beyond_a_curve_divides_the_curve_on_its_wa
 fn split_and_join_give_the_curve_back_and_deleting_takes_its_free_corners() {
     let mesh = shapes::sphere(1.0, 3);
     let adjacency = Adjacency::new(&mesh);
-    let network = layout(&mesh, &LayoutParams { patches: 8, ..LayoutParams::default() }, &Silent).unwrap();
+    let network =
+        layout(&mesh, Known::default(), &LayoutParams { patches: 8, ..LayoutParams::default() }, &Silent).unwrap();
     let mut editor = Editor::new(&mesh, &adjacency, network.clone());
     let before = editor.network.curves[3].points.iter().map(|p| p.position(&mesh)).collect::<Vec<_>>();
     let length = |p: &[DVec3]| p.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
@@ -180,7 +181,8 @@ fn dragging_a_corner_or_a_curve_of_a_layout_leaves_a_finished_network_and_the_re
     let mesh = shapes::sphere(1.0, 4);
     let adjacency = Adjacency::new(&mesh);
     let bvh = Bvh::new(&mesh);
-    let network = layout(&mesh, &LayoutParams { patches: 12, ..LayoutParams::default() }, &Silent).unwrap();
+    let network =
+        layout(&mesh, Known::default(), &LayoutParams { patches: 12, ..LayoutParams::default() }, &Silent).unwrap();
     let mut editor = Editor::new(&mesh, &adjacency, network.clone());
     let params = SnakeParams { fairness: 0.1, curvature: 1.0, ..SnakeParams::default() };
     let p = network.corners[2].place.position(&mesh);
@@ -237,7 +239,7 @@ fn regions_of_3_5_and_6_sides_are_split_into_four_sided_patches_and_neighbours_f
     }
     let found = editor.diagnose();
     assert!(found.is_finished(), "{:?}", found.faults);
-    assert!(imprint(&mesh, &editor.network).is_ok());
+    assert!(imprint(&mesh, &editor.network, &Silent).is_ok());
     assert!(matches!(editor.split_region(0, None), Err(EditError::NoSplit { sides: 4, .. })));
 }
 
@@ -260,7 +262,7 @@ fn the_rest_of_a_network_is_completed_around_curves_that_stay_within_a_millionth
     editor.complete(&LayoutParams { patches: 40, ..LayoutParams::default() }, &Silent).unwrap();
     let found = editor.diagnose();
     assert!(found.is_finished(), "{:?}", found.faults);
-    assert!(imprint(&mesh, &editor.network).is_ok());
+    assert!(imprint(&mesh, &editor.network, &Silent).is_ok());
     let all: Vec<DVec3> = editor.network.curves.iter().flat_map(|c| &c.points).map(|p| p.position(&mesh)).collect();
     for p in drawn.iter().flatten() {
         let away = all.iter().map(|q| q.distance(*p)).fold(f64::INFINITY, f64::min);
@@ -315,7 +317,7 @@ fn networks_completed_around_two_cuts_and_two_strokes_on_rough_meshes_are_finish
             let adjacency = Adjacency::new(mesh);
             let found = Editor::new(mesh, &adjacency, drawn.network.clone()).diagnose();
             assert!(found.is_finished(), "{name} {seed}: {:?}", found.faults);
-            assert!(imprint(mesh, &drawn.network).is_ok(), "{name} {seed}");
+            assert!(imprint(mesh, &drawn.network, &Silent).is_ok(), "{name} {seed}");
         }
     }
 }
@@ -362,7 +364,7 @@ fn distance_to(curve: &[DVec3], p: DVec3) -> f64 {
 fn grids_follow_1_to_4_feature_curves_of_both_families_exactly_without_a_fold() {
     for (u, v) in [(1, 0), (0, 1), (1, 1), (2, 2), (3, 2), (4, 4)] {
         let (mesh, network, features) = bumpy(u, v);
-        let patches = imprint(&mesh, &network).unwrap();
+        let patches = imprint(&mesh, &network, &Silent).unwrap();
         let made = relax_with_features(
             &mesh,
             &patches[0],
@@ -411,7 +413,7 @@ fn grids_follow_1_to_4_feature_curves_of_both_families_exactly_without_a_fold() 
 #[test]
 fn a_section_is_refined_alone_and_curves_of_one_family_that_cross_are_refused_with_the_place() {
     let (mesh, network, mut features) = bumpy(1, 2);
-    let patches = imprint(&mesh, &network).unwrap();
+    let patches = imprint(&mesh, &network, &Silent).unwrap();
     let run = |features: &[FeatureCurve], sections: &Sections| {
         relax_with_features(&mesh, &patches[0], features, (41, 31), sections, &GridParams::default(), &Silent)
     };
@@ -444,10 +446,10 @@ fn a_section_is_refined_alone_and_curves_of_one_family_that_cross_are_refused_wi
 fn patches_beside_a_feature_curve_share_its_nodes_and_the_model_has_no_gaps() {
     let mesh = shapes::torus(2.0, 0.7, 72, 36);
     let params = PipelineParams { layout: LayoutParams { patches: 16, ..Default::default() }, ..Default::default() };
-    let fitted = pipeline::fit(&mesh, None, &params, &Silent).unwrap();
+    let fitted = pipeline::fit(&mesh, None, None, &params, &Silent).unwrap();
     let mut model: Model = fitted.model;
     let bvh = Bvh::new(&model.mesh);
-    let patches = imprint(&model.mesh, &model.network).unwrap();
+    let patches = imprint(&model.mesh, &model.network, &Silent).unwrap();
     // Across the first patch, at a third of one side and a half of the other.
     let at = |k: usize, share: f64| {
         let chain = &patches[0].sides[k];
@@ -458,7 +460,7 @@ fn patches_beside_a_feature_curve_share_its_nodes_and_the_model_has_no_gaps() {
     let mut edited = model.drawing();
     edited.sketch.features.push(FeatureCurve { patch: 0, family: Family::V, points });
     model.record(HistoryEntry { command: "feature".into(), parameters: "{}".into() }, edited);
-    let told = pipeline::rework(&mut model, &params, &Silent).unwrap();
+    let told = pipeline::rework(&mut model, None, &params, &Silent).unwrap();
     assert_eq!(grid::measure(&model.grids[0], &patches[0]).folds, 0);
     let uses = model.network.uses();
     let side = |p: u32, k: u8| -> Vec<DVec3> {
@@ -485,16 +487,17 @@ fn patches_beside_a_feature_curve_share_its_nodes_and_the_model_has_no_gaps() {
     let with = model.clone();
     assert!(model.undo() && model.sketch.features.is_empty() && model.grids.is_empty());
     assert!(model.redo());
-    pipeline::rework(&mut model, &params, &Silent).unwrap();
+    pipeline::rework(&mut model, None, &params, &Silent).unwrap();
     assert_eq!(model, with);
 }
 
 #[test]
 fn slanted_feature_curves_of_both_families_on_a_torus_leave_no_fold_in_their_patch() {
     let mesh = shapes::torus(2.0, 0.7, 72, 36);
-    let network = layout(&mesh, &LayoutParams { patches: 16, ..Default::default() }, &Silent).unwrap();
+    let network =
+        layout(&mesh, Known::default(), &LayoutParams { patches: 16, ..Default::default() }, &Silent).unwrap();
     let bvh = Bvh::new(&mesh);
-    let patches = imprint(&mesh, &network).unwrap();
+    let patches = imprint(&mesh, &network, &Silent).unwrap();
     for patch in [0, 5] {
         for (family, sides) in [(Family::V, [0, 2]), (Family::U, [3, 1])] {
             for shares in [[0.33, 0.5], [0.25, 0.4], [0.7, 0.6]] {
@@ -507,7 +510,7 @@ fn slanted_feature_curves_of_both_families_on_a_torus_leave_no_fold_in_their_pat
                 let features = [FeatureCurve { patch: patch as u32, family, points }];
                 let drawn = (&features[..], &[][..]);
                 let params = GridParams::default();
-                let grids = grid::resample_with_features(&mesh, &network, &patches, drawn, &params, &Silent).unwrap();
+                let grids = grid::resample(&mesh, &network, &patches, drawn, &params, &Silent).unwrap();
                 let folds: Vec<usize> = grids.iter().zip(&patches).map(|(g, p)| grid::measure(g, p).folds).collect();
                 assert_eq!(folds[patch], 0, "{patch} {family:?} {shares:?} {folds:?}");
             }
@@ -520,7 +523,7 @@ fn points_slide_along_feature_curves_so_that_iso_curves_cross_them_with_half_the
     // A flat patch whose middle v curve leans: nodes at even distances on it would bend the rows.
     let mesh = shapes::rectangle(2.0, 1.0, 60, 30);
     let network = one_patch(&mesh);
-    let patches = imprint(&mesh, &network).unwrap();
+    let patches = imprint(&mesh, &network, &Silent).unwrap();
     let bvh = Bvh::new(&mesh);
     let low = mesh.bounds().min;
     // An S: dense to one side below, to the other above.
@@ -573,7 +576,7 @@ fn fits_on_both_sides_of_a_plane_of_symmetry_are_exact_mirror_images_and_bend_no
     );
     let plane = start.sketch.symmetry.unwrap();
     let mut model = Model { mesh: mesh.clone(), network: start.network, sketch: start.sketch, ..Model::default() };
-    let told = pipeline::rework(&mut model, &PipelineParams::default(), &Silent).unwrap();
+    let told = pipeline::rework(&mut model, None, &PipelineParams::default(), &Silent).unwrap();
     let count = model.surfaces.len();
     assert!(count >= 12 && count.is_multiple_of(2), "{count}");
     // Every set of control points is the image of another, to the last bits.
@@ -593,7 +596,7 @@ fn fits_on_both_sides_of_a_plane_of_symmetry_are_exact_mirror_images_and_bend_no
     assert!(told.quality["relief.rounding_max_rel"].value() < 1e-12);
     // Seams in the plane bend no more than those of free fits and half a degree.
     let mut free = Model { sketch: Default::default(), ..model.clone() };
-    let unmirrored = pipeline::rework(&mut free, &PipelineParams::default(), &Silent).unwrap();
+    let unmirrored = pipeline::rework(&mut free, None, &PipelineParams::default(), &Silent).unwrap();
     let in_plane = |c: u32| {
         model.network.curves[c as usize].points.iter().all(|p| plane.height(p.position(&mesh)).abs() < 2e-3 * 2.0)
     };
@@ -641,7 +644,8 @@ fn a_half_drawn_network_is_mirrored_across_the_plane_of_symmetry() {
 #[test]
 fn a_network_is_carried_to_another_shape_of_its_class_and_stays_finished() {
     let from = shapes::sphere(1.0, 4);
-    let network = layout(&from, &LayoutParams { patches: 10, ..LayoutParams::default() }, &Silent).unwrap();
+    let network =
+        layout(&from, Known::default(), &LayoutParams { patches: 10, ..LayoutParams::default() }, &Silent).unwrap();
     let mut to = shapes::sphere(1.0, 5);
     let bend = |p: DVec3| DVec3::new(1.4 * p.x, 0.9 * p.y, p.z + 0.25 * p.x * p.x);
     to.points.iter_mut().for_each(|p| *p = bend(*p));
@@ -662,7 +666,7 @@ fn a_network_is_carried_to_another_shape_of_its_class_and_stays_finished() {
     };
     apply(&mut drawing, &edit, &ground, &others, &Silent).unwrap();
     assert_eq!(drawing.network.patches.len(), network.patches.len());
-    assert!(imprint(&to, &drawing.network).is_ok());
+    assert!(imprint(&to, &drawing.network, &Silent).is_ok());
     let missing = Edit::Carry(Carry { from: "nothing".into(), landmarks: Vec::new() });
     let before = drawing.clone();
     assert!(apply(&mut drawing, &missing, &ground, &others, &Silent).unwrap_err().to_string().contains("nothing"));
@@ -719,7 +723,7 @@ fn a_seam_over_a_crease_of_23_degrees_is_sharp_or_smooth_as_it_is_told() {
     let angle = |drawing: &Drawing| {
         let (mesh, network) = (mesh.clone(), drawing.network.clone());
         let mut model = Model { mesh, network, ..Model::default() };
-        let made = pipeline::rework(&mut model, &PipelineParams::default(), &Silent).unwrap();
+        let made = pipeline::rework(&mut model, None, &PipelineParams::default(), &Silent).unwrap();
         assert_eq!(made.seams.len(), 1);
         (made.seams[0].kind, made.seams[0].angle_mean_deg)
     };

@@ -55,7 +55,7 @@ fn reach(at: &[DVec3]) -> [f64; 2] {
 
 /// The grid of the patch follows all feature curves.
 fn is_followed(mesh: &TriMesh, drawing: &Drawing) {
-    let patch = imprint(mesh, &drawing.network).unwrap().remove(0);
+    let patch = imprint(mesh, &drawing.network, &Silent).unwrap().remove(0);
     let (features, params) = (&drawing.sketch.features, GridParams::default());
     let made = relax_with_features(mesh, &patch, features, (41, 21), &Sections::default(), &params, &Silent).unwrap();
     for k in 0..features.len() {

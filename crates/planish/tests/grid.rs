@@ -243,7 +243,7 @@ fn cancelling_inside_a_patch_of_200_k_vertices_returns_within_a_second() {
         let observer = Impatient { start: Instant::now(), ..observer };
         let result = relax(&big.input, &patches, &[(450, 450)], &GridParams::default(), &observer);
         let late = observer.start.elapsed().saturating_sub(patience);
-        assert_eq!(result.unwrap_err(), GridError::Cancelled);
+        assert_eq!(result.unwrap_err(), GridError::Cancelled(planish::observe::Cancelled));
         assert!(observer.asked.load(Ordering::Relaxed) > 0);
         assert!(late < Duration::from_secs(1), "{late:?}");
     }

@@ -91,7 +91,7 @@ fn diagnosis_agrees_with_the_table_of_the_data_set() {
         assert_eq!((d.euler, d.boundary_loops, d.degenerate_faces), (euler, loops, degenerate), "{name}");
         assert_eq!((d.non_manifold_edges, d.non_manifold_vertices, d.duplicate_faces), (0, 0, 0), "{name}");
         assert_eq!(d.unreferenced_vertices, if name == "bunny.ply" { 1_113 } else { 0 }, "{name}");
-        let (mended, repairs) = repair(&mesh).unwrap();
+        let (mended, repairs) = repair(&mesh, &Silent).unwrap();
         assert_sound(&mended, name);
         if watertight {
             assert!(!repairs.any(), "{name}: {repairs:?}");
@@ -119,7 +119,7 @@ fn repair_leaves_sound_meshes_as_they_are() {
     let closed = common::closed_meshes().into_iter().map(|(name, mesh, _)| (name, mesh));
     let open = common::open_meshes().into_iter().map(|(name, mesh, _)| (name, mesh));
     for (name, mesh) in closed.chain(open) {
-        let (mended, repairs) = repair(&mesh).unwrap();
+        let (mended, repairs) = repair(&mesh, &Silent).unwrap();
         assert_eq!(mended, mesh, "{name}");
         assert!(!repairs.any(), "{name}");
     }
@@ -139,7 +139,7 @@ fn repair_makes_a_sphere_of_a_soup_with_flips_duplicates_and_stray_vertices_and_
     soup.triangles.push(soup.triangles[5]);
     let values = soup.points.iter().flat_map(|p| p.to_array().map(|x| x as f32)).collect();
     soup.attributes.push(Attribute { name: "color".into(), width: 3, values });
-    let (mended, repairs) = repair(&soup).unwrap();
+    let (mended, repairs) = repair(&soup, &Silent).unwrap();
     let d = diagnose(&mended);
     assert_eq!((d.watertight, d.vertices, d.triangles, d.genus), (true, 162, 320, Some(0)));
     assert!(d.volume.unwrap() > 3.9, "{:?}", d.volume);
@@ -156,12 +156,12 @@ fn repair_turns_a_closed_piece_that_is_inside_out_but_keeps_a_void() {
     let inner = shapes::sphere(0.5, 2);
     mesh.points.extend(&inner.points);
     mesh.triangles.extend(inner.triangles.iter().map(|t| [t[0] + n, t[2] + n, t[1] + n]));
-    let (kept, repairs) = repair(&mesh).unwrap();
+    let (kept, repairs) = repair(&mesh, &Silent).unwrap();
     assert_eq!((kept, repairs.turned_components), (mesh.clone(), 0));
     for p in &mut mesh.points[n as usize..] {
         p.x += 3.0;
     }
-    let (turned, repairs) = repair(&mesh).unwrap();
+    let (turned, repairs) = repair(&mesh, &Silent).unwrap();
     assert_eq!(repairs.turned_components, 1);
     assert_eq!(diagnose(&turned).inverted_components, 0);
 }
@@ -172,7 +172,7 @@ fn repair_cuts_three_sheets_at_one_edge_a_moebius_band_and_two_cones_at_one_apex
         [[0., 0., 0.], [0., 0., 1.], [1., 0., 0.], [-1., 0.2, 0.], [0., 1., 0.]].map(DVec3::from_array).to_vec(),
         vec![[0, 1, 2], [0, 1, 3], [1, 0, 4]],
     );
-    let (mended, repairs) = repair(&book).unwrap();
+    let (mended, repairs) = repair(&book, &Silent).unwrap();
     assert_eq!((repairs.cut_edges, mended.points.len()), (1, 9));
     assert_sound(&mended, "book");
 
@@ -190,7 +190,7 @@ fn repair_cuts_three_sheets_at_one_edge_a_moebius_band_and_two_cones_at_one_apex
         }
     }
     assert_eq!(diagnose(&band).genus, None);
-    let (mended, repairs) = repair(&band).unwrap();
+    let (mended, repairs) = repair(&band, &Silent).unwrap();
     assert!(repairs.one_sided_edges >= 2);
     assert_sound(&mended, "band");
     assert_eq!(mended.triangles.len(), band.triangles.len());
@@ -201,7 +201,7 @@ fn repair_cuts_three_sheets_at_one_edge_a_moebius_band_and_two_cones_at_one_apex
             .to_vec(),
         vec![[0, 1, 2], [0, 2, 3], [0, 5, 4]],
     );
-    let (mended, repairs) = repair(&cones).unwrap();
+    let (mended, repairs) = repair(&cones, &Silent).unwrap();
     assert_eq!((repairs.split_vertices, mended.points.len()), (1, 7));
     assert_sound(&mended, "cones");
 }
@@ -216,7 +216,7 @@ fn repair_removes_triangles_without_height_and_leaves_no_hole() {
     mesh.triangles[20] = [m, b, c];
     mesh.triangles.extend([[a, m, c], [a, b, m]]);
     assert_eq!((diagnose(&mesh).watertight, diagnose(&mesh).degenerate_faces), (true, 1));
-    let (mended, repairs) = repair(&mesh).unwrap();
+    let (mended, repairs) = repair(&mesh, &Silent).unwrap();
     let d = diagnose(&mended);
     assert_eq!((d.watertight, d.degenerate_faces, repairs.degenerate_left), (true, 0, 0), "{repairs:?}");
     assert_eq!(repairs.flipped_edges, 1);
@@ -234,7 +234,7 @@ fn repair_removes_triangles_without_height_and_leaves_no_hole() {
     mesh.triangles[g as usize / 3] = [b, twin, d];
     mesh.triangles.extend([[a, twin, c], [twin, a, d]]);
     assert!(diagnose(&mesh).watertight);
-    let (mended, repairs) = repair(&mesh).unwrap();
+    let (mended, repairs) = repair(&mesh, &Silent).unwrap();
     assert_eq!((repairs.collapsed_edges, repairs.degenerate_left), (1, 0));
     assert_eq!((mended.triangles.len(), diagnose(&mended).genus), (320, Some(0)));
 }
@@ -246,7 +246,7 @@ fn repair_leaves_a_two_sided_sheet_open() {
     let n = both.points.len() as u32;
     both.points.extend(&front.points);
     both.triangles.extend(front.triangles.iter().map(|t| [t[0] + n, t[2] + n, t[1] + n]));
-    let (mended, repairs) = repair(&both).unwrap();
+    let (mended, repairs) = repair(&both, &Silent).unwrap();
     assert_eq!((repairs.welded_vertices, diagnose(&mended).components), (0, 2));
 }
 
@@ -263,13 +263,13 @@ fn repair_welds_a_crack_whose_triangles_are_slivers() {
     sheet.points[5].x = -1e-7;
     sheet.points[4].z = 1e-3;
     sheet.points[5].z = 1e-3;
-    let whole = repair(&sheet).unwrap().0;
+    let whole = repair(&sheet, &Silent).unwrap().0;
     let n = sheet.points.len() as u32;
     let ends = [sheet.points[0], sheet.points[1]];
     sheet.points.extend(ends);
     sheet.triangles[2] = [n, n + 1, 5];
     sheet.triangles[3] = [n, 5, 3];
-    let (mended, repairs) = repair(&sheet).unwrap();
+    let (mended, repairs) = repair(&sheet, &Silent).unwrap();
     assert_eq!((repairs.welded_vertices, mended.triangles.len()), (2, whole.triangles.len()));
     assert_eq!(diagnose(&mended).boundary_loops, 1);
 }
@@ -281,14 +281,14 @@ fn repair_closes_holes_that_are_less_than_a_hundredth_of_the_diagonal_around() {
     let edge = mesh.points[0].distance(mesh.points[mesh.triangles[0][1] as usize]);
     let around = 3.0 * edge / mesh.bounds().diagonal();
     assert!(around > 0.05);
-    let (mended, repairs) = repair(&mesh).unwrap();
+    let (mended, repairs) = repair(&mesh, &Silent).unwrap();
     assert_eq!((repairs.closed_holes, diagnose(&mended).boundary_loops), (0, 1));
     // The same beside something large.
     let n = mesh.points.len() as u32;
     let large = shapes::sphere(30.0, 2);
     mesh.points.extend(large.points.iter().map(|&p| p + DVec3::X * 40.0));
     mesh.triangles.extend(large.triangles.iter().map(|t| t.map(|v| v + n)));
-    let (mended, repairs) = repair(&mesh).unwrap();
+    let (mended, repairs) = repair(&mesh, &Silent).unwrap();
     assert_eq!((repairs.closed_holes, diagnose(&mended).boundary_loops), (1, 0));
     assert_eq!(mended.triangles.len(), mesh.triangles.len() + 1);
 }
@@ -297,13 +297,13 @@ fn repair_closes_holes_that_are_less_than_a_hundredth_of_the_diagonal_around() {
 fn repair_tells_missing_vertices_infinite_ones_and_nothing() {
     let mut mesh = shapes::sphere(1.0, 0);
     mesh.triangles[3][1] = 99;
-    assert_eq!(repair(&mesh).unwrap_err(), MeshError::BadIndex { triangle: 3, vertex: 99, count: 12 });
+    assert_eq!(repair(&mesh, &Silent).unwrap_err(), MeshError::BadIndex { triangle: 3, vertex: 99, count: 12 });
     assert_eq!(diagnose(&mesh).bad_indices, 1);
     let mut mesh = shapes::sphere(1.0, 0);
     mesh.points[4].y = f64::NAN;
-    assert_eq!(repair(&mesh).unwrap_err(), MeshError::NotFinite { vertex: 4 });
+    assert_eq!(repair(&mesh, &Silent).unwrap_err(), MeshError::NotFinite { vertex: 4 });
     assert_eq!(diagnose(&mesh).non_finite_vertices, 1);
-    assert_eq!(repair(&TriMesh::default()).unwrap_err(), MeshError::Empty);
+    assert_eq!(repair(&TriMesh::default(), &Silent).unwrap_err(), MeshError::Empty);
     assert_eq!(diagnose(&TriMesh::default()).components, 0);
 }
 
@@ -316,9 +316,9 @@ proptest! {
         let points = (0..9).map(|k| DVec3::new(random::unit(1, 3 * k), random::unit(1, 3 * k + 1), random::unit(1, 3 * k + 2)));
         let soup = TriMesh::new(points.collect(), triangles);
         diagnose(&soup);
-        if let Ok((mended, _)) = repair(&soup) {
+        if let Ok((mended, _)) = repair(&soup, &Silent) {
             assert_sound(&mended, "soup");
-            assert_sound(&repair(&mended).unwrap().0, "soup again");
+            assert_sound(&repair(&mended, &Silent).unwrap().0, "soup again");
         }
     }
 }
@@ -693,7 +693,7 @@ fn line_errors(mesh: &TriMesh, tags: &FeatureTags) -> (f64, f64) {
 fn lines_of_a_scanned_cube_come_three_times_as_near_and_their_angles_within_a_third() {
     let (mut mesh, mut tags, scale) = scanned_cube();
     let before = line_errors(&mesh, &tags);
-    let moved = fair_lines(&mut mesh, &mut tags, &scale);
+    let moved = fair_lines(&mut mesh, &mut tags, &scale, &Silent);
     let after = line_errors(&mesh, &tags);
     assert!(moved > 1000, "{moved} moved");
     assert!(after.0 < before.0 / 3.0, "lines off by {before:?} before, {after:?} after");
@@ -707,11 +707,11 @@ fn lines_of_an_exact_cube_stay_where_they_are_within_1e_9() {
     let (_, mut tags, scale) = scanned_cube();
     let exact = shapes::cuboid(DVec3::ONE, 32);
     let mut mesh = exact.clone();
-    fair_lines(&mut mesh, &mut tags, &scale);
+    fair_lines(&mut mesh, &mut tags, &scale, &Silent);
     let most = exact.points.iter().zip(&mesh.points).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
     assert!(most < 1e-9, "{most:e}");
     // Nothing is known of a mesh that was not scanned.
-    assert_eq!(fair_lines(&mut mesh, &mut tags, &ScanScale { noise: 0.0, ..scale }), 0);
+    assert_eq!(fair_lines(&mut mesh, &mut tags, &ScanScale { noise: 0.0, ..scale }, &Silent), 0);
 }
 
 /// The cube with the edge at x = y = 1/2 rounded by two cells, off by a third of the noise as the other edges are; the tags are
@@ -740,7 +740,7 @@ fn a_rounded_edge_is_no_line_and_becomes_smooth_while_the_other_eleven_stay() {
         (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
     };
     let (before, was) = (rms(&mesh), tags.edges.len());
-    fair_lines(&mut mesh, &mut tags, &scale);
+    fair_lines(&mut mesh, &mut tags, &scale, &Silent);
     let on_rounding = |e: &&[u32; 2]| e.iter().all(|&v| off(mesh.points[v as usize]).is_some());
     assert_eq!(tags.edges.iter().filter(on_rounding).count(), 0);
     assert!(tags.edges.len() > was * 10 / 12, "{} of {was} edges", tags.edges.len());
@@ -752,7 +752,7 @@ fn lines_are_faired_to_the_bit_on_1_and_4_threads() {
     let run = |threads| {
         let (mut mesh, mut tags, scale) = scanned_cube();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| fair_lines(&mut mesh, &mut tags, &scale));
+        pool.install(|| fair_lines(&mut mesh, &mut tags, &scale, &Silent));
         mesh
     };
     assert_eq!(run(1), run(4));

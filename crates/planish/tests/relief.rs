@@ -93,7 +93,7 @@ fn a_side_collapsed_to_a_point_still_round_trips_and_has_an_orthonormal_frame() 
 fn displaced_rows_agree_across_every_seam_within_1e_14() {
     let work = cube(33, CurveKind::Smooth, blob);
     let (surfaces, reliefs) = fitted(&work, 7);
-    let mesh = relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap();
+    let mesh = relief::displaced_mesh(&work.network, &surfaces, &reliefs, &Silent).unwrap();
     // Every displaced node of every patch has a vertex of the welded mesh at its place.
     for (s, r) in surfaces.iter().zip(&reliefs) {
         for p in relief::displace(s, r).unwrap() {
@@ -112,11 +112,12 @@ fn closed_networks_give_closed_meshes_with_euler_number_2_or_0() {
         (purse(16), 2),
     ] {
         let (surfaces, reliefs) = fitted(&work, 5);
-        let mesh = relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap();
+        let mesh = relief::displaced_mesh(&work.network, &surfaces, &reliefs, &Silent).unwrap();
         assert_eq!(topology(&mesh), (euler, 0));
         let adjacency = Adjacency::new(&mesh);
         assert!(adjacency.opposite.iter().all(|&h| h != NONE));
-        let smooth = relief::surface_mesh(&work.network, &surfaces, &relief::span_shapes(&surfaces, 4)).unwrap();
+        let smooth =
+            relief::surface_mesh(&work.network, &surfaces, &relief::span_shapes(&surfaces, 4), &Silent).unwrap();
         assert_eq!(topology(&smooth), (euler, 0));
     }
 }
@@ -125,7 +126,7 @@ fn closed_networks_give_closed_meshes_with_euler_number_2_or_0() {
 fn open_networks_keep_their_boundary_and_have_euler_number_1_or_0() {
     for (work, euler) in [(wavy([9, 12]), 1), (tube([24, 10]), 0)] {
         let (surfaces, reliefs) = fitted(&work, 5);
-        let mesh = relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap();
+        let mesh = relief::displaced_mesh(&work.network, &surfaces, &reliefs, &Silent).unwrap();
         let (found, open) = topology(&mesh);
         assert_eq!(found, euler);
         assert!(open > 0);
@@ -136,7 +137,7 @@ fn open_networks_keep_their_boundary_and_have_euler_number_1_or_0() {
 fn a_cube_of_side_2_has_volume_8_within_1e_12() {
     let work = cube(9, CurveKind::Feature, |p| p);
     let (surfaces, reliefs) = fitted(&work, 5);
-    let mesh = relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap();
+    let mesh = relief::displaced_mesh(&work.network, &surfaces, &reliefs, &Silent).unwrap();
     assert!((volume(&mesh) - 8.0).abs() < 1e-12);
 }
 
@@ -164,9 +165,9 @@ fn a_patch_mesh_puts_its_nodes_on_texel_centres() {
 fn lists_that_do_not_fit_are_errors() {
     let work = torus(9);
     let (surfaces, mut reliefs) = fitted(&work, 5);
-    assert!(relief::displaced_mesh(&work.network, &surfaces[1..], &reliefs).is_err());
+    assert!(relief::displaced_mesh(&work.network, &surfaces[1..], &reliefs, &Silent).is_err());
     reliefs[3].vectors.pop();
-    let error = relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap_err();
+    let error = relief::displaced_mesh(&work.network, &surfaces, &reliefs, &Silent).unwrap_err();
     assert!(error.to_string().contains("patch 3"), "{error}");
     let mut broken = surfaces[0].clone();
     broken.control.pop();
@@ -180,7 +181,7 @@ fn displaced_mesh_is_the_same_to_the_bit_on_1_and_4_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let (surfaces, reliefs) = fitted(&work, 8);
-            relief::displaced_mesh(&work.network, &surfaces, &reliefs).unwrap()
+            relief::displaced_mesh(&work.network, &surfaces, &reliefs, &Silent).unwrap()
         })
     };
     assert_eq!(run(1), run(4));

@@ -7,7 +7,7 @@ use planish::curve::SnakeParams;
 use planish::edit::network::{Editor, Holds};
 use planish::edit::{Ground, apply};
 use planish::grid::{self, Grid, GridParams};
-use planish::layout::{LayoutParams, layout};
+use planish::layout::{Known, LayoutParams, layout};
 use planish::mesh::{Adjacency, TriMesh};
 use planish::model::{Drawing, Model};
 use planish::network::{CurveKind, Network, PatchMesh, changed_patches, imprint, reimprint};
@@ -24,7 +24,8 @@ fn edited(share: f64) -> (TriMesh, Adjacency, Network, Network, u32) {
         *p *= 1.0 + 0.05 * (5.0 * p.x).sin() * (4.0 * p.y).cos() + 0.01 * (23.0 * p.z + 11.0 * p.x).sin();
     }
     let adjacency = Adjacency::new(&mesh);
-    let before = layout(&mesh, &LayoutParams { patches: 24, ..LayoutParams::default() }, &Silent).unwrap();
+    let before =
+        layout(&mesh, Known::default(), &LayoutParams { patches: 24, ..LayoutParams::default() }, &Silent).unwrap();
     let length = |c: usize| {
         let at: Vec<DVec3> = before.curves[c].points.iter().map(|p| p.position(&mesh)).collect();
         at.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>()
@@ -44,13 +45,13 @@ fn edited(share: f64) -> (TriMesh, Adjacency, Network, Network, u32) {
 #[test]
 fn patches_cut_anew_beside_a_dragged_curve_are_those_of_the_whole_mesh_bit_for_bit() {
     let (mesh, adjacency, before, after, curve) = edited(0.08);
-    let old = imprint(&mesh, &before).unwrap();
+    let old = imprint(&mesh, &before, &Silent).unwrap();
     let which = changed_patches(&before, &after).expect("the same network");
     assert_eq!(which.len(), 2);
     assert!(which.iter().all(|&p| after.patches[p].sides.iter().any(|s| s.curve == curve)));
     let near: Vec<&PatchMesh> = which.iter().map(|&p| &old[p]).collect();
-    let made = reimprint(&mesh, &adjacency, &after, &near, &which).unwrap();
-    let whole = imprint(&mesh, &after).unwrap();
+    let made = reimprint(&mesh, &adjacency, &after, &near, &which, &Silent).unwrap();
+    let whole = imprint(&mesh, &after, &Silent).unwrap();
     for (&p, one) in which.iter().zip(&made) {
         assert_eq!(one.mesh, whole[p].mesh);
         assert_eq!(
@@ -60,7 +61,7 @@ fn patches_cut_anew_beside_a_dragged_curve_are_those_of_the_whole_mesh_bit_for_b
     }
     // Told patches that do not hold the new curve, it cuts the whole mesh and says the same.
     let far = (0..old.len()).find(|p| !which.contains(p)).unwrap();
-    let made = reimprint(&mesh, &adjacency, &after, &[&old[far]], &which).unwrap();
+    let made = reimprint(&mesh, &adjacency, &after, &[&old[far]], &which, &Silent).unwrap();
     assert!(which.iter().zip(&made).all(|(&p, one)| one.mesh == whole[p].mesh));
     // Another curve more is another network.
     let mut split = Editor::new(&mesh, &adjacency, after.clone());
@@ -72,11 +73,11 @@ fn patches_cut_anew_beside_a_dragged_curve_are_those_of_the_whole_mesh_bit_for_b
 /// Grids before an edit, and after it made from nothing and by following.
 fn both(share: f64, threads: usize) -> (TriMesh, Vec<PatchMesh>, Vec<Grid>, Vec<Grid>) {
     let (mesh, _, before, after, _) = edited(share);
-    let old = imprint(&mesh, &before).unwrap();
+    let old = imprint(&mesh, &before, &Silent).unwrap();
     let params = GridParams::default();
     let sizes = grid::choose_sizes(&before, &old, &params);
     let which = changed_patches(&before, &after).unwrap();
-    let whole = imprint(&mesh, &after).unwrap();
+    let whole = imprint(&mesh, &after, &Silent).unwrap();
     let pick = |list: &[PatchMesh]| -> Vec<PatchMesh> { which.iter().map(|&p| list[p].clone()).collect() };
     let (old, new) = (pick(&old), pick(&whole));
     let sizes: Vec<_> = which.iter().map(|&p| sizes[p]).collect();
@@ -135,7 +136,7 @@ fn a_grid_of_a_patch_that_grew_by_a_third_is_made_from_nothing() {
         };
         let edits =
             [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0), r#"{"edit":"boundaries"}"#.into()];
-        imprint(mesh, &drawn(mesh, &edits).network).unwrap()
+        imprint(mesh, &drawn(mesh, &edits).network, &Silent).unwrap()
     };
     let (small, large) = (sheet(1.0), sheet(1.33));
     let params = GridParams::default();
@@ -165,10 +166,10 @@ fn surfaces_beside_a_dragged_curve_are_fitted_on_the_seams_of_all_others_bit_for
     let (mesh, _, before, after, curve) = edited(0.05);
     let params = PipelineParams::default();
     let mut model = Model { mesh: mesh.clone(), network: before.clone(), ..Model::default() };
-    pipeline::rework(&mut model, &params, &Silent).unwrap();
+    pipeline::rework(&mut model, None, &params, &Silent).unwrap();
     let earlier = Earlier::of(&model).expect("grids");
     let which = changed_patches(&before, &after).unwrap();
-    let patches = imprint(&mesh, &after).unwrap();
+    let patches = imprint(&mesh, &after, &Silent).unwrap();
     let some: Vec<PatchMesh> = which.iter().map(|&p| patches[p].clone()).collect();
     let old: Vec<Grid> = which.iter().map(|&p| model.grids[p].clone()).collect();
     let mut grids = model.grids.clone();
@@ -179,7 +180,7 @@ fn surfaces_beside_a_dragged_curve_are_fitted_on_the_seams_of_all_others_bit_for
     assert_eq!(made.iter().map(|m| m.0).collect::<Vec<_>>(), which);
     let mut surfaces = model.surfaces.clone();
     made.into_iter().for_each(|(p, s)| surfaces[p] = s);
-    let seams = surface::measure_seams(&after, &surfaces);
+    let seams = surface::measure_seams(&after, &surfaces, &Silent).unwrap();
     assert!(seams.iter().all(|s| s.gap_max < 1e-14));
     // As near to the new grids as surfaces were to the old ones, and half as much again.
     for &p in &which {
@@ -191,9 +192,9 @@ fn surfaces_beside_a_dragged_curve_are_fitted_on_the_seams_of_all_others_bit_for
     let kept = model.grids.clone();
     model.network = after;
     let mut cold = model.clone();
-    let warm = pipeline::rework_from(&mut model, Some(&earlier), &params, &Silent).unwrap();
+    let warm = pipeline::rework(&mut model, Some(&earlier), &params, &Silent).unwrap();
     assert!((0..kept.len()).all(|p| (model.grids[p] == kept[p]) != which.contains(&p)));
-    let from_nothing = pipeline::rework(&mut cold, &params, &Silent).unwrap();
+    let from_nothing = pipeline::rework(&mut cold, None, &params, &Silent).unwrap();
     for key in ["displaced.rms", "seam.gap_max", "grid.folds"] {
         let (a, b) = (warm.quality[key].value(), from_nothing.quality[key].value());
         assert!(a <= 1.2 * b + 1e-12, "{key}: {a} {b}");
@@ -238,7 +239,7 @@ fn patches_and_curves_across_the_plane_of_symmetry_become_their_own_images() {
         let first = drawn(&mesh, &edits);
         // The family that the numbers of the sides ask for is not known beforehand.
         let mut fitting = first.clone();
-        let patches = imprint(&mesh, &first.network).unwrap();
+        let patches = imprint(&mesh, &first.network, &Silent).unwrap();
         for f in &mut fitting.sketch.features {
             let sides = &patches[f.patch as usize].sides;
             let at = |p: &planish::mesh::FacePoint| p.position(&mesh);
@@ -280,7 +281,7 @@ fn patches_and_curves_across_the_plane_of_symmetry_become_their_own_images() {
         sketch: mirrored.sketch.clone(),
         ..Model::default()
     };
-    let told = pipeline::rework(&mut model, &PipelineParams::default(), &Silent).unwrap();
+    let told = pipeline::rework(&mut model, None, &PipelineParams::default(), &Silent).unwrap();
     assert!(told.quality["seam.gap_max"].value() < 1e-14 * mesh.bounds().diagonal());
     assert!(told.quality["relief.rounding_max_rel"].value() < 1e-12);
     let own: Vec<usize> = (0..6)

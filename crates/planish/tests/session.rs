@@ -71,7 +71,7 @@ fn three_great_circles_divide_each_other_at_6_corners_and_their_8_triangles_spli
     assert!(found.is_finished(), "{:?}", found.faults);
     // A triangle with a corner in one side is a patch: two triangles across from each other are split, six are not.
     assert_eq!(found.patches.len(), 12);
-    assert_eq!(imprint(&mesh, &drawing.network).unwrap().len(), found.patches.len());
+    assert_eq!(imprint(&mesh, &drawing.network, &Silent).unwrap().len(), found.patches.len());
 }
 
 #[test]
@@ -359,9 +359,9 @@ fn a_patch_without_feature_curves_gets_the_cells_that_are_given() {
     let mut drawing = start;
     make(&ground, &mut drawing, r#"{"edit":"sections","at":[1.0,0.5,0.2],"u":[37],"v":[23]}"#).unwrap();
     let mut model = Model { mesh, network: drawing.network, sketch: drawing.sketch, ..Model::default() };
-    pipeline::rework(&mut model, &PipelineParams::default(), &Silent).unwrap();
+    pipeline::rework(&mut model, None, &PipelineParams::default(), &Silent).unwrap();
     assert_eq!((model.grids[0].cols, model.grids[0].rows), (38, 24));
-    let patches = imprint(&model.mesh, &model.network).unwrap();
+    let patches = imprint(&model.mesh, &model.network, &Silent).unwrap();
     assert_eq!(grid::measure(&model.grids[0], &patches[0]).folds, 0);
 }
 
@@ -466,7 +466,7 @@ fn sections_of_a_patch_across_the_plane_of_symmetry_become_their_own_image() {
     make(&ground, &mut drawing, r#"{"edit":"mirror"}"#).unwrap();
     let sketch = &drawing.sketch;
     assert_eq!((sketch.features.len(), sketch.sections.len()), (2, 2));
-    let patches = imprint(&mesh, &drawing.network).unwrap();
+    let patches = imprint(&mesh, &drawing.network, &Silent).unwrap();
     for (patch, cells) in &sketch.sections {
         grid::check_features(&mesh, (*patch, &patches[*patch as usize]), &sketch.features, Some(cells)).unwrap();
         // The 8 cells lie above the curve or below it on both sides of the plane.
@@ -490,7 +490,7 @@ fn sections_of_a_patch_across_the_plane_of_symmetry_become_their_own_image() {
 fn below(drawing: &Drawing, mesh: &TriMesh) -> bool {
     let front = drawing.sketch.features.iter().find(|f| f.points[0].position(mesh).x > 0.0).unwrap();
     let (patch, cells) = drawing.sketch.sections.iter().find(|s| s.0 == front.patch).unwrap();
-    let patches = imprint(mesh, &drawing.network).unwrap();
+    let patches = imprint(mesh, &drawing.network, &Silent).unwrap();
     let own = &patches[*patch as usize];
     let (list, low) = if front.family == Family::V { (&cells.u, 3) } else { (&cells.v, 0) };
     let z =

@@ -155,7 +155,7 @@ fn seams_share_their_control_points_bit_for_bit_and_gap_below_1e_15() {
             let points = boundary_points(&work, &surfaces, c);
             assert!(points.windows(2).all(|w| w[0] == w[1]));
         }
-        for seam in surface::measure_seams(&work.network, &surfaces) {
+        for seam in surface::measure_seams(&work.network, &surfaces, &Silent).unwrap() {
             assert!(seam.gap_max < 2e-15, "{seam:?}");
         }
     }
@@ -232,7 +232,7 @@ fn bad_input_is_an_error_that_says_what() {
     let work = cube(9, CurveKind::Smooth, blob);
     assert_eq!(
         surface::fit_network(&work.network, &work.grids, &control(5, 5), &Stop).unwrap_err(),
-        FitError::Cancelled
+        FitError::Cancelled(planish::observe::Cancelled)
     );
 }
 
@@ -254,7 +254,7 @@ fn stitched(work: &Patchwork, m: usize) -> (Vec<Surface>, Vec<Surface>) {
 
 /// `(mean, max)` angle over the smooth seams, degrees.
 fn angles(work: &Patchwork, surfaces: &[Surface]) -> (f64, f64) {
-    let mut seams = surface::measure_seams(&work.network, surfaces);
+    let mut seams = surface::measure_seams(&work.network, surfaces, &Silent).unwrap();
     seams.retain(|s| s.kind == CurveKind::Smooth);
     let mean = seams.iter().map(|s| s.angle_mean_deg).sum::<f64>() / seams.len() as f64;
     (mean, seams.iter().map(|s| s.angle_max_deg).fold(0.0, f64::max))
@@ -320,7 +320,7 @@ fn stitching_keeps_seams_bit_identical_and_corners_in_place() {
             }
             assert!(b.control.iter().all(|p| p.is_finite()));
         }
-        for seam in surface::measure_seams(&work.network, &after) {
+        for seam in surface::measure_seams(&work.network, &after, &Silent).unwrap() {
             assert!(seam.gap_max < 2e-15, "{seam:?}");
         }
     }
@@ -354,8 +354,10 @@ fn features_stay_sharp_while_the_smooth_seams_between_them_become_smooth() {
     let (mean, max) = angles(&work, &after);
     // Beside the rims the slopes of the grids have a say.
     assert!(mean < 0.03 && max < 0.1, "{mean} {max}");
-    for (a, b) in
-        surface::measure_seams(&work.network, &before).iter().zip(surface::measure_seams(&work.network, &after))
+    for (a, b) in surface::measure_seams(&work.network, &before, &Silent)
+        .unwrap()
+        .iter()
+        .zip(surface::measure_seams(&work.network, &after, &Silent).unwrap())
     {
         assert_eq!(a.curve, b.curve);
         if a.kind == CurveKind::Feature {
@@ -367,7 +369,7 @@ fn features_stay_sharp_while_the_smooth_seams_between_them_become_smooth() {
     let (before, after) = stitched(&sharp, 5);
     let moved = before.iter().zip(&after).flat_map(|(a, b)| a.control.iter().zip(&b.control));
     assert!(moved.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) < 1e-12);
-    for seam in surface::measure_seams(&sharp.network, &after) {
+    for seam in surface::measure_seams(&sharp.network, &after, &Silent).unwrap() {
         assert!((seam.angle_max_deg - 90.0).abs() < 1e-9 && (seam.length - 2.0).abs() < 1e-12);
     }
 }
@@ -385,7 +387,7 @@ fn faces_that_are_flat_beside_an_edge_meet_at_their_angle_though_what_is_further
     let work = cube(41, CurveKind::Feature, stepped);
     let (before, after) = stitched(&work, 13);
     let off = |surfaces: &[Surface]| -> f64 {
-        let seams = surface::measure_seams(&work.network, surfaces);
+        let seams = surface::measure_seams(&work.network, surfaces, &Silent).unwrap();
         seams.iter().map(|s| (s.angle_mean_deg - 90.0).abs()).sum::<f64>() / seams.len() as f64
     };
     let (was, is) = (off(&before), off(&after));
@@ -498,7 +500,7 @@ fn the_default_leaves_four_cells_to_every_span_however_rough_the_grid() {
 fn angles_along_a_seam_are_means_over_its_length() {
     // A sheet whose right half is hinged at the seam by an angle that grows evenly from 0 to 0.2.
     let work = sheet(2, 1, [false, false], [33, 33], |x, y| DVec3::new(x, y, (x - 1.0).max(0.0) * (0.2 * y).tan()));
-    let seams = surface::measure_seams(&work.network, &fit(&work, &control(8, 8)));
+    let seams = surface::measure_seams(&work.network, &fit(&work, &control(8, 8)), &Silent).unwrap();
     let [seam] = &seams[..] else { panic!("one seam, not {}", seams.len()) };
     let whole = 0.2f64.to_degrees();
     for (found, wanted) in

@@ -42,8 +42,8 @@ fn surface_of(path: &Path, content: Content, word: SurfaceWord) -> Result<TriMes
     };
     let made = match word {
         SurfaceWord::Mesh => return Ok(model.mesh),
-        SurfaceWord::Base => pipeline::surface_mesh(&model),
-        SurfaceWord::Displaced => pipeline::displaced_mesh(&model),
+        SurfaceWord::Base => pipeline::surface_mesh(&model, &crate::progress::Interrupt),
+        SurfaceWord::Displaced => pipeline::displaced_mesh(&model, &crate::progress::Interrupt),
     };
     made.map_err(|e| Failure::input(path, e).hint("fit it again with `planish fit`"))
 }

@@ -1,12 +1,12 @@
 //! `planish demo`: a synthetic part is scanned with all the faults of a scanner, and everything runs on the scan.
 
 use super::Session;
-use super::run::{Job, Scanned, from_scan, produce};
+use super::run::{Job, Truth, produce};
 use crate::args::Demo;
 use crate::failure::{Failure, Status};
 use crate::products::Staged;
-use planish::pipeline::Figure;
-use planish::synthetic::{self, ScannerParams, virtual_scan};
+use planish::pipeline::{Input, RunParams};
+use planish::synthetic::{self, virtual_scan};
 use planish_io::{Up, WriteOptions};
 use std::path::Path;
 
@@ -20,7 +20,8 @@ pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
     let staged = Staged::folder(&args.output)?;
     let seed = session.common.seed.unwrap_or(0);
     let (truth, shape) = session.step("shape", || Ok(synthetic::demo(seed, TRIANGLES)))?;
-    let scanner = ScannerParams { points: args.points as usize, seed, ..ScannerParams::default() };
+    let scanner = args.scanner.params(Some(seed))?;
+    let scan_params = args.meshing.params()?;
     let (made, shot) = session.bars.step("scan", |o| virtual_scan(&truth, &scanner, o));
     if crate::progress::interrupted() {
         return Err(Failure::interrupted());
@@ -30,23 +31,16 @@ pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
     let wrong = |name: &str, e: &dyn std::fmt::Display| Failure::usage(args.output.join(name), e);
     planish_io::write_mesh(staged.path(TRUTH), &truth, &options).map_err(|e| wrong(TRUTH, &e))?;
     planish_io::write_scan(staged.path(SCAN), &scan.cloud).map_err(|e| wrong(SCAN, &e))?;
-    let Scanned { mesh, tags, mut facts, suited, records } =
-        from_scan(session, Path::new(SCAN), &scan.cloud, None, &staged)?;
-    let strays = scan.stray.iter().filter(|&&s| s).count();
-    facts.quality.insert("truth.outliers".into(), Figure::Count(strays as u64));
-    facts.quality.insert("truth.noise_rel".into(), Figure::Number(scanner.noise));
+    let truth = Truth { mesh: &truth, outliers: scan.stray.iter().filter(|&&s| s).count(), noise_rel: scanner.noise };
     let job = Job {
         command: "demo",
         path: Path::new(SCAN),
-        input: &mesh,
-        tags: Some(&tags),
-        network: None,
-        params: suited,
+        network_path: None,
+        params: RunParams { scan: scan_params, ..RunParams::default() },
         demanded: None,
         output: &args.output,
         up: Up::Z,
-        scan: Some(facts),
-        truth: Some(&truth),
+        truth: Some(truth),
     };
-    produce(session, job, staged, [vec![shape, shot], records].concat())
+    produce(session, job, Input::Scan(&scan.cloud), staged, vec![shape, shot])
 }

@@ -12,6 +12,7 @@ use crate::summary::Summary;
 use planish::edit::{self, ApplyError, Edit, Ground, Made, Redo, Undo};
 use planish::model::{Drawing, HistoryEntry, Model};
 use planish::network::{Diagnosis, diagnose};
+use planish::observe::Cancelled;
 use planish::pipeline::{self, Earlier, PipelineParams, Warning};
 use planish_io::report::{EditRow, RelaxedRow, Report, count, number};
 use serde::Deserialize;
@@ -66,7 +67,7 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
     let finished = found.is_finished() && !model.network.patches.is_empty();
     if finished && !args.no_fit && model.grids.is_empty() {
         let wrong = |e| pipeline_failure(&args.input, None, e);
-        let made = pipeline::rework_from(&mut model, earlier.as_ref(), &params, &session.bars).map_err(wrong)?;
+        let made = pipeline::rework(&mut model, earlier.as_ref(), &params, &session.bars).map_err(wrong)?;
         report.stages.extend(made.stages);
         report.quality = made.quality;
         report.warnings.extend(made.warnings);
@@ -150,7 +151,8 @@ fn start(session: &Session, args: &EditArgs) -> Result<Model, Failure> {
         return Ok(model);
     }
     let input = files::mesh(&args.input)?;
-    let (mesh, _) = planish::mend::repair(&input).map_err(|e| Failure::input(&args.input, e))?;
+    let (mesh, _) =
+        planish::mend::repair(&input, &crate::progress::Interrupt).map_err(|e| Failure::input(&args.input, e))?;
     Ok(Model { mesh, units: session.units(), ..Model::default() })
 }
 
@@ -326,7 +328,7 @@ fn one(
 fn told(script: &Path, k: usize, line: usize, edit: &Edit, wrong: Wrong) -> Failure {
     let name = format!("{}, line {line}", edit.name());
     match wrong {
-        Wrong::Apply(ApplyError::Cancelled) => Failure::interrupted(),
+        Wrong::Apply(e) if Cancelled::is_cause_of(&e) => Failure::interrupted(),
         Wrong::Apply(e) => {
             Failure::input(script, format!("step {} ({name}): {}", k + 1, super::with_hint(&e.to_string())))
         }

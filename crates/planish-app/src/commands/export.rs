@@ -41,8 +41,10 @@ pub fn export(session: &Session, args: &Export) -> Result<Status, Failure> {
         }
         ExportKind::Mesh => {
             let mesh = match args.surface {
-                SurfaceWord::Displaced => &pipeline::displaced_mesh(&model).map_err(unfit)?,
-                SurfaceWord::Base => &pipeline::surface_mesh(&model).map_err(unfit)?,
+                SurfaceWord::Displaced => {
+                    &pipeline::displaced_mesh(&model, &crate::progress::Interrupt).map_err(unfit)?
+                }
+                SurfaceWord::Base => &pipeline::surface_mesh(&model, &crate::progress::Interrupt).map_err(unfit)?,
                 SurfaceWord::Mesh => &model.mesh,
             };
             planish_io::write_mesh(staged.file_path(), mesh, &options).map_err(wrong)

@@ -1,6 +1,6 @@
 //! `planish fit`: mesh and network to a model; or the surfaces of a model, and its grids where it has none.
 
-use super::run::{Job, fitted, seam_rows, summary, verdict};
+use super::run::{Job, Made, fitted, seam_rows, summary, verdict};
 use super::{Session, commit_report, pipeline_failure};
 use crate::args::Fit;
 use crate::failure::{Failure, Status};
@@ -9,7 +9,7 @@ use crate::products::Staged;
 use planish::mesh::Adjacency;
 use planish::model::{HistoryEntry, Model};
 use planish::network::diagnose;
-use planish::pipeline::{self, PipelineParams};
+use planish::pipeline::{self, Input, PipelineParams, ScanParams};
 use planish_io::Up;
 use planish_io::report::Report;
 use std::path::Path;
@@ -36,23 +36,22 @@ pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
 
 /// A model of a mesh.
 fn anew(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
-    let params = args.stages.params(session.common.seed)?;
-    let ((input, tags), read) = session.step("read", || files::tagged_mesh(&args.input))?;
-    let network = files::optional_network(args.network.as_deref(), &input)?;
+    args.stages.params(session.common.seed)?;
+    let ((mesh, tags), read) = session.step("read", || files::tagged_mesh(&args.input))?;
+    let network = files::optional_network(args.network.as_deref(), &mesh)?;
     let job = Job {
         command: "fit",
         path: &args.input,
-        input: &input,
-        tags: tags.as_ref(),
-        network: network.zip(args.network.as_deref()),
-        params,
+        network_path: args.network.as_deref(),
+        params: args.stages.run_params(ScanParams::default(), session.common.seed),
         demanded: args.stages.demanded_tolerance(),
         output: &args.output,
         up: Up::default(),
-        scan: None,
         truth: None,
     };
-    fitted(session, job, vec![read])
+    let input = Input::Mesh { mesh: &mesh, tags: tags.as_ref(), network };
+    let Made { report, model, .. } = fitted(session, &job, input, vec![read])?;
+    Ok((report, model))
 }
 
 /// A model with the mesh, network and grids of another, and surfaces of its own; with grids of its own, if there are none.

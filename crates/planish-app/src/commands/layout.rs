@@ -17,7 +17,7 @@ pub fn layout(session: &Session, args: &Layout) -> Result<Status, Failure> {
     let params = args.layout.params(session.common.seed)?;
     let ((input, tags), read) = session.step("read", || files::tagged_mesh(&args.mesh))?;
     let mut report = Report::new("layout", files::mesh_facts(&args.mesh, &input, session.units()));
-    let made = pipeline::layout_tagged(&input, tags.as_ref(), &params, &session.bars)
+    let made = pipeline::layout(&input, tags.as_ref(), &params, &session.bars)
         .map_err(|e| super::pipeline_failure(&args.mesh, None, e))?;
     let network = &made.network;
     planish_io::write_network(staged.file_path(), network, &made.mesh).map_err(|e| Failure::usage(&args.output, e))?;

@@ -7,23 +7,17 @@ use crate::files;
 use crate::products::Staged;
 use crate::progress;
 use crate::summary::Summary;
-use planish::cloud::CleanParams;
 use planish::contour::{self, Meshed, MeshingError, Sampling};
 use planish::field::{Part, Spacing};
 use planish::mesh::{TriMesh, diagnose};
 use planish::model::Units;
-use planish::pipeline::{self, Figure, ScanError, ScanParams, Warning};
+use planish::pipeline::{self, Figure, ScanError, ScanMeshed, Warning};
 use planish_io::report::{Input, Report, count, number};
 use planish_io::script::Script;
 use planish_io::{MeshFormat, WriteOptions};
 
 /// Cells along the longest side unless the user says.
 const RESOLUTION: usize = 129;
-/// Share of the machine's memory that may be used unless the user says.
-const MEMORY_SHARE: f64 = 0.75;
-/// What a machine has if nobody knows.
-const MEMORY_GUESS: u64 = 8 << 30;
-
 /// What is to be meshed.
 enum Source {
     Scan(planish::cloud::Cloud),
@@ -36,57 +30,41 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     files::check_extension(&args.output, &["ply", "obj", "stl", "glb"])?;
     let staged = Staged::file(&args.output)?;
     let own_report = session.stage_report()?;
-    let params = args.contour.params(None)?;
+    let params = args.meshing.params()?;
     let grid_params = args.volume.params(None)?;
-    let ((source, input, units), read) = session.step("read", || read(session, args))?;
-    let spacing = match (args.voxel, args.resolution) {
-        (Some(h), _) => Spacing::Voxel(h),
-        (None, n) => Spacing::Resolution(n.map_or(RESOLUTION, |n| n.get())),
-    };
+    let ((source, input, units), read) = session.step("read", || read(session, args, params.cells))?;
     match &source {
         Source::Scan(_) => {}
         Source::Grid(_) => {
-            args.holes.refuse("--volume-close tells whether the border of a volume closes the surface")?
+            args.meshing.refuse_cleaning("--volume-close tells whether the border of a volume closes the surface")?
         }
-        Source::Mesh(_) | Source::Script(_) => args.holes.refuse("leave it out: the result is closed anyway")?,
+        Source::Mesh(_) | Source::Script(_) => {
+            args.meshing.refuse_cleaning("leave it out: the result is closed anyway")?
+        }
     }
-    let memory = args.memory.map_or_else(default_memory, |gb| (gb * (1u64 << 30) as f64) as u64);
-    let sampling = Sampling { spacing, memory };
-    let mut scanned = None;
-    let (made, record) = session.bars.step("mesh", |o| match &source {
-        Source::Scan(scan) => {
-            let params = ScanParams {
-                clean: CleanParams::default(),
-                contour: params.clone(),
-                voxel: args.voxel,
-                resolution: args.resolution.map(|n| n.get()),
-                memory,
-                close: args.holes.choice(),
-            };
-            match pipeline::mesh_scan(scan, &params, o) {
-                Ok(made) => {
-                    let meshed = made.meshed.clone();
-                    scanned = Some(made);
-                    Ok(meshed)
-                }
-                Err(ScanError::Mesh(e)) => Err(Trouble::Meshing(e)),
-                Err(ScanError::Cloud(e)) => Err(Trouble::Cloud(e)),
-            }
-        }
-        Source::Mesh(mesh) => contour::from_mesh(mesh, sampling, &params, o).map_err(Trouble::Meshing),
-        Source::Script(Script::Part(part)) => contour::from_part(part, sampling, &params, o).map_err(Trouble::Meshing),
-        Source::Script(Script::Job(milling)) => {
-            contour::from_field(milling, sampling, &params, o).map_err(Trouble::Meshing)
-        }
-        Source::Grid(grid) => contour::from_grid(grid, &grid_params, memory, &params, o).map_err(Trouble::Meshing),
+    let spacing = params.cells.unwrap_or(Spacing::Resolution(RESOLUTION));
+    let sampling = Sampling { spacing, memory: params.memory };
+    let contour = &params.contour;
+    let (made, record) = session.bars.step("mesh", |o| {
+        Ok::<Made, Trouble>(match &source {
+            Source::Scan(scan) => Made::OfScan(pipeline::mesh_scan(scan, &params, o)?),
+            Source::Mesh(mesh) => Made::Plain(contour::from_mesh(mesh, sampling, contour, o)?),
+            Source::Script(Script::Part(part)) => Made::Plain(contour::from_part(part, sampling, contour, o)?),
+            Source::Script(Script::Job(milling)) => Made::Plain(contour::from_field(milling, sampling, contour, o)?),
+            Source::Grid(grid) => Made::Plain(contour::from_grid(grid, &grid_params, params.memory, contour, o)?),
+        })
     });
     if progress::interrupted() {
         return Err(Failure::interrupted());
     }
-    let made = made.map_err(|e| match e {
-        Trouble::Meshing(e) => failure(args, &source, e),
-        Trouble::Cloud(e) => Failure::input(&args.input, super::with_hint(&e.to_string())),
+    let all = made.map_err(|e| match e {
+        Trouble::Meshing(e) | Trouble::Scan(ScanError::Mesh(e)) => failure(args, &source, e),
+        Trouble::Scan(e) => Failure::input(&args.input, super::with_hint(&e.to_string())),
     })?;
+    let (made, scanned) = match &all {
+        Made::OfScan(scanned) => (&scanned.meshed, Some(scanned)),
+        Made::Plain(made) => (made, None),
+    };
     let (mut mesh, tags) = (std::borrow::Cow::Borrowed(&made.extracted.mesh), &made.extracted.tags);
     let scan = if let Source::Scan(scan) = &source { Some(scan) } else { None };
     // Single precision would lose the detail far from the origin.
@@ -101,11 +79,11 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     })?;
     let mut report = Report::new("mesh", input);
     report.stages = vec![read, record, write];
-    figures(&made, &mut report);
+    figures(made, &mut report);
     if let Source::Mesh(input) = &source {
-        thin_walls(&made, input, &mut report);
+        thin_walls(made, input, &mut report);
     }
-    if let Some(scanned) = &scanned {
+    if let Some(scanned) = scanned {
         pipeline::scan_figures(scanned, &mut report.quality, &mut report.warnings);
         report.warnings.extend(scan.filter(|_| !exact).and_then(super::clean::moved));
     }
@@ -113,19 +91,37 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     commit_report(own_report, &report)?;
     if !session.common.quiet {
         session.tell_warnings(&report);
-        table(args, &made, &report).print();
+        table(args, made, &report).print();
     }
     Ok(Status::Done)
+}
+
+/// What a source became.
+enum Made {
+    OfScan(ScanMeshed),
+    Plain(Meshed),
 }
 
 /// What can go wrong with one of the sources.
 enum Trouble {
     Meshing(MeshingError),
-    Cloud(planish::cloud::CloudError),
+    Scan(ScanError),
+}
+
+impl From<MeshingError> for Trouble {
+    fn from(e: MeshingError) -> Trouble {
+        Trouble::Meshing(e)
+    }
+}
+
+impl From<ScanError> for Trouble {
+    fn from(e: ScanError) -> Trouble {
+        Trouble::Scan(e)
+    }
 }
 
 /// Reads whatever the input is, by its extension.
-fn read(session: &Session, args: &Mesh) -> Result<(Source, Input, Units), Failure> {
+fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Source, Input, Units), Failure> {
     let path = &args.input;
     let chosen = session.common.units.map(Units::from);
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
@@ -151,15 +147,16 @@ fn read(session: &Session, args: &Mesh) -> Result<(Source, Input, Units), Failur
     if planish_io::is_grid(path) && !planish_io::is_scan(path) {
         let mut grid = planish_io::read_grid(path).map_err(|e| Failure::input(path, e))?;
         let npy = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
-        if args.resolution.is_some() || args.voxel.is_some() && !npy {
+        let voxel = if let Some(Spacing::Voxel(h)) = cells { Some(h) } else { None };
+        if cells.is_some() && !(npy && voxel.is_some()) {
             let what =
                 if npy { "the cells of a volume are its own samples" } else { "a NRRD file tells its own spacing" };
-            let option = if args.voxel.is_some() { "--voxel" } else { "--resolution" };
+            let option = if voxel.is_some() { "--voxel" } else { "--resolution" };
             return Err(Failure::usage(path, format!("{what}, {option} has no meaning here")).hint("leave it out"));
         }
         // NumPy arrays carry no size of a voxel.
         if npy {
-            grid.spacing *= args.voxel.unwrap_or(1.0);
+            grid.spacing *= voxel.unwrap_or(1.0);
         }
         let units = session.units();
         let size = grid.spacing * glam::DVec3::from_array(grid.size.map(|n| n as f64 - 1.0));
@@ -199,13 +196,6 @@ fn failure(args: &Mesh, source: &Source, error: MeshingError) -> Failure {
         _ => "check the input",
     };
     Failure::input(&args.input, super::with_hint(&error.to_string())).hint(hint)
-}
-
-pub fn default_memory() -> u64 {
-    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    let total =
-        text.lines().find_map(|l| l.strip_prefix("MemTotal:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
-    (total.map_or(MEMORY_GUESS, |kb| kb << 10) as f64 * MEMORY_SHARE) as u64
 }
 
 fn figures(made: &Meshed, report: &mut Report) {

@@ -20,6 +20,7 @@ use crate::outputs;
 use crate::products::Staged;
 use crate::progress::{self, Bars};
 use planish::model::{Model, Units};
+use planish::observe::Cancelled;
 use planish::pipeline::{Figure, PipelineError, Quality, StageRecord};
 use planish_io::WriteError;
 use planish_io::report::Report;
@@ -131,9 +132,10 @@ fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
 /// What a failed pipeline is to the user: mostly a fault of the input.
 fn pipeline_failure(input: &Path, network: Option<&Path>, error: PipelineError) -> Failure {
     match error {
-        PipelineError::Cancelled => Failure::interrupted(),
+        e if Cancelled::is_cause_of(&e) => Failure::interrupted(),
         // With a network of the user's own, what it causes is told of that file.
         PipelineError::Network(e) if network.is_some() => Failure::input(network.unwrap_or(input), e),
+        e @ (PipelineError::Scan(_) | PipelineError::Cloud(_)) => Failure::input(input, with_hint(&e.to_string())),
         e => Failure::input(input, with_hint(&e.to_string())).hint("look for faults with `planish info`"),
     }
 }

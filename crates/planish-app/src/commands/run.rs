@@ -1,4 +1,4 @@
-//! `planish run`: everything, from a mesh to all products.
+//! `planish run`: everything, from a scan or a mesh to all products.
 
 use super::{Session, commit_report, pipeline_failure, write_relief, write_text};
 use crate::args::Run;
@@ -8,221 +8,166 @@ use crate::pictures;
 use crate::products::Staged;
 use crate::summary::Summary;
 use planish::DVec3;
-use planish::mesh::{FeatureTags, TriMesh};
+use planish::mesh::TriMesh;
 use planish::model::{HistoryEntry, Model};
-use planish::network::Network;
-use planish::pipeline::{self, Fitted, PipelineParams, StageRecord};
+use planish::pipeline::{self, Figure, Fitted, Input, RunParams, ScanParams, Scanned, StageRecord};
 use planish_io::report::{self, Report, SeamRow, count, distance, number, percent};
 use planish_io::{StepInput, Up, WriteOptions};
 use std::path::Path;
 
 pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
     let staged = Staged::folder(&args.output)?;
-    let mut params = args.stages.params(session.common.seed)?;
-    let mut before = Vec::new();
-    let mut extra = None;
-    let (input, tags) = if planish_io::is_scan(&args.input) {
-        let (scan, read) = session.step("read", || files::scan(&args.input, &args.scan))?;
-        let Scanned { mesh, tags, facts, suited, records } =
-            from_scan(session, &args.input, &scan, args.holes.choice(), &staged)?;
-        params = args.stages.params_suiting(suited, session.common.seed)?;
-        before.push(read);
-        before.extend(records);
-        extra = Some(facts);
-        (mesh, Some(tags))
-    } else {
-        args.holes.refuse("close the holes of a mesh with `planish mesh` first")?;
-        let (tagged, read) = session.step("read", || files::tagged_mesh(&args.input))?;
-        before.push(read);
-        tagged
-    };
-    let network = files::optional_network(args.network.as_deref(), &input)?;
+    // Options that cannot be are told before the file is read.
+    args.stages.params(session.common.seed)?;
+    let scan = ScanParams { points: args.points.params(None)?, ..args.meshing.params()? };
+    let params = args.stages.run_params(scan, session.common.seed);
     let job = Job {
         command: "run",
         path: &args.input,
-        input: &input,
-        tags: tags.as_ref(),
-        network: network.zip(args.network.as_deref()),
+        network_path: args.network.as_deref(),
         params,
         demanded: args.stages.demanded_tolerance(),
         output: &args.output,
         up: args.up.into(),
-        scan: extra,
         truth: None,
     };
-    produce(session, job, staged, before)
-}
-
-/// A scan on its way to a model.
-pub struct Scanned {
-    /// The mesh that was made of it.
-    pub mesh: TriMesh,
-    /// Its sharp edges.
-    pub tags: FeatureTags,
-    /// What was found.
-    pub facts: ScanFacts,
-    /// The parameters that suit it.
-    pub suited: PipelineParams,
-    /// The stages that ran.
-    pub records: Vec<StageRecord>,
-}
-
-/// What the stages before the mesh found.
-pub struct ScanFacts {
-    /// Facts of the input.
-    pub input: report::Input,
-    /// Figures of the scan.
-    pub quality: pipeline::Quality,
-    /// Warnings of the scan.
-    pub warnings: Vec<pipeline::Warning>,
-    /// The raw points, in parts: on the surface, and outliers.
-    pub points: [Vec<DVec3>; 2],
-}
-
-/// The stages from a scan to a mesh; leaves `points.ply`.
-pub fn from_scan(
-    session: &Session,
-    path: &Path,
-    scan: &planish::cloud::Cloud,
-    close: Option<bool>,
-    staged: &Staged,
-) -> Result<Scanned, Failure> {
-    let params = pipeline::ScanParams {
-        clean: Default::default(),
-        contour: Default::default(),
-        voxel: None,
-        resolution: None,
-        memory: super::mesh::default_memory(),
-        close,
-    };
-    let fault = |e: &dyn std::fmt::Display| Failure::input(path, super::with_hint(&e.to_string()));
-    let (made, record) = session.bars.step("mesh", |o| pipeline::mesh_scan(scan, &params, o));
-    if crate::progress::interrupted() {
-        return Err(Failure::interrupted());
+    if planish_io::is_scan(&args.input) {
+        let (scan, read) = session.step("read", || files::scan(&args.input, &args.scan))?;
+        return produce(session, job, Input::Scan(&scan), staged, vec![read]);
     }
-    let made = made.map_err(|e| fault(&e))?;
-    let (points, project) = session
-        .bars
-        .step("points", |o| planish::cloud::project(scan, &made.samples, params.clean.outlier, &Default::default(), o));
-    if crate::progress::interrupted() {
-        return Err(Failure::interrupted());
+    args.meshing.refuse("use `planish mesh` first")?;
+    if let Some(flag) = args.points.first_given() {
+        return Err(Failure::usage(flag, "is for scans, and the input is none").hint("leave it out"));
     }
-    let mut points = points.map_err(|e| fault(&e))?;
-    // All products lie in one place.
-    points.cloud.shift = DVec3::ZERO;
-    planish_io::write_scan(staged.path("points.ply"), &points.cloud).map_err(|e| Failure::usage(path, e))?;
-    let mut facts = ScanFacts {
-        input: super::clean::scan_facts(path, scan, session.units()),
-        quality: Default::default(),
-        warnings: Vec::new(),
-        points: Default::default(),
-    };
-    pipeline::scan_figures(&made, &mut facts.quality, &mut facts.warnings);
-    facts.warnings.extend(super::clean::moved(scan));
-    facts.quality.insert("scan.outliers".into(), pipeline::Figure::Count(points.outliers as u64));
-    facts.quality.insert("scan.moved_rms".into(), pipeline::Figure::Number(points.moved_rms));
-    for (p, &off) in scan.points.iter().zip(&points.strays) {
-        facts.points[usize::from(off)].push(*p);
-    }
-    let suited = pipeline::params_for(&made);
-    let (mesh, tags) = (made.meshed.extracted.mesh, made.meshed.extracted.tags);
-    Ok(Scanned { mesh, tags, facts, suited, records: vec![record, project] })
+    let ((mesh, tags), read) = session.step("read", || files::tagged_mesh(&args.input))?;
+    let network = files::optional_network(args.network.as_deref(), &mesh)?;
+    produce(session, job, Input::Mesh { mesh: &mesh, tags: tags.as_ref(), network }, staged, vec![read])
 }
 
-/// A mesh on its way to a model.
+/// A shape on its way to a model.
 pub struct Job<'a> {
     /// Name of the command.
     pub command: &'static str,
-    /// The mesh's path as the user gave it.
+    /// The input's path as the user gave it.
     pub path: &'a Path,
-    /// The mesh.
-    pub input: &'a TriMesh,
-    /// Its sharp edges, where the file tells them.
-    pub tags: Option<&'a FeatureTags>,
-    /// A network of the user's own, with its path.
-    pub network: Option<(Network, &'a Path)>,
+    /// Path of the user's own network.
+    pub network_path: Option<&'a Path>,
     /// Parameters of all stages.
-    pub params: PipelineParams,
+    pub params: RunParams<'a>,
     /// Tolerance that the user demanded, as a fraction of the diagonal.
     pub demanded: Option<f64>,
     /// Where the products go.
     pub output: &'a Path,
     /// Axis that points up.
     pub up: Up,
-    /// What the stages before the mesh found, if the input is a scan.
-    pub scan: Option<ScanFacts>,
     /// The surface that was scanned, where it is known.
-    pub truth: Option<&'a TriMesh>,
+    pub truth: Option<Truth<'a>>,
+}
+
+/// What is known of a synthetic scan.
+pub struct Truth<'a> {
+    /// The surface that was scanned.
+    pub mesh: &'a TriMesh,
+    /// Points with a wrong range.
+    pub outliers: usize,
+    /// Noise, of the diagonal.
+    pub noise_rel: f64,
 }
 
 /// Fits a model and writes all products.
-pub fn produce(session: &Session, job: Job, staged: Staged, before: Vec<StageRecord>) -> Result<Status, Failure> {
+pub fn produce(
+    session: &Session,
+    job: Job,
+    input: Input,
+    staged: Staged,
+    before: Vec<StageRecord>,
+) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
-    let (path, output, demanded, up) = (job.path, job.output, job.demanded, job.up);
-    let mut job = job;
-    let raw = job.scan.as_mut().map(|s| std::mem::take(&mut s.points));
-    let (mut report, model) = fitted(session, job, before)?;
-    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let options = WriteOptions { units: model.units, up, name };
-    let ((), write) = session.step("write", || write_products(&staged, output, &model, &options, &mut report))?;
-    let (pictures, draw) = session.step("pictures", || pictures::pictures(&model, raw.as_ref(), &report, up))?;
+    let cloud = if let Input::Scan(cloud) = input { Some(cloud) } else { None };
+    let Made { mut report, model, scan } = fitted(session, &job, input, before)?;
+    let raw = match (cloud, scan) {
+        (Some(cloud), Some(Scanned { mut points, .. })) => {
+            // All products lie in one place.
+            points.cloud.shift = DVec3::ZERO;
+            planish_io::write_scan(staged.path("points.ply"), &points.cloud)
+                .map_err(|e| Failure::usage(job.path, e))?;
+            let mut raw: [Vec<DVec3>; 2] = Default::default();
+            cloud.points.iter().zip(&points.strays).for_each(|(p, &off)| raw[usize::from(off)].push(*p));
+            Some(raw)
+        }
+        _ => None,
+    };
+    let name = job.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let options = WriteOptions { units: model.units, up: job.up, name };
+    let ((), write) = session.step("write", || write_products(&staged, job.output, &model, &options, &mut report))?;
+    let (pictures, draw) = session.step("pictures", || pictures::pictures(&model, raw.as_ref(), &report, job.up))?;
     report.stages.extend([write, draw]);
     write_text(&staged.path("report.json"), &report.to_json())?;
     write_text(&staged.path("report.html"), &report::html(&report, &pictures))?;
     staged.commit()?;
     commit_report(own_report, &report)?;
-    let status = verdict(&report, demanded);
+    let status = verdict(&report, job.demanded);
     if !session.common.quiet {
         session.tell_warnings(&report);
-        let mut summary = summary(&report, demanded);
-        summary.row("products", output.display().to_string());
-        summary.row("look at", output.join("report.html").display().to_string());
+        let mut summary = summary(&report, job.demanded);
+        summary.row("products", job.output.display().to_string());
+        summary.row("look at", job.output.join("report.html").display().to_string());
         summary.print();
     }
     Ok(status)
 }
 
-/// Fits a model: its report so far, and itself with units and history.
-pub fn fitted(session: &Session, job: Job, before: Vec<StageRecord>) -> Result<(Report, Model), Failure> {
+/// A model with its report so far.
+pub struct Made {
+    /// The report.
+    pub report: Report,
+    /// The model, with units and history.
+    pub model: Model,
+    /// What became of a scan.
+    pub scan: Option<Scanned>,
+}
+
+/// Runs the pipeline on an input.
+pub fn fitted(session: &Session, job: &Job, input: Input, before: Vec<StageRecord>) -> Result<Made, Failure> {
     let units = session.units();
-    let mut report = Report::new(job.command, files::mesh_facts(job.path, job.input, units));
-    let (network, network_path) = job.network.unzip();
-    let Fitted { mut model, stages, quality, seams, warnings } =
-        pipeline::fit_tagged(job.input, job.tags, network, &job.params, &session.bars)
-            .map_err(|e| pipeline_failure(job.path, network_path, e))?;
+    let facts = match &input {
+        Input::Scan(scan) => super::clean::scan_facts(job.path, scan, units),
+        Input::Mesh { mesh, .. } => files::mesh_facts(job.path, mesh, units),
+    };
+    let moved = if let Input::Scan(scan) = &input { super::clean::moved(scan) } else { None };
+    let mut report = Report::new(job.command, facts);
+    let run = pipeline::run(input, &job.params, &session.bars)
+        .map_err(|e| pipeline_failure(job.path, job.network_path, e))?;
+    let Fitted { mut model, stages, quality, seams, warnings } = run.fitted;
     report.stages = before;
     report.stages.extend(stages);
     report.quality = quality;
     report.warnings = warnings;
+    report.warnings.extend(moved);
     report.seams = seam_rows(&model, &seams);
-    if let Some(truth) = job.truth {
-        let noise = job.scan.as_ref().and_then(|s| s.quality.get("scan.noise")).map_or(0.0, |f| f.value());
+    let meshed = run.scan.as_ref().map(|s| &s.meshed.meshed.extracted.mesh);
+    if let Some(meshed) = meshed {
+        // Outliers are no part of the shape: its size is that of the mesh, for all figures.
+        report.input.diagonal = meshed.bounds().diagonal();
+    }
+    if let (Some(truth), Some(meshed)) = (&job.truth, meshed) {
+        report.quality.insert("truth.outliers".into(), Figure::Count(truth.outliers as u64));
+        report.quality.insert("truth.noise_rel".into(), Figure::Number(truth.noise_rel));
+        let noise = report.figure("scan.noise").unwrap_or(0.0);
         // An edge has its seam within two noise levels; without noise within a thousandth of the diagonal.
-        let within = (2.0 * noise).max(1e-3 * truth.bounds().diagonal());
+        let within = (2.0 * noise).max(1e-3 * truth.mesh.bounds().diagonal());
         let (found, record) =
-            session.bars.step("truth", |o| pipeline::truth_figures(truth, job.input, &model, within, o));
+            session.bars.step("truth", |o| pipeline::truth_figures(truth.mesh, meshed, &model, within, o));
         if crate::progress::interrupted() {
             return Err(Failure::interrupted());
         }
         report.quality.extend(found.map_err(Failure::fault)?);
         report.stages.push(record);
     }
-    if let Some(scan) = job.scan {
-        // Outliers are no part of the shape: its size is that of the mesh, for all figures.
-        let diagonal = report.input.diagonal;
-        report.input = report::Input { diagonal, ..scan.input };
-        report.quality.extend(scan.quality);
-        for key in ["scan.noise", "scan.spacing", "scan.moved_rms", "scan.to_mesh_rms", "scan.to_mesh_mean"] {
-            if let Some(x) = report.figure(key) {
-                report.quality.insert(format!("{key}_rel"), pipeline::Figure::Number(x / diagonal));
-            }
-        }
-        report.warnings.extend(scan.warnings);
-    }
     model.units = units;
-    model.params = serde_json::to_string(&job.params).map_err(Failure::fault)?;
+    model.params = serde_json::to_string(&run.params).map_err(Failure::fault)?;
     model.history.push(HistoryEntry { command: "fit".into(), parameters: model.params.clone() });
-    Ok((report, model))
+    Ok(Made { report, model, scan: run.scan })
 }
 
 /// Done, or the demanded tolerance is missed.
@@ -335,5 +280,5 @@ fn write_products(
     planish_io::write_model(staged.path("model.planish"), model).map_err(|e| wrong("model.planish", &e))?;
     planish_io::write_step(staged.path("surface.step"), &step).map_err(|e| wrong("surface.step", &e))?;
     write_relief(&staged.path("relief"), model, &mut report.quality).map_err(|e| wrong("relief", &e))?;
-    mesh("preview.glb", &pipeline::displaced_mesh(model).map_err(Failure::fault)?)
+    mesh("preview.glb", &pipeline::displaced_mesh(model, &crate::progress::Interrupt).map_err(Failure::fault)?)
 }

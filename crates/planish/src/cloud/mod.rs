@@ -28,7 +28,7 @@ pub use project::{Cleaned, ProjectParams, project};
 use crate::geom::{Aabb, KdTree};
 use crate::linalg::eigen3;
 use crate::mesh::Attribute;
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer, Part};
 use glam::DVec3;
 use local::fitted::Fit;
 use local::moments;
@@ -141,8 +141,8 @@ pub enum CloudError {
         points: usize,
     },
     /// The observer wants no result any more.
-    #[error("cleaning cancelled")]
-    Cancelled,
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// A fitted sample: position, oriented normal, local quadric, support, irregularity.
@@ -212,8 +212,8 @@ const JOINS: usize = 4;
 pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Result<Samples, CloudError> {
     let (points, ids) = distinct(cloud)?;
     let (points, ids, tree) = strays::without(points, ids);
-    let part = |from: f64, to: f64| Part { observer, from, to };
-    let mut sites = sites::choose(&points, &tree, &part(0.0, 0.45)).ok_or(CloudError::Cancelled)?;
+    let part = |from: f64, to: f64| Part::new(observer, from, to - from);
+    let mut sites = sites::choose(&points, &tree, &part(0.0, 0.45))?;
     if sites.point.is_empty() {
         return Err(CloudError::NoSurface { points: points.len() });
     }
@@ -222,7 +222,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
     let mut round = 0;
     let (fits, areas, oriented) = loop {
         let [from, to] = if round == 0 { [0.45, 0.85] } else { [0.85, 0.9] };
-        grown = front::grow(&tree, &sites, &open, grown, &part(from, to)).ok_or(CloudError::Cancelled)?;
+        grown = front::grow(&tree, &sites, &open, grown, &part(from, to))?;
         let fits = front::supported(&points, grown.clone());
         if fits.is_empty() {
             return Err(CloudError::NoSurface { points: points.len() });
@@ -271,8 +271,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
         })
         .collect();
     let of_site: Vec<u32> = fits.iter().map(|f| f.site).collect();
-    let cells =
-        cells::cells(&points, &tree, &sites, &samples, &of_site, &part(0.9, 1.0)).ok_or(CloudError::Cancelled)?;
+    let cells = cells::cells(&points, &tree, &sites, &samples, &of_site, &part(0.9, 1.0))?;
     // What was chosen by its residuals is moved to where the surface is last.
     for (s, &site) in samples.iter_mut().zip(&of_site) {
         s.quadric = s.quadric.sharpened(s.center, sites.noise(site as usize));
@@ -303,22 +302,6 @@ fn least_gap(fits: &[Fit]) -> f64 {
     let mut gaps: Vec<f64> = fits.iter().map(|f| f.gap).filter(|g| g.is_finite()).collect();
     gaps.sort_unstable_by(f64::total_cmp);
     if gaps.len() * 100 > fits.len() { gaps[gaps.len() / 20] } else { f64::INFINITY }
-}
-
-/// A piece of the progress of a stage.
-struct Part<'a> {
-    observer: &'a dyn Observer,
-    from: f64,
-    to: f64,
-}
-
-impl Observer for Part<'_> {
-    fn progress(&self, fraction: f64) {
-        self.observer.progress(self.from + (self.to - self.from) * fraction);
-    }
-    fn cancelled(&self) -> bool {
-        self.observer.cancelled()
-    }
 }
 
 /// Different finite points in the order of their tree, with the index of each in the cloud.

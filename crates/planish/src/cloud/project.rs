@@ -84,9 +84,7 @@ pub fn project(
     let finite: Vec<u32> = (0..cloud.points.len() as u32).filter(|&i| cloud.points[i as usize].is_finite()).collect();
     let mut placed: Vec<Placed> = Vec::with_capacity(finite.len());
     while placed.len() < finite.len() {
-        if observer.cancelled() {
-            return Err(CloudError::Cancelled);
-        }
+        observer.check()?;
         observer.progress(placed.len() as f64 / finite.len() as f64);
         let range = placed.len()..(placed.len() + CHUNK).min(finite.len());
         placed.par_extend(range.into_par_iter().map_init(Vec::new, |near, k| {

@@ -27,7 +27,7 @@ use crate::contour::octree::Octree;
 use crate::contour::survey::Survey;
 use crate::field::{Creases, Directed};
 use crate::mesh::{FeatureKind, FeatureTags, TriMesh};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use cell::face;
 pub use polish::FieldCreases;
 pub use sources::{Meshed, MeshingError, Sampling, from_field, from_grid, from_mesh, from_part};
@@ -76,8 +76,8 @@ pub enum ContourError {
         vertices: usize,
     },
     /// The observer wants no result any more.
-    #[error("extraction cancelled")]
-    Cancelled,
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// A mesh with its features.
@@ -162,7 +162,7 @@ pub fn extract(
         .par_iter()
         .map(|&layers| (!observer.cancelled()).then(|| survey::survey(field, &points, &limits, base, layers, merged)))
         .collect();
-    let surveys = surveys.ok_or(ContourError::Cancelled)?;
+    let surveys = surveys.ok_or(Cancelled)?;
     observer.progress(0.3);
     let parts: Option<Vec<face::Part>> = surveys
         .par_iter()
@@ -171,7 +171,7 @@ pub fn extract(
             (!observer.cancelled()).then(|| face::face_points(field, &limits, creases, base, cells))
         })
         .collect();
-    let (faces, mut wishes) = FacePoints::join(field, parts.ok_or(ContourError::Cancelled)?, hits as u32);
+    let (faces, mut wishes) = FacePoints::join(field, parts.ok_or(Cancelled)?, hits as u32);
     observer.progress(0.6);
     let patcher = Patcher { field, points: &points, limits: &limits, faces: &faces, refine: creases, base };
     let sheets: Option<Vec<Sheet>> = surveys
@@ -188,7 +188,7 @@ pub fn extract(
             Some(sheet)
         })
         .collect();
-    let mut sheets = sheets.ok_or(ContourError::Cancelled)?;
+    let mut sheets = sheets.ok_or(Cancelled)?;
     let mut surveys = surveys;
     if let Some(octree) = &octree {
         // Larger cells come after all others.

@@ -8,7 +8,7 @@ use crate::field::{
     sample_grid,
 };
 use crate::mesh::TriMesh;
-use crate::observe::Observer;
+use crate::observe::{self, Observer};
 
 /// Where the lattice lies and how much memory it may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,22 +59,6 @@ pub struct Meshed {
     pub thin: Thin,
 }
 
-/// Two halves of the work as parts of one.
-struct Half<'a> {
-    observer: &'a dyn Observer,
-    from: f64,
-}
-
-impl Observer for Half<'_> {
-    fn progress(&self, fraction: f64) {
-        self.observer.progress(self.from + 0.5 * fraction);
-    }
-
-    fn cancelled(&self) -> bool {
-        self.observer.cancelled()
-    }
-}
-
 /// Remeshes a triangle mesh, sound or not ([K01] §5.3).
 /// # Errors
 /// [`MeshingError`].
@@ -88,9 +72,9 @@ pub fn from_mesh(
     let lattice = Lattice::around(&field.bounds(), sampling.spacing)?;
     let area = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
     lattice.check_memory(Some(area), sampling.memory)?;
-    let directed = field.sample(&lattice, &Half { observer, from: 0.0 })?;
+    let directed = field.sample(&lattice, &observe::Part::new(observer, 0.0, 0.5))?;
     let creases = field.creases(&lattice, params.sharp);
-    let extracted = extract(&directed, Some(&creases), params, &Half { observer, from: 0.5 })?;
+    let extracted = extract(&directed, Some(&creases), params, &observe::Part::new(observer, 0.5, 0.5))?;
     Ok(meshed(extracted, &directed))
 }
 
@@ -107,9 +91,9 @@ pub fn from_part(
         return from_mesh(mesh, sampling, params, observer);
     }
     let lattice = lattice_of(part, sampling)?;
-    let directed = part.sample(&lattice, &Half { observer, from: 0.0 })?;
+    let directed = part.sample(&lattice, &observe::Part::new(observer, 0.0, 0.5))?;
     let creases = FieldCreases::new(part, params.sharp, params.corner);
-    let extracted = extract(&directed, Some(&creases), params, &Half { observer, from: 0.5 })?;
+    let extracted = extract(&directed, Some(&creases), params, &observe::Part::new(observer, 0.5, 0.5))?;
     Ok(meshed(extracted, &directed))
 }
 
@@ -123,12 +107,12 @@ pub fn from_field(
     observer: &dyn Observer,
 ) -> Result<Meshed, MeshingError> {
     let lattice = lattice_of(field, sampling)?;
-    let directed = sample(field, &lattice, &Half { observer, from: 0.0 })?;
+    let directed = sample(field, &lattice, &observe::Part::new(observer, 0.0, 0.5))?;
     let creases = FieldCreases::new(field, params.sharp, params.corner);
     // Noisy gradients would lead the search for features astray.
     let exact = field.noise_deg() == 0.0;
     let creases: Option<&dyn crate::field::Creases> = if exact { Some(&creases) } else { None };
-    let extracted = extract(&directed, creases, params, &Half { observer, from: 0.5 })?;
+    let extracted = extract(&directed, creases, params, &observe::Part::new(observer, 0.5, 0.5))?;
     Ok(meshed(extracted, &directed))
 }
 
@@ -145,8 +129,8 @@ pub fn from_grid(
     let cells = grid.size.map(|n| n.saturating_sub(1));
     let own = Lattice { origin: grid.origin, step: grid.spacing, cells };
     own.check_memory(None, memory)?;
-    let directed = sample_grid(grid, grid_params, &Half { observer, from: 0.0 })?;
-    let extracted = extract(&directed, None, params, &Half { observer, from: 0.5 }).map_err(|e| {
+    let directed = sample_grid(grid, grid_params, &observe::Part::new(observer, 0.0, 0.5))?;
+    let extracted = extract(&directed, None, params, &observe::Part::new(observer, 0.5, 0.5)).map_err(|e| {
         let known = || grid.values.iter().copied().filter(|v| v.is_finite());
         let (low, high) = (known().fold(f32::INFINITY, f32::min), known().fold(f32::NEG_INFINITY, f32::max));
         let level = grid_params.iso;

@@ -115,9 +115,7 @@ pub fn carry_curve(
     let params = SnakeParams { fairness: 0.0, curvature: 1.0, sweeps: SMOOTHING, ..SnakeParams::default() };
     for _ in 0..SMOOTHING {
         snake.step(&params, super::Sweep::Single);
-        if observer.cancelled() {
-            return Err(CurveError::Cancelled);
-        }
+        observer.check()?;
     }
     Ok(snake.curve())
 }

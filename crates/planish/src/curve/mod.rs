@@ -11,6 +11,8 @@
 //! Departs from [K98]: two neighbours may lie any number of faces apart; [`connect`] finds the faces between
 //! them, so a curve may be sampled as coarsely as its shape allows.
 
+use crate::observe::Cancelled;
+
 pub mod attract;
 mod canvas;
 pub mod carry;
@@ -108,5 +110,5 @@ pub enum CurveError {
     },
     /// Stopped by the observer.
     #[error("cancelled")]
-    Cancelled,
+    Cancelled(#[from] Cancelled),
 }

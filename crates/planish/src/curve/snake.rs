@@ -595,9 +595,7 @@ impl<'m> Snake<'m> {
         let mut kind = params.sweep;
         let mut past: Vec<f64> = Vec::new();
         while out.sweeps < params.sweeps && !out.settled {
-            if observer.cancelled() {
-                return Err(CurveError::Cancelled);
-            }
+            observer.check()?;
             out.last_move = self.step(params, kind);
             out.sweeps += 1;
             out.solves += (kind == Sweep::Solve) as usize;

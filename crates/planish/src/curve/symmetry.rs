@@ -94,9 +94,7 @@ pub fn find(mesh: &TriMesh, bvh: &Bvh, observer: &dyn Observer) -> Result<(Plane
     }
     let mut best: Option<(f64, Plane)> = None;
     for (k, &normal) in candidates.iter().enumerate() {
-        if observer.cancelled() {
-            return Err(CurveError::Cancelled);
-        }
+        observer.check()?;
         observer.progress(k as f64 / candidates.len() as f64);
         let (plane, miss) = refine(bvh, &samples, Plane { point: center, normal }, ROUNDS);
         if best.as_ref().is_none_or(|b| miss < b.0) {

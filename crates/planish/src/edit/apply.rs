@@ -6,7 +6,7 @@ use super::work::{Ground, Work};
 use super::{ApplyError, Edit, Made, Others, keep};
 use crate::edit::network::Editor;
 use crate::model::Drawing;
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 
 /// Makes one edit, and tells what it did. On an error the drawing is what it was. Patches are those of the curves
 /// afterwards.
@@ -28,7 +28,7 @@ pub fn apply(
     let (images, relaxed) = (work.images.take(), std::mem::take(&mut work.relaxed));
     if observer.cancelled() || made.is_err() {
         *drawing = before;
-        return Err(made.err().unwrap_or(ApplyError::Cancelled));
+        return Err(made.err().unwrap_or(Cancelled.into()));
     }
     let canvas = &ground.canvas;
     let moved = drawing.network.corners != before.network.corners || drawing.network.curves != before.network.curves;

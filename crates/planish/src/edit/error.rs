@@ -3,6 +3,7 @@
 use super::network::EditError;
 use crate::curve::CurveError;
 use crate::grid::FeatureError;
+use crate::observe::Cancelled;
 
 /// Why an edit was not made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -132,5 +133,5 @@ pub enum ApplyError {
     NotADrawing,
     /// Stopped by the observer.
     #[error("cancelled")]
-    Cancelled,
+    Cancelled(#[from] Cancelled),
 }

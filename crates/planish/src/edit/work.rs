@@ -8,7 +8,7 @@ use crate::geom::Bvh;
 use crate::grid::check_features;
 use crate::mesh::{FacePoint, TriMesh, sharp_edges};
 use crate::model::Drawing;
-use crate::network::{Corner, Curve, CurveKind, Network, PatchMesh, imprint};
+use crate::network::{Corner, Curve, CurveKind, ImprintError, Network, PatchMesh, imprint};
 use crate::observe::Observer;
 use glam::DVec3;
 use std::sync::OnceLock;
@@ -202,7 +202,10 @@ impl Work<'_, '_> {
         let middle = points.get(points.len() / 2).map_or(DVec3::ZERO, |p| p.position(mesh));
         changed.points = points;
         let number = changed.patch;
-        let cut = imprint(mesh, &self.drawing.network).ok();
+        let cut = match imprint(mesh, &self.drawing.network, self.observer) {
+            Err(ImprintError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            other => other.ok(),
+        };
         let patch = cut.as_ref().and_then(|patches| patches.get(number as usize));
         self.check_features(number, patch.ok_or(ApplyError::NoPatch { place: middle.to_array() })?)
     }
@@ -241,7 +244,10 @@ impl Work<'_, '_> {
     /// The finished patch that a place lies in, and its number.
     pub(super) fn patch_at(&self, place: &FacePoint) -> Result<(u32, PatchMesh), ApplyError> {
         let nowhere = || ApplyError::NoPatch { place: place.position(self.mesh()).to_array() };
-        let mut cut = imprint(self.mesh(), &self.drawing.network).map_err(|_| nowhere())?;
+        let mut cut = imprint(self.mesh(), &self.drawing.network, self.observer).map_err(|e| match e {
+            ImprintError::Cancelled(c) => c.into(),
+            _ => nowhere(),
+        })?;
         let p = place.position(self.mesh());
         // The patch with the part of the face that is nearest to the place.
         let near = cut.iter().enumerate().flat_map(|(k, patch)| {

@@ -13,7 +13,7 @@ use super::kink::{Around, is_bent};
 use super::levels::Levels;
 use super::scalar_grid::{GradientRule, GridParams, ScalarGrid};
 use super::{FieldError, Lattice};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -45,7 +45,7 @@ pub fn sample_grid(grid: &ScalarGrid, params: &GridParams, observer: &dyn Observ
             (!observer.cancelled()).then(|| slab.read(s * PLANES, ((s + 1) * PLANES).min(planes)))
         })
         .collect();
-    let Some(slabs) = slabs else { return Err(FieldError::Cancelled) };
+    let slabs = slabs.ok_or(Cancelled)?;
     let (sides, axes): (Vec<Sides>, Vec<[Hits; 3]>) = slabs.into_iter().unzip();
     let [mut x, mut y, mut z] = [const { Vec::new() }; 3];
     for [a, b, c] in axes {

@@ -4,6 +4,8 @@
 
 use crate::geom::Aabb;
 use glam::DVec3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// A regular lattice of cubic cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,12 +62,13 @@ pub enum LatticeError {
 }
 
 /// The size of cells as a user gives it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Spacing {
-    /// Edge of a cell, world units.
-    Voxel(f64),
-    /// Cells along the longest side of the bounds.
-    Resolution(usize),
+    /// Edge of a cell
+    Voxel(#[schemars(extend("exclusiveMinimum" = 0.0, "unit" = "input units"))] f64),
+    /// Cells along the longest side
+    Resolution(#[schemars(range(min = 1))] usize),
 }
 
 impl Lattice {

@@ -18,7 +18,7 @@ use super::{FieldError, Lattice};
 use crate::geom::Aabb;
 use crate::geom::predicates::{orient2d, orient3d};
 use crate::mesh::TriMesh;
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -85,11 +85,9 @@ impl<'a> MeshField<'a> {
     pub fn sample(&self, lattice: &Lattice, observer: &dyn Observer) -> Result<Directed, FieldError> {
         let normals: Vec<DVec3> =
             (0..self.mesh.triangles.len()).into_par_iter().map(|t| self.mesh.normal(t) * self.turn as f64).collect();
-        let crossings = rasterise(self.mesh, lattice, observer).ok_or(FieldError::Cancelled)?;
+        let crossings = rasterise(self.mesh, lattice, observer)?;
         observer.progress(0.5);
-        if observer.cancelled() {
-            return Err(FieldError::Cancelled);
-        }
+        observer.check()?;
         let mut field = if self.balanced {
             self.by_counting(lattice, &crossings, &normals)
         } else {
@@ -269,23 +267,21 @@ fn starts(crossings: &[Crossing], lines: usize) -> Vec<usize> {
 /// Triangles a task takes at once.
 const CHUNK: usize = 1 << 12;
 
-/// All crossings of each axis, sorted along its lines; none if cancelled.
-fn rasterise(mesh: &TriMesh, lattice: &Lattice, observer: &dyn Observer) -> Option<[Vec<Crossing>; 3]> {
-    let parts: Option<Vec<[Vec<Crossing>; 3]>> = (0..mesh.triangles.len().div_ceil(CHUNK))
+/// All crossings of each axis, sorted along its lines.
+fn rasterise(mesh: &TriMesh, lattice: &Lattice, observer: &dyn Observer) -> Result<[Vec<Crossing>; 3], Cancelled> {
+    let parts: Result<Vec<[Vec<Crossing>; 3]>, Cancelled> = (0..mesh.triangles.len().div_ceil(CHUNK))
         .into_par_iter()
         .map(|c| {
-            if observer.cancelled() {
-                return None;
-            }
+            observer.check()?;
             let mut out: [Vec<Crossing>; 3] = Default::default();
             for t in c * CHUNK..((c + 1) * CHUNK).min(mesh.triangles.len()) {
                 rasterise_one(mesh.corners(t), t as u32, lattice, &mut out);
             }
-            Some(out)
+            Ok(out)
         })
         .collect();
     let mut parts = parts?;
-    Some([0, 1, 2].map(|axis| {
+    Ok([0, 1, 2].map(|axis| {
         let own: Vec<Vec<Crossing>> = parts.iter_mut().map(|part| std::mem::take(&mut part[axis])).collect();
         sorted(lattice, axis, &own)
     }))

@@ -50,6 +50,7 @@ pub use winding::Winding;
 
 use crate::geom::Aabb;
 use crate::mesh::MeshError;
+use crate::observe::Cancelled;
 use glam::DVec3;
 
 /// Why a field cannot be made or sampled.
@@ -68,8 +69,8 @@ pub enum FieldError {
         what: String,
     },
     /// The observer wants no result any more.
-    #[error("sampling cancelled")]
-    Cancelled,
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// On which side of the surface a point lies.

@@ -6,7 +6,7 @@
 use super::directed::{self, Directed, Hit, Hits, Sides};
 use super::{Field, FieldError, Lattice, Side};
 use crate::geom::Aabb;
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -23,9 +23,7 @@ const FEW: usize = 2;
 /// [`FieldError::Cancelled`].
 pub fn sample(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> Result<Directed, FieldError> {
     let sides = sides(field, lattice, observer)?;
-    if observer.cancelled() {
-        return Err(FieldError::Cancelled);
-    }
+    observer.check()?;
     let none = || Hits { start: vec![0; lattice.rows() + 1], ..Hits::default() };
     let cancelled = std::sync::atomic::AtomicBool::new(false);
     let row = |j: usize, k: usize| -> directed::Missing {
@@ -49,7 +47,7 @@ pub fn sample(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> 
     };
     let mut found = Directed::assemble_rows(*lattice, sides, [none(), none(), none()], &row);
     if cancelled.into_inner() || observer.cancelled() {
-        return Err(FieldError::Cancelled);
+        return Err(Cancelled.into());
     }
     found.mended = 0;
     found.noise_deg = field.noise_deg();
@@ -78,7 +76,7 @@ pub fn sides(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> R
         })
         .collect();
     let rows: Option<Vec<Vec<Vec<u32>>>> = rows.into_iter().collect();
-    let Some(rows) = rows else { return Err(FieldError::Cancelled) };
+    let rows = rows.ok_or(Cancelled)?;
     debug_assert_eq!(rows.iter().map(Vec::len).sum::<usize>(), ny * nz);
     Ok(Sides::from_rows(rows.into_iter().flatten()))
 }

@@ -10,6 +10,7 @@
 //! ([`PAD`]); they only rule out. What counts, the distance to a triangle, is `f64` in world units.
 
 use super::{Aabb, FacePoint};
+use crate::observe::{Cancelled, Observer, Silent};
 use glam::{DVec3, Vec3A, Vec4};
 use rayon::prelude::*;
 
@@ -132,6 +133,18 @@ impl Bvh {
     /// # Panics
     /// If there is no triangle.
     pub fn new<'a>(surface: impl Into<Triangles<'a>>) -> Bvh {
+        match Bvh::watched(surface, &Silent) {
+            Ok(tree) => tree,
+            Err(Cancelled) => unreachable!("nobody cancels"),
+        }
+    }
+
+    /// As [`Bvh::new`], where an observer may stop it.
+    /// # Errors
+    /// [`Cancelled`].
+    /// # Panics
+    /// If there is no triangle.
+    pub fn watched<'a>(surface: impl Into<Triangles<'a>>, observer: &dyn Observer) -> Result<Bvh, Cancelled> {
         let mesh = surface.into();
         assert!(!mesh.triangles.is_empty(), "a mesh with triangles");
         let unit = Unit::of(&Aabb::of(mesh.triangles.iter().flatten().map(|&v| &mesh.points[v as usize])));
@@ -142,10 +155,10 @@ impl Bvh {
                 Item { min: a.min(b).min(c) - PAD, max: a.max(b).max(c) + PAD, face: t as u32 }
             })
             .collect();
-        let nodes = build(&mut items, 0, 0);
+        let nodes = build(&mut items, 0, 0, observer)?;
         let faces: Vec<u32> = items.par_iter().map(|i| i.face).collect();
         let corners = faces.par_iter().map(|&f| mesh.corners(f as usize)).collect();
-        Bvh { nodes, corners, faces, unit }
+        Ok(Bvh { nodes, corners, faces, unit })
     }
 
     /// The place of the surface closest to `point`.
@@ -284,11 +297,12 @@ impl Interval {
 }
 
 /// The nodes of a subtree, the root first; `base` is the place of its first item among all.
-fn build(items: &mut [Item], base: usize, depth: usize) -> Vec<Node> {
+fn build(items: &mut [Item], base: usize, depth: usize, observer: &dyn Observer) -> Result<Vec<Node>, Cancelled> {
+    observer.check()?;
     if items.len() <= ALONE {
         let mut nodes = Vec::with_capacity(items.len() / 2 + 1);
         grow(items, base, depth, &mut nodes);
-        return nodes;
+        return Ok(nodes);
     }
     let (mut root, mut parts) = (Node::EMPTY, Vec::new());
     let mut rest = items;
@@ -301,8 +315,8 @@ fn build(items: &mut [Item], base: usize, depth: usize) -> Vec<Node> {
         }
         first += size;
     }
-    let subtrees: Vec<(usize, Vec<Node>)> =
-        parts.into_par_iter().map(|(k, part, first)| (k, build(part, first, depth + 1))).collect();
+    let subtree = |(k, part, first)| Ok((k, build(part, first, depth + 1, observer)?));
+    let subtrees: Vec<(usize, Vec<Node>)> = parts.into_par_iter().map(subtree).collect::<Result<_, Cancelled>>()?;
     let mut nodes = Vec::with_capacity(1 + subtrees.iter().map(|s| s.1.len()).sum::<usize>());
     nodes.push(root);
     for (k, subtree) in subtrees {
@@ -315,7 +329,7 @@ fn build(items: &mut [Item], base: usize, depth: usize) -> Vec<Node> {
             node
         }));
     }
-    nodes
+    Ok(nodes)
 }
 
 /// Appends a subtree to `nodes`, its root first.

@@ -88,33 +88,28 @@ fn follow_patch(
     caught: f64,
     observer: &dyn Observer,
 ) -> Result<Grid, Fault> {
-    let cancelled = || observer.cancelled();
     let (cols, rows, stops) = (old.cols, old.rows, SideStops::default());
-    let chart = flatten(input, patch, &stops, [cols, rows], &cancelled)?;
+    let chart = flatten(input, patch, &stops, [cols, rows], observer)?;
     let from_nothing = || relax_patch(input, patch, (cols, rows), &stops, params, caught, observer);
     let Some(net) = carried(&chart, patch, old) else { return from_nothing() };
-    let net = settled_coarsely(net, params, &cancelled)?;
-    let mut net = settle(net, FINE_EFFORT, params, &cancelled)?;
-    catch(&mut net, caught, &cancelled)?;
-    if !open_folds(&mut net, false, &cancelled)? && !folded_cells(&net).is_empty() {
+    let net = settled_coarsely(net, params, observer)?;
+    let mut net = settle(net, FINE_EFFORT, params, observer)?;
+    catch(&mut net, caught, observer)?;
+    if !open_folds(&mut net, false, observer)? && !folded_cells(&net).is_empty() {
         return from_nothing();
     }
     Ok(laid(&chart, &net.spots, patch, (cols, rows), &stops))
 }
 
 /// The net with the moves that bring its coarse net to rest, blended between the coarse nodes.
-fn settled_coarsely<'a>(
-    net: Net<'a>,
-    params: &GridParams,
-    cancelled: &(dyn Fn() -> bool + Sync),
-) -> Result<Net<'a>, Fault> {
+fn settled_coarsely<'a>(net: Net<'a>, params: &GridParams, observer: &dyn Observer) -> Result<Net<'a>, Fault> {
     let (cols, rows) = (net.cols, net.rows);
     if cols.min(rows) <= 2 * COARSE * COARSE {
         return Ok(net);
     }
     let fewer = |n: usize| (n - 1).div_ceil(COARSE) + 1;
     let before = net.resampled(fewer(cols), fewer(rows));
-    let after = settle(before.clone(), COARSE_EFFORT, params, cancelled)?;
+    let after = settle(before.clone(), COARSE_EFFORT, params, observer)?;
     let moves: Vec<DVec2> = before.uv.iter().zip(&after.uv).map(|(a, b)| *b - *a).collect();
     let cell = |k: usize, n: usize, m: usize| {
         let x = k as f64 * (m - 1) as f64 / (n - 1) as f64;

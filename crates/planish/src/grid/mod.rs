@@ -28,13 +28,13 @@ pub use feature::network::{check_features, family_of, relax_network};
 pub use feature::{Family, FeatureCurve, FeatureError};
 pub use follow::follow;
 pub use quality::{GridQuality, measure};
-pub use resample::{resample, resample_with_features};
+pub use resample::resample;
 pub use sizes::choose_sizes;
 
 use crate::grid::chart::locate::Spot;
 use crate::mesh::{FacePoint, TriMesh};
 use crate::network::PatchMesh;
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use net::springs;
 use rayon::prelude::*;
@@ -149,7 +149,7 @@ pub enum GridError {
     },
     /// The observer no longer wanted the result.
     #[error("cancelled")]
-    Cancelled,
+    Cancelled(#[from] Cancelled),
 }
 
 /// What is wrong with one patch; becomes a [`GridError`] with its index.
@@ -158,7 +158,13 @@ enum Fault {
     NotADisk(&'static str),
     DegenerateSide(usize),
     Folded(usize),
-    Cancelled,
+    Cancelled(Cancelled),
+}
+
+impl From<Cancelled> for Fault {
+    fn from(cancelled: Cancelled) -> Fault {
+        Fault::Cancelled(cancelled)
+    }
 }
 
 impl Fault {
@@ -167,7 +173,7 @@ impl Fault {
             Fault::NotADisk(reason) => GridError::NotADisk { patch, reason },
             Fault::DegenerateSide(side) => GridError::DegenerateSide { patch, side },
             Fault::Folded(triangles) => GridError::Folded { patch, triangles },
-            Fault::Cancelled => GridError::Cancelled,
+            Fault::Cancelled(c) => c.into(),
         }
     }
 }
@@ -233,9 +239,7 @@ fn relax_jobs(
         .par_iter()
         .with_max_len(1)
         .map(|&(k, patch, (cols, rows))| {
-            if observer.cancelled() {
-                return Err(GridError::Cancelled);
-            }
+            observer.check()?;
             if cols < 2 || rows < 2 {
                 return Err(GridError::TooSmall { patch: k, cols, rows });
             }
@@ -269,9 +273,8 @@ fn relax_patch(
     caught: f64,
     observer: &dyn Observer,
 ) -> Result<Grid, Fault> {
-    let cancelled = || observer.cancelled();
-    let chart = chart::flatten(input, patch, stops, [cols, rows], &cancelled)?;
-    let spots = springs::relax(&chart, cols, rows, params, caught, &cancelled)?;
+    let chart = chart::flatten(input, patch, stops, [cols, rows], observer)?;
+    let spots = springs::relax(&chart, cols, rows, params, caught, observer)?;
     Ok(laid(&chart, &spots, patch, (cols, rows), stops))
 }
 

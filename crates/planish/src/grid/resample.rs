@@ -45,27 +45,11 @@ const FIRST_SHARE: f64 = 0.6;
 /// [`FACTOR`] along a side, and up to [`GROWTH`] times the points of the start, `params.max_side` and `params.max_points`.
 ///
 /// Where a grid still misses more after a few rounds, it is what is reached: [`super::measure`] tells.
-/// # Errors
-/// As [`relax`].
-pub fn resample(
-    input: &TriMesh,
-    network: &Network,
-    patches: &[PatchMesh],
-    params: &GridParams,
-    observer: &dyn Observer,
-) -> Result<Vec<Grid>, GridError> {
-    let make = |which: &[usize], sizes: &[(usize, usize)], observer: &dyn Observer| {
-        let jobs: Vec<Job> = which.iter().map(|&p| (p, &patches[p], sizes[p])).collect();
-        relax_jobs(input, &jobs, &[], params, observer)
-    };
-    refined(input, network, patches, params, &|_| Ok(()), &make, observer)
-}
-
-/// As [`resample`], with feature curves as iso-curves of the grids of their patches; cells that sections give go over
-/// what the patches want.
+/// * `drawn` - feature curves, which become iso-curves of the grids of their patches; cells that sections give go over
+///   what the patches want. Mostly empty.
 /// # Errors
 /// As [`relax_network`](super::relax_network).
-pub fn resample_with_features(
+pub fn resample(
     input: &TriMesh,
     network: &Network,
     patches: &[PatchMesh],
@@ -74,6 +58,10 @@ pub fn resample_with_features(
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, FeatureError> {
     let make = |which: &[usize], sizes: &[(usize, usize)], observer: &dyn Observer| {
+        if drawn.0.is_empty() && drawn.1.is_empty() {
+            let jobs: Vec<Job> = which.iter().map(|&p| (p, &patches[p], sizes[p])).collect();
+            return Ok(relax_jobs(input, &jobs, &[], params, observer)?);
+        }
         relax_some(input, network, patches, sizes, drawn, which, params, observer)
     };
     refined(input, network, patches, params, &|sizes| give_sums(network, drawn, sizes), &make, observer)
@@ -81,21 +69,21 @@ pub fn resample_with_features(
 
 /// Points along u and v.
 type Size = (usize, usize);
-type Give<'a, E> = dyn Fn(&mut [Size]) -> Result<(), E> + 'a;
-type Make<'a, E> = dyn Fn(&[usize], &[Size], &dyn Observer) -> Result<Vec<Grid>, E> + 'a;
+type Give<'a> = dyn Fn(&mut [Size]) -> Result<(), FeatureError> + 'a;
+type Make<'a> = dyn Fn(&[usize], &[Size], &dyn Observer) -> Result<Vec<Grid>, FeatureError> + 'a;
 
 /// Relaxes all patches, and those that need it again with more points.
 /// * `give` - puts sizes that are given in the place of those chosen
 /// * `make` - grids of some patches, rising, by the sizes of all
-fn refined<E: From<GridError>>(
+fn refined(
     input: &TriMesh,
     network: &Network,
     patches: &[PatchMesh],
     params: &GridParams,
-    give: &Give<E>,
-    make: &Make<E>,
+    give: &Give,
+    make: &Make,
     observer: &dyn Observer,
-) -> Result<Vec<Grid>, E> {
+) -> Result<Vec<Grid>, FeatureError> {
     let mut sizes = choose_sizes(network, patches, params);
     give(&mut sizes)?;
     let all: Vec<usize> = (0..patches.len()).collect();
@@ -109,9 +97,7 @@ fn refined<E: From<GridError>>(
     // What was wrong with the patches that asked for the last round.
     let mut before: Vec<Option<Fault>> = vec![None; patches.len()];
     for round in 0..ROUNDS {
-        if observer.cancelled() {
-            return Err(GridError::Cancelled.into());
-        }
+        observer.check().map_err(GridError::from)?;
         let fault = |p: usize, grid: &Grid| {
             let folds = folds(grid, &patches[p]);
             let floor = if folds > 0 { FOLDED * allowed } else { 0.0 };
@@ -127,7 +113,7 @@ fn refined<E: From<GridError>>(
         };
         let misses = wants(&past_help);
         // Long chords carry one patch's need far: where that asks for too many points, only the worst are heeded.
-        let wish = |misses: &[f64]| -> Result<Vec<Size>, E> {
+        let wish = |misses: &[f64]| -> Result<Vec<Size>, FeatureError> {
             let mut limit = allowed;
             loop {
                 let mut wanted = finer(network, &chords, &grids, &suspects, misses, limit, most);

@@ -37,7 +37,7 @@ pub(super) fn quads(bench: &mut Bench) -> bool {
 
 /// Relaxes all nodes and arcs once.
 pub(super) fn relax(bench: &mut Bench, observer: &dyn Observer) -> Result<(), LayoutError> {
-    let cancelled = || if observer.cancelled() { Err(LayoutError::Cancelled) } else { Ok(()) };
+    let cancelled = || observer.check();
     let nodes: Vec<u32> = (0..bench.complex.nodes.len() as u32).collect();
     cancelled()?;
     bench.sweep(&nodes, |complex, stars, n| star_change(complex, &stars[n as usize]));
@@ -49,9 +49,7 @@ pub(super) fn relax(bench: &mut Bench, observer: &dyn Observer) -> Result<(), La
 
 /// Draws all smooth arcs anew, straight in the map of their two cells.
 pub(super) fn straighten(bench: &mut Bench, observer: &dyn Observer) -> Result<(), LayoutError> {
-    if observer.cancelled() {
-        return Err(LayoutError::Cancelled);
-    }
+    observer.check()?;
     let arcs: Vec<u32> = bench.complex.live_arcs().collect();
     bench.sweep(&arcs, |complex, _, a| arc_change(complex, a));
     Ok(())
@@ -109,9 +107,7 @@ fn settle_some(
 ) -> Result<Vec<bool>, LayoutError> {
     let mut all = vec![false; fresh.len()];
     for _ in 0..rounds {
-        if observer.cancelled() {
-            return Err(LayoutError::Cancelled);
-        }
+        observer.check()?;
         let complex = &bench.complex;
         let arcs = complex.live_arcs().filter_map(|a| arc_change(complex, a));
         let stars = complex.stars().into_iter().filter_map(|s| star_change(complex, &s));

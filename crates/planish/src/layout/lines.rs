@@ -7,6 +7,7 @@
 use super::LayoutParams;
 use crate::mesh::sets::Sets;
 use crate::mesh::{Adjacency, NONE, TriMesh, next, sharp_edges};
+use crate::observe::{Cancelled, Observer};
 use crate::sharp::{bridge_gaps, cut_spikes};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -33,12 +34,13 @@ pub(super) fn feature_lines(
     adjacency: &Adjacency,
     tagged: &[bool],
     params: &LayoutParams,
-) -> Vec<bool> {
+    observer: &dyn Observer,
+) -> Result<Vec<bool>, Cancelled> {
     if tagged.contains(&true) {
         let inner = |h: usize| adjacency.opposite[h] != NONE;
         let mut kept: Vec<bool> = tagged.iter().enumerate().map(|(h, &t)| t && inner(h)).collect();
-        drop_detail(mesh, adjacency, params.feature_length * mesh.bounds().diagonal(), &mut kept);
-        return kept;
+        drop_detail(mesh, adjacency, params.feature_length * mesh.bounds().diagonal(), &mut kept, observer)?;
+        return Ok(kept);
     }
     let sharp = sharp_edges(mesh, adjacency, params.sharp_angle_deg);
     let edges: f64 = (0..sharp.len() as u32).map(|h| mesh.edge_length(h)).sum();
@@ -61,8 +63,8 @@ pub(super) fn feature_lines(
             kept[adjacency.opposite[h] as usize] = true;
         }
     }
-    drop_detail(mesh, adjacency, params.feature_length * mesh.bounds().diagonal(), &mut kept);
-    kept
+    drop_detail(mesh, adjacency, params.feature_length * mesh.bounds().diagonal(), &mut kept, observer)?;
+    Ok(kept)
 }
 
 /// Mean unit normal of the surface to the left of sharp half-edge `h`, up to `reach` from its middle and to the
@@ -96,13 +98,21 @@ fn mean_normal(mesh: &TriMesh, adjacency: &Adjacency, sharp: &[bool], h: u32, re
 /// Bridges gaps of lines, and clears what is surface detail: lines with a loose end that are shorter than `shortest`, the
 /// lines around regions smaller than a circle of half that length around, spikes a quarter of it around, and connected
 /// lines shorter than half of it together.
-fn drop_detail(mesh: &TriMesh, adjacency: &Adjacency, shortest: f64, sharp: &mut [bool]) {
+fn drop_detail(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    shortest: f64,
+    sharp: &mut [bool],
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
     let around = CLOSED_SHARE * shortest;
     let smallest = around * around / (4.0 * std::f64::consts::PI);
-    bridge_gaps(mesh, adjacency, sharp);
+    bridge_gaps(mesh, adjacency, sharp, observer)?;
+    observer.check()?;
     cut_spikes(mesh, adjacency, SPIKE_SHARE * shortest, sharp);
     while drop_loose(mesh, adjacency, shortest, sharp) | drop_regions(mesh, adjacency, smallest, sharp) {}
     drop_short(mesh, adjacency, around, sharp);
+    Ok(())
 }
 
 fn clear(adjacency: &Adjacency, sharp: &mut [bool], h: u32) {
@@ -238,7 +248,7 @@ pub mod tests {
         ] {
             let mut sharp = vec![false; adjacency.opposite.len()];
             mark(&mesh, &adjacency, &mut sharp, &places);
-            drop_detail(&mesh, &adjacency, shortest, &mut sharp);
+            drop_detail(&mesh, &adjacency, shortest, &mut sharp, &crate::Silent).unwrap();
             assert_eq!(sharp.iter().filter(|&&s| s).count() / 2, kept, "{places:?}");
         }
     }

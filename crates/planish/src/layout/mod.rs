@@ -33,7 +33,7 @@ use crate::layout::refine::Refined;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
 use crate::network::imprint::{self, Shared};
 use crate::network::{Corner, Curve, Network, Patch, Side};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
@@ -105,49 +105,39 @@ pub enum LayoutError {
     },
     /// Stopped by the observer.
     #[error("cancelled")]
-    Cancelled,
+    Cancelled(#[from] Cancelled),
+}
+
+/// Lines that are known before a network is laid; each may be empty.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Known<'a> {
+    /// For each half-edge whether it is sharp, whatever the angles say; short and loose lines of them are left out as with
+    /// any. Empty to go by the angles.
+    pub sharp: &'a [bool],
+    /// For each half-edge whether it becomes a patch boundary like a feature line.
+    pub lines: &'a [bool],
+    /// For each vertex of such lines whether it becomes a corner.
+    pub corners: &'a [bool],
 }
 
 /// Lays a conforming network of four-sided patches on `mesh`, an oriented manifold with or without boundary.
 ///
 /// Sharp lines and boundaries lie on patch boundaries; every patch is an exact disk ([`crate::network::imprint`]).
 /// # Errors
-/// `NotManifold` for a mesh that needs repair, `Stuck` if its faces are degenerate beyond use.
-pub fn layout(mesh: &TriMesh, params: &LayoutParams, observer: &dyn Observer) -> Result<Network, LayoutError> {
-    layout_around(mesh, &[], &[], &[], params, observer)
-}
-
-/// As [`layout`], where the sharp edges are known: the half-edges `tagged` are the sharp ones, whatever the angles say;
-/// short and loose lines of them are left out as with any. Empty if nothing is known.
-/// # Errors
-/// As [`layout`].
-pub fn layout_tagged(
+/// `NotManifold` for a mesh that needs repair, `Stuck` if its faces are degenerate beyond use; `Cancelled`.
+pub fn layout(
     mesh: &TriMesh,
-    tagged: &[bool],
+    known: Known,
     params: &LayoutParams,
     observer: &dyn Observer,
 ) -> Result<Network, LayoutError> {
-    layout_around(mesh, &[], &[], tagged, params, observer)
-}
-
-/// As [`layout`], around lines that are given: the half-edges `lines` become patch boundaries like sharp lines,
-/// the vertices `corners` of them corners; `tagged` as in [`layout_tagged`]. All may be empty.
-/// # Errors
-/// As [`layout`].
-pub(crate) fn layout_around(
-    mesh: &TriMesh,
-    lines: &[bool],
-    corners: &[bool],
-    tagged: &[bool],
-    params: &LayoutParams,
-    observer: &dyn Observer,
-) -> Result<Network, LayoutError> {
+    let Known { sharp: tagged, lines, corners } = known;
     check(mesh)?;
     let adjacency = Adjacency::new(mesh);
     let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
     let side = (area / params.patches.max(1) as f64).sqrt();
     let mut edge = EDGE_TO_SIDE * side;
-    let mut sharp = lines::feature_lines(mesh, &adjacency, tagged, params);
+    let mut sharp = lines::feature_lines(mesh, &adjacency, tagged, params, observer)?;
     sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
     let mut fixed = vec![false; mesh.points.len()];
     for h in 0..sharp.len() as u32 {

@@ -301,18 +301,14 @@ pub(super) fn partition(
 ) -> Result<(Vec<u32>, usize), LayoutError> {
     let mut sites = ground.sample(count, reach);
     for _ in 0..LLOYD_ROUNDS {
-        if observer.cancelled() {
-            return Err(LayoutError::Cancelled);
-        }
+        observer.check()?;
         sites = ground.middles(&ground.cells(&sites).via, sites.len());
     }
     let mut ways = ground.cells(&sites);
     let mut is_site = vec![false; ways.via.len()];
     sites.iter().for_each(|&f| is_site[f as usize] = true);
     for round in 0.. {
-        if observer.cancelled() {
-            return Err(LayoutError::Cancelled);
-        }
+        observer.check()?;
         let mut wanted = ground.wanted(&ways.via, &ways.distance, sites.len(), round >= GENTLE_ROUNDS);
         wanted.retain(|&f| !std::mem::replace(&mut is_site[f as usize], true));
         if wanted.is_empty() {

@@ -12,6 +12,7 @@ use crate::geom::Aabb;
 use crate::geom::graph::{self, Dense, Reached};
 use crate::mesh::sets::Sets;
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 
 /// A handle or a hole with a loop shorter than this share of the diagonal is none: less than a three-hundredth wide.
@@ -26,7 +27,12 @@ const TIGHTENED: usize = 3;
 const MOST_VERTICES: usize = 96;
 
 /// Cuts the handles of an oriented manifold that are shorter around than [`TINY_LOOP`]; returns their number.
-pub(super) fn close(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &mut Vec<u32>) -> usize {
+pub(super) fn close(
+    mesh: &TriMesh,
+    triangles: &mut Vec<[u32; 3]>,
+    source: &mut Vec<u32>,
+    observer: &dyn Observer,
+) -> Result<usize, Cancelled> {
     let size = TINY_LOOP * Aabb::of(&mesh.points).diagonal();
     let mut closed = 0;
     let mut seeds: Option<Vec<u32>> = None;
@@ -50,6 +56,7 @@ pub(super) fn close(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &mut 
         // cuts elsewhere make none.
         let mut again = Vec::new();
         for &seed in &suspects {
+            observer.check()?;
             if busy[seed as usize] {
                 again.push(seed);
                 continue;
@@ -73,7 +80,7 @@ pub(super) fn close(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &mut 
         }
         seeds = Some(again);
     }
-    closed
+    Ok(closed)
 }
 
 /// Pieces of a surface around vertices.
@@ -391,7 +398,7 @@ mod tests {
     fn a_handle_of_six_triangles_is_closed_and_no_vertex_moves() {
         let mesh = with_a_handle();
         assert_eq!(diagnose(&mesh).genus, Some(1));
-        let (mended, done) = repair(&mesh).unwrap();
+        let (mended, done) = repair(&mesh, &crate::Silent).unwrap();
         let facts = diagnose(&mended);
         assert_eq!((done.closed_handles, facts.genus, facts.components), (1, Some(0), 2));
         assert!(facts.watertight && facts.manifold);
@@ -411,7 +418,7 @@ mod tests {
                 .min_by(|&a, &b| mesh.corners(a)[0].distance(at).total_cmp(&mesh.corners(b)[0].distance(at)))
                 .expect("a face of the sphere");
             mesh.triangles.swap_remove(hole);
-            let (mended, done) = repair(&mesh).unwrap();
+            let (mended, done) = repair(&mesh, &crate::Silent).unwrap();
             let facts = diagnose(&mended);
             assert_eq!((done.closed_handles, facts.genus, facts.components), (1, Some(0), 2));
             assert_eq!((done.closed_holes, facts.boundary_loops), (1, 0));
@@ -422,7 +429,7 @@ mod tests {
     fn thick_handles_and_thin_rings_stay() {
         for thin in [0.3, 0.002] {
             let mesh = shapes::torus(1.0, thin, 96, 12);
-            let (mended, done) = repair(&mesh).unwrap();
+            let (mended, done) = repair(&mesh, &crate::Silent).unwrap();
             assert_eq!(done.closed_handles, 0);
             assert_eq!(mended, mesh);
         }

@@ -6,6 +6,7 @@
 
 use super::lids::{Lid, least_area, lid};
 use crate::mesh::{Adjacency, FeatureKind, FeatureTags, TriMesh, boundary_loops, components, next};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -19,30 +20,38 @@ const CRACK: usize = 6;
 const MOST_EDGES: usize = 400;
 
 /// Closes the holes of an oriented manifold that are at most `longest` around; returns their number.
-pub fn close_holes(mesh: &mut TriMesh, tags: &mut FeatureTags, longest: f64) -> usize {
+/// # Errors
+/// [`Cancelled`]; the mesh is then as it was.
+pub fn close_holes(
+    mesh: &mut TriMesh,
+    tags: &mut FeatureTags,
+    longest: f64,
+    observer: &dyn Observer,
+) -> Result<usize, Cancelled> {
     let adjacency = Adjacency::new(mesh);
     let (piece, pieces) = components(&adjacency);
     let mut area = vec![0.0; pieces];
     (0..mesh.triangles.len()).for_each(|t| area[piece[t] as usize] += mesh.area(t));
     let loops = boundary_loops(&adjacency);
-    let made: Vec<Option<(Vec<u32>, Lid)>> = loops
+    let made = loops
         .par_iter()
         .map(|around| {
+            observer.check()?;
             let length: f64 = around.iter().map(|&h| step(mesh, h).length()).sum();
             let disk = length * length / (4.0 * std::f64::consts::PI);
             if length > longest
                 || around.len() > MOST_EDGES
                 || area[piece[around[0] as usize / 3] as usize] < PIECE * disk
             {
-                return None;
+                return Ok(None);
             }
             // A lid runs against the edges of its hole.
             let rim: Vec<u32> = around.iter().rev().map(|&h| mesh.origin(h)).collect();
-            lid_over(mesh, &adjacency, around, &rim).map(|lid| (rim, lid))
+            Ok(lid_over(mesh, &adjacency, around, &rim).map(|lid| (rim, lid)))
         })
-        .collect();
+        .collect::<Result<Vec<Option<_>>, Cancelled>>();
     let mut count = 0;
-    for (rim, lid) in made.into_iter().flatten() {
+    for (rim, lid) in made?.into_iter().flatten() {
         let first = mesh.points.len() as u32;
         let name = |v: u32| rim.get(v as usize).copied().unwrap_or_else(|| first + v - rim.len() as u32);
         mesh.triangles.extend(lid.triangles.iter().map(|t| t.map(name)));
@@ -57,7 +66,7 @@ pub fn close_holes(mesh: &mut TriMesh, tags: &mut FeatureTags, longest: f64) -> 
         }
         count += 1;
     }
-    count
+    Ok(count)
 }
 
 fn step(mesh: &TriMesh, h: u32) -> DVec3 {
@@ -123,7 +132,7 @@ mod tests {
         let mut mesh = shapes::sphere(1.0, 5);
         let points = &mesh.points;
         mesh.triangles.retain(|t| t.iter().all(|&v| points[v as usize].distance(DVec3::Z) > radius));
-        crate::mend::repair(&mesh).unwrap().0
+        crate::mend::repair(&mesh, &crate::Silent).unwrap().0
     }
 
     #[test]
@@ -132,7 +141,7 @@ mod tests {
         let before = mesh.triangles.len();
         let kept = mesh.points.clone();
         let mut tags = FeatureTags::from_edges(mesh.points.len(), []);
-        assert_eq!(close_holes(&mut mesh, &mut tags, 2.0), 1);
+        assert_eq!(close_holes(&mut mesh, &mut tags, 2.0, &crate::Silent).unwrap(), 1);
         let facts = diagnose(&mesh);
         assert!(facts.watertight && facts.manifold && facts.genus == Some(0));
         assert_eq!(tags.vertices.len(), mesh.points.len());
@@ -152,18 +161,18 @@ mod tests {
     fn long_holes_ends_of_pipes_and_the_rims_of_pieces_stay_open() {
         let mut mesh = holed_sphere(0.25);
         let mut tags = FeatureTags::from_edges(mesh.points.len(), []);
-        assert_eq!(close_holes(&mut mesh, &mut tags, 1.0), 0);
+        assert_eq!(close_holes(&mut mesh, &mut tags, 1.0, &crate::Silent).unwrap(), 0);
         let mut sheet = shapes::rectangle(1.0, 1.0, 10, 10);
-        assert_eq!(close_holes(&mut sheet, &mut FeatureTags::from_edges(121, []), 100.0), 0);
+        assert_eq!(close_holes(&mut sheet, &mut FeatureTags::from_edges(121, []), 100.0, &crate::Silent).unwrap(), 0);
         let mut pipe = shapes::cylinder(0.1, 4.0, 48);
         let caps = pipe.clone();
         pipe.triangles.retain(|t| {
             let z = t.map(|v| caps.points[v as usize].z);
             z.iter().any(|&a| (a - z[0]).abs() > 1e-9)
         });
-        let (mut pipe, _) = crate::mend::repair(&pipe).unwrap();
+        let (mut pipe, _) = crate::mend::repair(&pipe, &crate::Silent).unwrap();
         let mut tags = FeatureTags::from_edges(pipe.points.len(), []);
         assert_eq!(diagnose(&pipe).boundary_loops, 2);
-        assert_eq!(close_holes(&mut pipe, &mut tags, 100.0), 0);
+        assert_eq!(close_holes(&mut pipe, &mut tags, 100.0, &crate::Silent).unwrap(), 0);
     }
 }

@@ -15,13 +15,14 @@ use crate::mesh::diagnose::sorted_triple;
 use crate::mesh::sets::Sets;
 use crate::mesh::soup::{check, fans, keyed_edges, mates, orient, origin, repeats};
 use crate::mesh::{Attribute, FeatureTags, MeshError, NONE, TriMesh, next};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 
 /// Mends `mesh`; attributes are carried along.
 /// # Errors
 /// [`MeshError`] if a triangle names a missing vertex or one whose position is not finite, or if no triangle
-/// is left.
-pub fn repair(mesh: &TriMesh) -> Result<(TriMesh, Repairs), MeshError> {
+/// is left; [`MeshError::Cancelled`].
+pub fn repair(mesh: &TriMesh, observer: &dyn Observer) -> Result<(TriMesh, Repairs), MeshError> {
     check(mesh)?;
     let mut done = Repairs::default();
     let mut triangles = mesh.triangles.clone();
@@ -32,6 +33,7 @@ pub fn repair(mesh: &TriMesh) -> Result<(TriMesh, Repairs), MeshError> {
     // Before welding, as duplicates hide open edges, and after, as welding can bring about both.
     triangles.retain(|t| !repeats(t));
     done.duplicate_faces = drop_duplicates(&mut triangles);
+    observer.check()?;
     done.welded_vertices = weld_cracks(mesh, &mut triangles);
     triangles.retain(|t| !repeats(t));
     done.duplicate_faces += drop_duplicates(&mut triangles);
@@ -39,12 +41,14 @@ pub fn repair(mesh: &TriMesh) -> Result<(TriMesh, Repairs), MeshError> {
     if triangles.is_empty() {
         return Err(MeshError::Empty);
     }
-    make_manifold(mesh, &mut triangles, &mut source, &mut done);
-    super::slivers::remove(mesh, &mut triangles, &source, &mut done);
-    done.closed_handles = super::handles::close(mesh, &mut triangles, &mut source);
+    make_manifold(mesh, &mut triangles, &mut source, &mut done, observer)?;
+    observer.progress(0.3);
+    super::slivers::remove(mesh, &mut triangles, &source, &mut done, observer)?;
+    done.closed_handles = super::handles::close(mesh, &mut triangles, &mut source, observer)?;
     if done.closed_handles > 0 {
-        super::slivers::remove(mesh, &mut triangles, &source, &mut done);
+        super::slivers::remove(mesh, &mut triangles, &source, &mut done, observer)?;
     }
+    observer.progress(0.8);
 
     let mut used = vec![false; mesh.points.len()];
     mesh.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
@@ -52,7 +56,8 @@ pub fn repair(mesh: &TriMesh) -> Result<(TriMesh, Repairs), MeshError> {
     let mut mended = gather(mesh, &triangles, &source);
     let longest = TINY_LOOP * mended.bounds().diagonal();
     let mut tags = FeatureTags::from_edges(mended.points.len(), []);
-    done.closed_holes = super::close_holes(&mut mended, &mut tags, longest);
+    done.closed_holes = super::close_holes(&mut mended, &mut tags, longest, observer)?;
+    observer.progress(1.0);
     Ok((mended, done))
 }
 
@@ -182,8 +187,15 @@ fn drop_duplicates(triangles: &mut Vec<[u32; 3]>) -> usize {
 /// what is left then is detached.
 const ROUNDS: usize = 4;
 
-fn make_manifold(mesh: &TriMesh, triangles: &mut [[u32; 3]], source: &mut Vec<u32>, done: &mut Repairs) {
+fn make_manifold(
+    mesh: &TriMesh,
+    triangles: &mut [[u32; 3]],
+    source: &mut Vec<u32>,
+    done: &mut Repairs,
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
     for round in 0..=ROUNDS {
+        observer.check()?;
         let keyed = keyed_edges(triangles);
         let over: Vec<u32> =
             keyed.chunk_by(|x, y| x.0 == y.0).filter(|run| run.len() > 2).map(|run| run[0].1).collect();
@@ -194,12 +206,13 @@ fn make_manifold(mesh: &TriMesh, triangles: &mut [[u32; 3]], source: &mut Vec<u3
         done.one_sided_edges += one_sided;
         done.split_vertices += split;
         if over.is_empty() && one_sided == 0 {
-            return;
+            break;
         }
         if round == ROUNDS {
             detach_bad(triangles, source, done);
         }
     }
+    Ok(())
 }
 
 /// Turns triangles so that neighbours agree; unpairs edges where that cannot be. Returns their number.

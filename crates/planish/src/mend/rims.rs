@@ -11,6 +11,7 @@ use super::part_fans;
 use crate::geom::KdTree;
 use crate::mend;
 use crate::mesh::{self, FeatureTags, TriMesh};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -30,33 +31,52 @@ const ROUNDS: usize = 32;
 const COLD: f64 = 0.3;
 
 /// Trims the mesh of an open scan; with `lids` closes its small holes. Returns how many were closed.
-pub(crate) fn finish(mesh: &mut TriMesh, tags: &mut FeatureTags, points: &[DVec3], voxel: f64, lids: bool) -> usize {
+/// # Errors
+/// [`Cancelled`]; the mesh is then half trimmed.
+pub(crate) fn finish(
+    mesh: &mut TriMesh,
+    tags: &mut FeatureTags,
+    points: &[DVec3],
+    voxel: f64,
+    lids: bool,
+    observer: &dyn Observer,
+) -> Result<usize, Cancelled> {
     let longest = SMALL_HOLE * mesh.bounds().diagonal();
     part(mesh, tags);
     let seen = mesh.points.len();
-    let mut closed = if lids { mend::close_holes(mesh, tags, longest) } else { 0 };
-    let warmth = warmth(mesh, seen, points, voxel);
+    let mut closed = if lids { mend::close_holes(mesh, tags, longest, observer)? } else { 0 };
+    let warmth = warmth(mesh, seen, points, voxel, observer)?;
+    observer.check()?;
     mend::trim(mesh, tags, &warmth.iter().map(|w| w - COLD).collect::<Vec<f64>>());
+    observer.check()?;
     part(mesh, tags);
     if lids {
-        closed += mend::close_holes(mesh, tags, longest);
+        closed += mend::close_holes(mesh, tags, longest, observer)?;
     }
-    closed
+    Ok(closed)
 }
 
 /// How warm each vertex stays. Vertices from `seen` on belong to lids, which no points stand for.
-fn warmth(mesh: &TriMesh, seen: usize, points: &[DVec3], voxel: f64) -> Vec<f64> {
+fn warmth(
+    mesh: &TriMesh,
+    seen: usize,
+    points: &[DVec3],
+    voxel: f64,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, Cancelled> {
     let adjacency = mesh::Adjacency::new(mesh);
     let tree = KdTree::new(points);
-    let reach = reaches(&tree, points);
-    let cold: Vec<bool> = (0..mesh.points.len() as u32)
+    let reach = reaches(&tree, points, observer)?;
+    let cold: Result<Vec<bool>, Cancelled> = (0..mesh.points.len() as u32)
         .into_par_iter()
         .map(|v| {
+            observer.check()?;
             let p = mesh.points[v as usize];
             let far = |i: u32| p.distance(points[i as usize]) > (REACH * reach[i as usize]).max(CELLS * voxel);
-            adjacency.is_boundary_vertex(v) || ((v as usize) < seen && tree.closest(p).is_none_or(far))
+            Ok(adjacency.is_boundary_vertex(v) || ((v as usize) < seen && tree.closest(p).is_none_or(far)))
         })
         .collect();
+    let cold = cold?;
     let mut warmth: Vec<f64> = cold.iter().map(|&c| if c { 0.0 } else { 1.0 }).collect();
     let mut neighbours: Vec<[u32; 2]> =
         mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, a], [b, c], [c, b], [c, a], [a, c]]).collect();
@@ -66,6 +86,7 @@ fn warmth(mesh: &TriMesh, seen: usize, points: &[DVec3], voxel: f64) -> Vec<f64>
     neighbours.iter().for_each(|n| first[n[0] as usize + 1] += 1);
     (0..mesh.points.len()).for_each(|v| first[v + 1] += first[v]);
     for _ in 0..ROUNDS {
+        observer.check()?;
         warmth = (0..mesh.points.len())
             .into_par_iter()
             .map(|v| {
@@ -78,27 +99,30 @@ fn warmth(mesh: &TriMesh, seen: usize, points: &[DVec3], voxel: f64) -> Vec<f64>
             })
             .collect();
     }
-    warmth
+    Ok(warmth)
 }
 
 /// For each raw point the distance of its eighth neighbour; the middle one of those of its neighbours, so that a point that
 /// lies alone does not count.
-fn reaches(tree: &KdTree, points: &[DVec3]) -> Vec<f64> {
+fn reaches(tree: &KdTree, points: &[DVec3], observer: &dyn Observer) -> Result<Vec<f64>, Cancelled> {
     let near = |p: DVec3, found: &mut Vec<(f64, u32)>| tree.nearest(p, NEIGHBOURS, found);
-    let own: Vec<f64> = points
+    let own: Result<Vec<f64>, Cancelled> = points
         .par_iter()
         .map_init(Vec::new, |found, &p| {
+            observer.check()?;
             near(p, found);
-            found.last().map_or(0.0, |f| f.0.sqrt())
+            Ok(found.last().map_or(0.0, |f| f.0.sqrt()))
         })
         .collect();
+    let own = own?;
     points
         .par_iter()
         .map_init(Vec::new, |found, &p| {
+            observer.check()?;
             near(p, found);
             let mut around: Vec<f64> = found.iter().map(|f| own[f.1 as usize]).collect();
             around.sort_unstable_by(f64::total_cmp);
-            around.get(around.len() / 2).copied().unwrap_or(0.0)
+            Ok(around.get(around.len() / 2).copied().unwrap_or(0.0))
         })
         .collect()
 }

@@ -7,22 +7,30 @@ use crate::geom::{Aabb, tolerance};
 use crate::mesh::TriMesh;
 use crate::mesh::change::Changing;
 use crate::mesh::disjoint::Taken;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 
 /// Each pass can free only triangles that do not touch each other; clusters of them are short in practice.
 const PASSES: usize = 12;
 
 /// Removes triangles lower than the library's tolerance from an oriented manifold.
-pub(super) fn remove(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &[u32], done: &mut Repairs) {
+pub(super) fn remove(
+    mesh: &TriMesh,
+    triangles: &mut Vec<[u32; 3]>,
+    source: &[u32],
+    done: &mut Repairs,
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
     let at = |v: u32| mesh.points[source[v as usize] as usize];
     let flat = tolerance::length(Aabb::of(&mesh.points).diagonal());
     let is_low = |corners: [u32; 3]| height(corners.map(at)).0 <= flat;
     done.degenerate_left = triangles.iter().filter(|&&t| is_low(t)).count();
     if done.degenerate_left == 0 {
-        return;
+        return Ok(());
     }
     let mut mending = Mending { mesh: Changing::new(triangles, source.len(), &[]), at, flat, done };
     for _ in 0..PASSES {
+        observer.check()?;
         let all = 0..mending.mesh.len();
         let low: Vec<u32> = all.filter(|&t| mending.mesh.get(t).is_some_and(is_low)).collect();
         mending.done.degenerate_left = low.len();
@@ -32,6 +40,7 @@ pub(super) fn remove(mesh: &TriMesh, triangles: &mut Vec<[u32; 3]>, source: &[u3
     }
     *triangles = mending.mesh.into_triangles();
     done.degenerate_left = triangles.iter().filter(|&&t| is_low(t)).count();
+    Ok(())
 }
 
 /// Height over the longest edge, and the number of that edge.

@@ -245,7 +245,10 @@ mod tests {
     use crate::mesh::{TriMesh, diagnose};
     use crate::synthetic::shapes;
 
-    fn state(c: &Changing) -> (Vec<Option<[u32; 3]>>, Vec<Vec<u32>>, BTreeSet<[u32; 2]>) {
+    /// Triangles, stars and lines.
+    type State = (Vec<Option<[u32; 3]>>, Vec<Vec<u32>>, BTreeSet<[u32; 2]>);
+
+    fn state(c: &Changing) -> State {
         (c.triangles.clone(), c.stars.clone(), c.lines.clone())
     }
 

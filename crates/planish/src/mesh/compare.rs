@@ -6,7 +6,7 @@
 
 use super::{TriMesh, check};
 use crate::geom::{Aabb, Bvh, random};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -52,8 +52,8 @@ pub enum CompareError {
     #[error("0 samples asked for; at least 1 is needed")]
     NoSamples,
     /// The observer wants no result any more.
-    #[error("comparison cancelled")]
-    Cancelled,
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// Spread of distances, world units unless said.
@@ -131,7 +131,7 @@ pub fn compare_samples(
     for (which, mesh) in [('a', a), ('b', b)] {
         check(mesh).map_err(|error| CompareError::Mesh { which, error })?;
     }
-    let (a, b) = (Side::new(a, 'a')?, Side::new(b, 'b')?);
+    let (a, b) = (Side::new(a, 'a', observer)?, Side::new(b, 'b', observer)?);
     let diagonal = Aabb::of(&a.mesh.points).diagonal();
     let mut samples = measure(&a, &b, params, 0, observer)?;
     samples.extend(measure(&b, &a, params, 1, observer)?);
@@ -167,12 +167,13 @@ struct Side {
 }
 
 impl Side {
-    fn new(mesh: &TriMesh, which: char) -> Result<Side, CompareError> {
+    fn new(mesh: &TriMesh, which: char, observer: &dyn Observer) -> Result<Side, CompareError> {
         let triangles: Vec<[u32; 3]> =
             (0..mesh.triangles.len()).filter(|&t| mesh.area(t) > 0.0).map(|t| mesh.triangles[t]).collect();
         if triangles.is_empty() {
             return Err(CompareError::NoArea { which, triangles: mesh.triangles.len() });
         }
+        observer.check()?;
         // Only the vertices in use, so that the box is that of the surface.
         let mut id = vec![u32::MAX; mesh.points.len()];
         let mut points = Vec::new();
@@ -196,7 +197,7 @@ impl Side {
                 total
             })
             .collect();
-        let bvh = Bvh::new(&mesh);
+        let bvh = Bvh::watched(&mesh, observer)?;
         Ok(Side { mesh, sums, bvh })
     }
 
@@ -225,9 +226,7 @@ fn measure(
     let seed = random::bits(params.seed, pass);
     let mut result = Vec::with_capacity(params.samples);
     while result.len() < params.samples {
-        if observer.cancelled() {
-            return Err(CompareError::Cancelled);
-        }
+        observer.check()?;
         observer.progress((pass as f64 + result.len() as f64 / params.samples as f64) / 2.0);
         let range = result.len()..(result.len() + CHUNK).min(params.samples);
         result.par_extend(range.into_par_iter().map(|n| {

@@ -14,7 +14,7 @@ mod queue;
 
 use super::{FeatureTags, MeshError, TriMesh, check, self_intersections};
 use crate::geom::Bvh;
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use collapse::Collapse;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -73,8 +73,8 @@ pub enum DecimateError {
         range: &'static str,
     },
     /// The observer wants no result any more.
-    #[error("decimation cancelled")]
-    Cancelled,
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// A decimated mesh.

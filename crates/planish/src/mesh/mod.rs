@@ -29,6 +29,7 @@ pub use walk::{CurvePlace, move_point_on_curve, move_point_on_surface};
 pub use crate::geom::FacePoint;
 
 use crate::geom::{Aabb, Triangles};
+use crate::observe::Cancelled;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -76,6 +77,9 @@ pub enum MeshError {
     /// Nothing is left.
     #[error("no triangle with three different vertices; a mesh with faces is needed")]
     Empty,
+    /// The observer no longer wanted the result.
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 impl TriMesh {

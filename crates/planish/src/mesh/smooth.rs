@@ -10,7 +10,7 @@
 
 use super::intersect::intersections_of;
 use super::{Adjacency, FeatureKind, FeatureTags, MeshError, NONE, TriMesh, check, next, previous, self_intersections};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -49,8 +49,8 @@ pub enum SmoothError {
         value: f64,
     },
     /// The observer wants no result any more.
-    #[error("smoothing cancelled")]
-    Cancelled,
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// A smoothed mesh.
@@ -110,17 +110,13 @@ pub fn smooth(
     let filter = Filter::new(mesh, &adjacency, tags, size);
     let mut normals: Vec<DVec3> = (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.normal(t)).collect();
     for round in 0..NORMAL_ROUNDS {
-        if observer.cancelled() {
-            return Err(SmoothError::Cancelled);
-        }
+        observer.check()?;
         normals = filter.filtered(&normals);
         observer.progress(0.6 * (round + 1) as f64 / NORMAL_ROUNDS as f64);
     }
     let mut points = mesh.points.clone();
     for round in 0..VERTEX_ROUNDS {
-        if observer.cancelled() {
-            return Err(SmoothError::Cancelled);
-        }
+        observer.check()?;
         points = filter.followed(&points, &normals);
         for factor in [RELAX, UNSHRINK] {
             points = filter.relaxed(points, factor);

@@ -12,6 +12,7 @@ use super::disk::{self, Disk};
 use super::{Network, PatchMesh};
 use crate::geom::tolerance::ON_EDGE;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
@@ -82,6 +83,9 @@ pub enum ImprintError {
         /// Place.
         z: f64,
     },
+    /// The observer no longer wanted the result.
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// A place on a mesh by what it lies on.
@@ -233,8 +237,8 @@ pub(crate) enum Shared {
 
 /// Cuts `mesh` along the curves of `network` into one exact disk sub-mesh per patch.
 /// # Errors
-/// `ImprintError` names the curve or patch that is not in order, with its place.
-pub fn imprint(mesh: &TriMesh, network: &Network) -> Result<Vec<PatchMesh>, ImprintError> {
+/// `ImprintError` names the curve or patch that is not in order, with its place; [`ImprintError::Cancelled`].
+pub fn imprint(mesh: &TriMesh, network: &Network, observer: &dyn Observer) -> Result<Vec<PatchMesh>, ImprintError> {
     let adjacency = Adjacency::new(mesh);
     let faces = mesh.triangles.len();
     let mut curves: Vec<Vec<Place>> = Vec::with_capacity(network.curves.len());
@@ -242,12 +246,13 @@ pub fn imprint(mesh: &TriMesh, network: &Network) -> Result<Vec<PatchMesh>, Impr
         if let Some(p) = curve.points.iter().find(|p| p.face as usize >= faces) {
             return Err(ImprintError::NoSuchFace { curve: c, face: p.face, faces });
         }
+        observer.check()?;
         curves.push(curve.points.iter().map(|p| place_of(&adjacency, &mesh.triangles, p)).collect());
     }
     let chains: Vec<Chain> = curves.into_iter().enumerate().map(|(curve, places)| Chain { curve, places }).collect();
     let whole: Vec<usize> = (0..chains.len()).collect();
     let all: Vec<usize> = (0..network.patches.len()).collect();
-    let (made, lost) = cut_out(mesh, &adjacency, network, &chains, &whole, &all)?;
+    let (made, lost) = cut_out(mesh, &adjacency, network, &chains, &whole, &all, observer)?;
     match lost {
         Some((faces, p)) => Err(ImprintError::Uncovered { faces, x: p.x, y: p.y, z: p.z }),
         None => Ok(made),
@@ -276,9 +281,12 @@ pub(crate) fn cut_out(
     chains: &[Chain],
     whole: &[usize],
     which: &[usize],
+    observer: &dyn Observer,
 ) -> Result<CutOut, ImprintError> {
     let borrowed: Vec<&[Place]> = chains.iter().map(|c| &c.places[..]).collect();
     let cut = cut(mesh, adjacency, &borrowed).map_err(|e| of_curve(e, chains))?;
+    observer.progress(0.5);
+    observer.check()?;
     let cut_adjacency = Adjacency::new(&cut.mesh);
     let mut barrier = vec![false; 3 * cut.mesh.triangles.len()];
     let mut left: Vec<Vec<u32>> = Vec::with_capacity(cut.chains.len());
@@ -318,6 +326,7 @@ pub(crate) fn cut_out(
             }
         }
     }
+    observer.check()?;
     let name = flood(&cut, &cut_adjacency, &barrier, &seeds)
         .map_err(|(a, _)| ImprintError::NotADisk { patch: which[a as usize], why: "it runs into another patch" })?;
     let mut members = vec![Vec::new(); which.len()];
@@ -334,6 +343,7 @@ pub(crate) fn cut_out(
         .par_iter()
         .zip(which)
         .map(|(faces, &p)| {
+            observer.check()?;
             let not = |why| ImprintError::NotADisk { patch: p, why };
             let first = *side_edges(p, 0).first().ok_or(not("a side has no length"))?;
             let disk = Disk::new(&cut.mesh.triangles, &cut_adjacency, faces, |h| barrier[h as usize], first)

@@ -9,6 +9,7 @@
 use super::imprint::{Chain, cut_out, place_of};
 use super::{ImprintError, Network, PatchMesh, imprint};
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh};
+use crate::observe::Observer;
 
 /// The patches of `network` whose curves are not those of `before`, rising; nothing if the two do not have the same
 /// corners, curves and patches in number and order.
@@ -35,6 +36,7 @@ pub fn reimprint(
     network: &Network,
     before: &[&PatchMesh],
     which: &[usize],
+    observer: &dyn Observer,
 ) -> Result<Vec<PatchMesh>, ImprintError> {
     let faces = around(mesh, adjacency, before);
     let mut own = vec![NONE; mesh.triangles.len()];
@@ -64,13 +66,13 @@ pub fn reimprint(
         if needed[curve] {
             // A side that leaves the part: what was said of the old patches does not hold.
             if chains.len() != first + 1 || chains[first].places.len() != c.points.len() {
-                let all = imprint(mesh, network)?;
+                let all = imprint(mesh, network, observer)?;
                 return Ok(all.into_iter().enumerate().filter(|(p, _)| which.contains(p)).map(|x| x.1).collect());
             }
             whole[curve] = first;
         }
     }
-    let (mut made, _) = cut_out(&part, &part_adjacency, network, &chains, &whole, which)?;
+    let (mut made, _) = cut_out(&part, &part_adjacency, network, &chains, &whole, which, observer)?;
     for patch in &mut made {
         patch.face_origin.iter_mut().for_each(|f| *f = faces[*f as usize]);
         patch.origin.iter_mut().for_each(|p| p.face = faces[p.face as usize]);

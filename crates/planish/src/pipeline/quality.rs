@@ -3,14 +3,15 @@
 //! See `docs/methods/measuring.md`; the keys are in `docs/guide/report.md`.
 
 use super::{Figure, PipelineError, Quality, Warning};
+use crate::grid::{self, Grid};
 use crate::mend::Repairs;
 use crate::mesh::{self, CompareParams, Comparison, TriMesh};
 use crate::model::Model;
 use crate::network::{CurveKind, Network, PatchMesh};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer, Part};
+use crate::relief;
 use crate::surface::basis::uniform_parameters;
 use crate::surface::{self, SeamQuality, Surface};
-use crate::{grid, relief};
 use rayon::prelude::*;
 
 /// Quads per knot span and direction, at most, in the mesh that stands for a surface when distances are measured:
@@ -43,20 +44,30 @@ pub(super) fn measure(
     let diagonal = model.mesh.bounds().diagonal();
     mesh_figures(&model.mesh, &model.network, repairs, &mut quality, &mut warnings);
     network_figures(&model.network, &mut quality);
-    grid_figures(model, patches, &mut quality, &mut warnings);
-    let seams = seam_figures(model, diagonal, &mut quality, &mut warnings);
+    observer.check()?;
+    grid_figures(model, patches, &mut quality, &mut warnings, observer)?;
+    let seams = seam_figures(model, diagonal, &mut quality, &mut warnings, observer)?;
     observer.progress(0.1);
 
     let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
     quality.insert("surface.control_points".into(), Figure::Count(control as u64));
-    let worst = model.surfaces.par_iter().zip(&model.grids).map(|(s, g)| surface::deviation_of(s, g).rms);
-    length(&mut quality, "surface.patch_rms_max", worst.reduce(|| 0.0, f64::max), diagonal);
-    let base = surface_mesh(model)?;
-    distances(&mut quality, "surface", &compare(&model.mesh, &base, &Share(observer, 0.1, 0.45))?, diagonal);
+    let one = |(s, g): (&Surface, &Grid)| {
+        observer.check()?;
+        Ok(surface::deviation_of(s, g).rms)
+    };
+    let worst: Result<Vec<f64>, Cancelled> = model.surfaces.par_iter().zip(&model.grids).map(one).collect();
+    length(&mut quality, "surface.patch_rms_max", worst?.into_iter().fold(0.0, f64::max), diagonal);
+    let base = surface_mesh(model, observer)?;
+    distances(&mut quality, "surface", &compare(&model.mesh, &base, &Part::new(observer, 0.1, 0.45))?, diagonal);
     drop(base);
-    let displaced = displaced_mesh(model)?;
-    distances(&mut quality, "displaced", &compare(&model.mesh, &displaced, &Share(observer, 0.55, 0.45))?, diagonal);
-    relief_figures(model, diagonal, &mut quality, &mut warnings)?;
+    let displaced = displaced_mesh(model, observer)?;
+    distances(
+        &mut quality,
+        "displaced",
+        &compare(&model.mesh, &displaced, &Part::new(observer, 0.55, 0.45))?,
+        diagonal,
+    );
+    relief_figures(model, diagonal, &mut quality, &mut warnings, observer)?;
     observer.progress(1.0);
     Ok(Measured { quality, seams, warnings })
 }
@@ -64,25 +75,25 @@ pub(super) fn measure(
 /// The surfaces of a model with their displacement as one mesh: its grids.
 /// # Errors
 /// If the parts of the model do not belong together.
-pub fn displaced_mesh(model: &Model) -> Result<TriMesh, PipelineError> {
-    Ok(relief::displaced_mesh(&model.network, &model.surfaces, &model.reliefs)?)
+pub fn displaced_mesh(model: &Model, observer: &dyn Observer) -> Result<TriMesh, PipelineError> {
+    Ok(relief::displaced_mesh(&model.network, &model.surfaces, &model.reliefs, observer)?)
 }
 
 /// The smooth surfaces of a model as one mesh, fine enough to measure distances on.
 /// # Errors
 /// If the parts of the model do not belong together.
-pub fn surface_mesh(model: &Model) -> Result<TriMesh, PipelineError> {
+pub fn surface_mesh(model: &Model, observer: &dyn Observer) -> Result<TriMesh, PipelineError> {
     // Sampling relies on sound surfaces.
     model.surfaces.iter().try_for_each(Surface::check).map_err(relief::ReliefError::from)?;
-    surface_mesh_cut(model, cuts_to_measure(model))
+    surface_mesh_cut(model, cuts_to_measure(model, observer)?, observer)
 }
 
 /// The smooth surfaces of a model as one mesh, with `cuts` quads per knot span and direction.
 /// # Errors
 /// If the parts of the model do not belong together.
-pub fn surface_mesh_cut(model: &Model, cuts: usize) -> Result<TriMesh, PipelineError> {
+pub fn surface_mesh_cut(model: &Model, cuts: usize, observer: &dyn Observer) -> Result<TriMesh, PipelineError> {
     let shapes = relief::span_shapes(&model.surfaces, cuts);
-    Ok(relief::surface_mesh(&model.network, &model.surfaces, &shapes)?)
+    Ok(relief::surface_mesh(&model.network, &model.surfaces, &shapes, observer)?)
 }
 
 /// Knot spans of all surfaces of a model.
@@ -94,7 +105,7 @@ pub fn span_count(model: &Model) -> usize {
 ///
 /// A triangle of a net of steps `h` leaves a surface by at most `h^2 (|S_uu| + 2 |S_uv| + |S_vv|) / 8` (Filip,
 /// Magedson, Markot 1986, *Surface Algorithms Using Bounds on Derivatives*).
-fn cuts_to_measure(model: &Model) -> usize {
+fn cuts_to_measure(model: &Model, observer: &dyn Observer) -> Result<usize, Cancelled> {
     let diagonal = model.mesh.bounds().diagonal();
     let squares = |s: &Surface, wanted: f64| {
         let [rows, cols] = relief::span_shapes(std::slice::from_ref(s), 1)[0];
@@ -107,29 +118,22 @@ fn cuts_to_measure(model: &Model) -> usize {
             });
         (leave.map(|e| e * e).sum::<f64>(), us.len() * vs.len(), wanted * wanted * (us.len() * vs.len()) as f64)
     };
-    let each: Vec<(f64, usize, f64)> =
-        model.surfaces.par_iter().zip(&model.grids).map(|(s, g)| squares(s, surface::deviation_of(s, g).rms)).collect();
+    let one = |(s, g): (&Surface, &Grid)| {
+        observer.check()?;
+        Ok(squares(s, surface::deviation_of(s, g).rms))
+    };
+    let each: Result<Vec<(f64, usize, f64)>, Cancelled> =
+        model.surfaces.par_iter().zip(&model.grids).map(one).collect();
+    let each = each?;
     let count = each.iter().map(|e| e.1).sum::<usize>().max(1) as f64;
     let leave = (each.iter().map(|e| e.0).sum::<f64>() / count).sqrt();
     let wanted = CHORD_SHARE * (each.iter().map(|e| e.2).sum::<f64>() / count).sqrt().max(FINEST * diagonal);
     // A number that is none asks for the finest.
-    (1..CUTS_PER_SPAN).find(|&cuts| leave / (cuts * cuts) as f64 <= wanted).unwrap_or(CUTS_PER_SPAN)
+    Ok((1..CUTS_PER_SPAN).find(|&cuts| leave / (cuts * cuts) as f64 <= wanted).unwrap_or(CUTS_PER_SPAN))
 }
 
 fn compare(input: &TriMesh, result: &TriMesh, observer: &dyn Observer) -> Result<Comparison, PipelineError> {
     Ok(mesh::compare(input, result, &CompareParams::default(), observer)?)
-}
-
-/// A share of a stage's progress: the observer, where the share starts, and how long it is.
-struct Share<'a>(&'a dyn Observer, f64, f64);
-
-impl Observer for Share<'_> {
-    fn progress(&self, fraction: f64) {
-        self.0.progress(self.1 + self.2 * fraction);
-    }
-    fn cancelled(&self) -> bool {
-        self.0.cancelled()
-    }
 }
 
 /// Smooth seams first, the widest angle first; then the seams on features.
@@ -236,9 +240,19 @@ pub(super) fn network_figures(network: &Network, quality: &mut Quality) {
     quality.insert("patches.irregular_corners".into(), Figure::Count(irregular as u64));
 }
 
-fn grid_figures(model: &Model, patches: &[PatchMesh], quality: &mut Quality, warnings: &mut Vec<Warning>) {
-    let grids: Vec<grid::GridQuality> =
-        model.grids.par_iter().zip(patches).map(|(grid, patch)| grid::measure(grid, patch)).collect();
+fn grid_figures(
+    model: &Model,
+    patches: &[PatchMesh],
+    quality: &mut Quality,
+    warnings: &mut Vec<Warning>,
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
+    let one = |(grid, patch): (&Grid, &PatchMesh)| {
+        observer.check()?;
+        Ok(grid::measure(grid, patch))
+    };
+    let grids: Result<Vec<grid::GridQuality>, Cancelled> = model.grids.par_iter().zip(patches).map(one).collect();
+    let grids = grids?;
     let folds: usize = grids.iter().map(|g| g.folds).sum();
     let mean = |f: fn(&grid::GridQuality) -> f64| grids.iter().map(f).sum::<f64>() / grids.len().max(1) as f64;
     quality.insert("grid.points".into(), Figure::Count(model.grids.iter().map(|g| g.points.len() as u64).sum()));
@@ -250,10 +264,17 @@ fn grid_figures(model: &Model, patches: &[PatchMesh], quality: &mut Quality, war
         let text = format!("{folds} grid cells are folded over. A curve through the middle of the patch helps.");
         warnings.push(Warning::new("grid_folds", text, format!("patches {}", few(&places))));
     }
+    Ok(())
 }
 
-fn seam_figures(model: &Model, diagonal: f64, quality: &mut Quality, warnings: &mut Vec<Warning>) -> Vec<SeamQuality> {
-    let seams = surface::measure_seams(&model.network, &model.surfaces);
+fn seam_figures(
+    model: &Model,
+    diagonal: f64,
+    quality: &mut Quality,
+    warnings: &mut Vec<Warning>,
+    observer: &dyn Observer,
+) -> Result<Vec<SeamQuality>, Cancelled> {
+    let seams = surface::measure_seams(&model.network, &model.surfaces, observer)?;
     let gap = seams.iter().map(|s| s.gap_max).fold(0.0, f64::max);
     let smooth: Vec<&SeamQuality> = seams.iter().filter(|s| s.kind == CurveKind::Smooth).collect();
     let total: f64 = smooth.iter().map(|s| s.length).sum();
@@ -274,7 +295,7 @@ fn seam_figures(model: &Model, diagonal: f64, quality: &mut Quality, warnings: &
         let worst: Vec<String> = worst_seams(&seams).iter().take(3).map(|s| s.curve.to_string()).collect();
         warnings.push(Warning::new("seam_angle", text, format!("curves {}", few(&worst))));
     }
-    seams
+    Ok(seams)
 }
 
 fn relief_figures(
@@ -282,8 +303,10 @@ fn relief_figures(
     diagonal: f64,
     quality: &mut Quality,
     warnings: &mut Vec<Warning>,
+    observer: &dyn Observer,
 ) -> Result<(), PipelineError> {
     let each = model.surfaces.par_iter().zip(&model.reliefs).zip(&model.grids).map(|((surface, relief), grid)| {
+        observer.check()?;
         let back = relief::displace(surface, relief)?;
         let miss = back.iter().zip(&grid.points).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
         let most = relief.vectors.iter().map(|d| d.length()).fold(0.0, f64::max);

@@ -108,7 +108,7 @@ impl<'a> Clock<'a> {
         let share = self.weights.iter().find(|w| w.0 == name).map_or(0.0, |w| w.1) / total;
         self.observer.begins(name, before);
         let start = Instant::now();
-        let result = work(&Part { observer: self.observer, before, share, reached: Mutex::new(0.0) })?;
+        let result = work(&Stage { observer: self.observer, before, share, reached: Mutex::new(0.0) })?;
         let record = StageRecord {
             name: name.into(),
             seconds: start.elapsed().as_secs_f64(),
@@ -121,15 +121,15 @@ impl<'a> Clock<'a> {
     }
 }
 
-/// The part of a run that one stage is.
-struct Part<'a> {
+/// One stage of a run: it watches for the observer of the run.
+struct Stage<'a> {
     observer: &'a dyn PipelineObserver,
     before: f64,
     share: f64,
     reached: Mutex<f64>,
 }
 
-impl Observer for Part<'_> {
+impl Observer for Stage<'_> {
     fn progress(&self, fraction: f64) {
         // Threads report in any order: a bar must not run back.
         let Ok(mut reached) = self.reached.lock() else { return };

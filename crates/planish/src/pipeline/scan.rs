@@ -3,8 +3,8 @@
 //! See `docs/methods/samples.md`, section 9, and `docs/methods/sharp.md`.
 
 use super::record::Figure;
-use super::{PipelineParams, Quality, Warning};
-use crate::cloud::{self, CleanParams, Cloud, CloudError, Samples};
+use super::{Fitted, PipelineParams, Quality, Warning};
+use crate::cloud::{self, CleanParams, Cleaned, Cloud, CloudError, ProjectParams, Samples};
 use crate::contour::{self, ContourParams, Meshed, MeshingError, Sampling};
 use crate::field::{SampleField, Spacing};
 use crate::geom::Bvh;
@@ -12,11 +12,13 @@ use crate::grid::GridParams;
 use crate::mend::finish;
 use crate::mesh::sets::Sets;
 use crate::mesh::{FeatureTags, TriMesh};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer, Part};
 use crate::sharp::{self, ScanScale};
 use crate::surface::{FitParams, Resolution};
 use glam::DVec3;
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Why a scan gives no mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -27,24 +29,44 @@ pub enum ScanError {
     /// No surface.
     #[error(transparent)]
     Mesh(#[from] MeshingError),
+    /// The observer no longer wanted the result.
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// How a scan is meshed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
 pub struct ScanParams {
-    /// The samples.
+    /// The samples
     pub clean: CleanParams,
-    /// The extraction.
+    /// The extraction
     pub contour: ContourParams,
-    /// Edge of a cell, world units; from spacing and noise if `None`.
-    pub voxel: Option<f64>,
-    /// Cells along the longest side, if no edge is given.
-    pub resolution: Option<usize>,
-    /// Bytes that may be used.
-    pub memory: u64,
-    /// Close holes (`Some(true)`), leave them open (`Some(false)`), or as the scan is: those of a closed one are closed, of
-    /// an open one the small ones.
+    /// The points that come along with the mesh
+    pub points: ProjectParams,
+    /// Size of the cells; from spacing and noise of the scan if not given
+    pub cells: Option<Spacing>,
+    /// Close all holes (true), leave them open (false), or as the scan is if not given: those of a closed one are closed,
+    /// of an open one the small ones
+    #[schemars(extend("by_hand" = true))]
     pub close: Option<bool>,
+    /// Memory that may be used
+    #[schemars(extend("unit" = "bytes", "by_hand" = true))]
+    pub memory: u64,
+}
+
+impl Default for ScanParams {
+    /// Eight gigabytes.
+    fn default() -> ScanParams {
+        ScanParams {
+            clean: CleanParams::default(),
+            contour: ContourParams::default(),
+            points: ProjectParams::default(),
+            cells: None,
+            close: None,
+            memory: 8 << 30,
+        }
+    }
 }
 
 /// What [`mesh_scan`] makes.
@@ -92,32 +114,31 @@ pub fn voxel_for(samples: &Samples) -> f64 {
 /// # Errors
 /// [`ScanError`].
 pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> Result<ScanMeshed, ScanError> {
-    let samples = cloud::clean(scan, &params.clean, &Share { observer, from: 0.0, to: 0.6 })?;
+    let samples = cloud::clean(scan, &params.clean, &Part::new(observer, 0.0, 0.6))?;
     let closed = params.close.unwrap_or_else(|| samples.closed.first().copied().unwrap_or(false));
     let field = SampleField::new(&samples, closed);
-    let spacing = match (params.voxel, params.resolution) {
-        (Some(h), _) => Spacing::Voxel(h),
-        (None, Some(n)) => Spacing::Resolution(n),
-        (None, None) => Spacing::Voxel(voxel_for(&samples)),
-    };
+    let spacing = params.cells.unwrap_or_else(|| Spacing::Voxel(voxel_for(&samples)));
     let sampling = Sampling { spacing, memory: params.memory };
-    let mut meshed = contour::from_field(&field, sampling, &params.contour, &Share { observer, from: 0.6, to: 0.95 })?;
+    let mut meshed = contour::from_field(&field, sampling, &params.contour, &Part::new(observer, 0.6, 0.35))?;
     let mut lids = 0;
     if !closed {
         let points: Vec<DVec3> = scan.points.iter().copied().filter(|p| p.is_finite()).collect();
         let contour::Extracted { mesh, tags, .. } = &mut meshed.extracted;
-        lids = finish(mesh, tags, &points, meshed.lattice.step.x, params.close.is_none());
+        lids = finish(mesh, tags, &points, meshed.lattice.step.x, params.close.is_none(), observer)?;
     }
     let contour::Extracted { mesh, tags, .. } = &mut meshed.extracted;
     let cell = meshed.lattice.step.x;
-    sharp::mend_lines(mesh, tags);
-    sharp::fair_lines(mesh, tags, &ScanScale { noise: samples.noise, spacing: samples.spacing, cell });
-    sharp::split_bent(mesh, tags, BENT * fit_tolerance(&samples) * samples.diagonal);
+    observer.progress(0.96);
+    sharp::mend_lines(mesh, tags, observer)?;
+    let scale = ScanScale { noise: samples.noise, spacing: samples.spacing, cell };
+    sharp::fair_lines(mesh, tags, &scale, observer)?;
+    observer.progress(0.98);
+    sharp::split_bent(mesh, tags, BENT * fit_tolerance(&samples) * samples.diagonal, observer)?;
     tags.mark(mesh);
-    let mut reached = reach(scan, &meshed.extracted.mesh);
+    let mut reached = reach(scan, &meshed.extracted.mesh, observer)?;
     let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags, &reached);
     if specks > 0 {
-        reached = reach(scan, &meshed.extracted.mesh);
+        reached = reach(scan, &meshed.extracted.mesh, observer)?;
     }
     let n = reached.len().max(1) as f64;
     let squares = reached.iter().map(|r| r.0 * r.0).sum::<f64>();
@@ -163,21 +184,6 @@ pub fn params_for(made: &ScanMeshed) -> PipelineParams {
     }
 }
 
-struct Share<'a> {
-    observer: &'a dyn Observer,
-    from: f64,
-    to: f64,
-}
-
-impl Observer for Share<'_> {
-    fn progress(&self, fraction: f64) {
-        self.observer.progress(self.from + (self.to - self.from) * fraction);
-    }
-    fn cancelled(&self) -> bool {
-        self.observer.cancelled()
-    }
-}
-
 /// Leaves out the components whose area is next to nothing, or which hardly any point stands for; returns how many.
 fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags, reached: &[(f64, u32)]) -> usize {
     let mut sets = Sets::new(mesh.points.len());
@@ -207,15 +213,19 @@ fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags, reached: &[(f64, u32)
 }
 
 /// Distance of raw points to a mesh, and the face that is closest.
-fn reach(scan: &Cloud, mesh: &TriMesh) -> Vec<(f64, u32)> {
+fn reach(scan: &Cloud, mesh: &TriMesh, observer: &dyn Observer) -> Result<Vec<(f64, u32)>, Cancelled> {
     if mesh.triangles.is_empty() {
-        return Vec::new();
+        return Ok(Vec::new());
     }
-    let bvh = Bvh::new(mesh);
+    let bvh = Bvh::watched(mesh, observer)?;
     let step = scan.points.len().div_ceil(MEASURED).max(1);
     let finite: Vec<_> = scan.points.iter().step_by(step).filter(|p| p.is_finite()).collect();
-    let hits = finite.par_iter().map(|p| bvh.closest(**p));
-    hits.map(|hit| (hit.distance, hit.place.face)).collect()
+    let one = |p: &&DVec3| {
+        observer.check()?;
+        let hit = bvh.closest(**p);
+        Ok((hit.distance, hit.place.face))
+    };
+    finite.par_iter().map(one).collect()
 }
 
 /// The figures and warnings of a scan that was meshed.
@@ -228,6 +238,21 @@ pub fn scan_figures(made: &ScanMeshed, quality: &mut Quality, warnings: &mut Vec
         quality.insert(format!("scan.to_mesh_{key}"), Figure::Number(x));
         quality.insert(format!("scan.to_mesh_{key}_rel"), Figure::Number(x / made.samples.diagonal));
     }
+}
+
+/// The figures and warnings of a scan in a run, among those of its model.
+/// * `diagonal` - of the mesh
+pub(super) fn run_figures(made: &ScanMeshed, points: &Cleaned, diagonal: f64, fitted: &mut Fitted) {
+    let mut found = Quality::new();
+    scan_figures(made, &mut found, &mut fitted.warnings);
+    found.insert("scan.outliers".into(), Figure::Count(points.outliers as u64));
+    found.insert("scan.moved_rms".into(), Figure::Number(points.moved_rms));
+    for key in ["scan.noise", "scan.spacing", "scan.moved_rms", "scan.to_mesh_rms", "scan.to_mesh_mean"] {
+        if let Some(x) = found.get(key).map(|f| f.value()) {
+            found.insert(format!("{key}_rel"), Figure::Number(x / diagonal));
+        }
+    }
+    fitted.quality.extend(found);
 }
 
 /// The figures of samples alone.

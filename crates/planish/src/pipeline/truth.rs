@@ -150,8 +150,8 @@ pub fn truth_figures(
     observer: &dyn Observer,
 ) -> Result<Quality, PipelineError> {
     let mut figures = Quality::new();
-    let displaced = quality::displaced_mesh(model)?;
-    let base = quality::surface_mesh(model)?;
+    let displaced = quality::displaced_mesh(model, observer)?;
+    let base = quality::surface_mesh(model, observer)?;
     let params = CompareParams::default();
     for (name, mesh) in [("mesh", meshed), ("surface", &base), ("displaced", &displaced)] {
         let (found, samples) = compare_samples(truth, mesh, &params, observer)?;

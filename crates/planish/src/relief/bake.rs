@@ -3,8 +3,11 @@
 use super::frame::at_nodes;
 use super::{Relief, ReliefError};
 use crate::grid::Grid;
+use crate::observe::Observer;
 use crate::surface::Surface;
 use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The relief of `grid` over `surface`: `P - S` at every node, in the frame of the surface there.
 ///
@@ -35,6 +38,20 @@ pub fn displace(surface: &Surface, relief: &Relief) -> Result<Vec<DVec3>, Relief
     let mut points = vectors.clone();
     at_nodes(surface, rows, cols, &mut points, |d, s, frame| *d = s + frame.world_from_local(*d));
     Ok(points)
+}
+
+/// The displacement maps of all patches, in their order ([`bake`]).
+/// # Errors
+/// The first that cannot be baked; [`ReliefError::Cancelled`].
+pub fn bake_network(grids: &[Grid], surfaces: &[Surface], observer: &dyn Observer) -> Result<Vec<Relief>, ReliefError> {
+    let done = AtomicUsize::new(0);
+    let one = |(grid, surface): (&Grid, &Surface)| {
+        observer.check()?;
+        let relief = bake(grid, surface)?;
+        observer.progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / grids.len() as f64);
+        Ok(relief)
+    };
+    grids.par_iter().zip(surfaces).map(one).collect()
 }
 
 pub(super) fn check(rows: usize, cols: usize, found: usize) -> Result<(), ReliefError> {

@@ -12,11 +12,12 @@ mod frame;
 mod scalar;
 mod weld;
 
-pub use bake::{bake, displace};
+pub use bake::{bake, bake_network, displace};
 pub use frame::{Frame, frame_at, frames};
 pub use scalar::{fold_over, length, normal_component};
 pub use weld::{displaced_mesh, patch_mesh, span_shapes, surface_mesh};
 
+use crate::observe::Cancelled;
 use crate::surface::FitError;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -79,4 +80,7 @@ pub enum ReliefError {
         /// The patch.
         patch: usize,
     },
+    /// The observer no longer wanted the result.
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }

@@ -10,6 +10,7 @@ use super::{Relief, ReliefError, displace};
 use crate::grid::Grid;
 use crate::mesh::{Attribute, TriMesh};
 use crate::network::Network;
+use crate::observe::{Cancelled, Observer};
 use crate::surface::basis::uniform_parameters;
 use crate::surface::{FitError, Surface, check, node};
 use glam::DVec3;
@@ -20,16 +21,24 @@ const NONE: u32 = u32::MAX;
 /// The displaced grids of all patches as one mesh: for a closed network a closed manifold one.
 ///
 /// # Errors
-/// Lists that are not one per patch, or counts that differ along a curve.
-pub fn displaced_mesh(network: &Network, surfaces: &[Surface], reliefs: &[Relief]) -> Result<TriMesh, ReliefError> {
+/// Lists that are not one per patch, or counts that differ along a curve; [`ReliefError::Cancelled`].
+pub fn displaced_mesh(
+    network: &Network,
+    surfaces: &[Surface],
+    reliefs: &[Relief],
+    observer: &dyn Observer,
+) -> Result<TriMesh, ReliefError> {
     let patches = network.patches.len();
     for (what, found) in [("surfaces", surfaces.len()), ("reliefs", reliefs.len())] {
         if found != patches {
             return Err(ReliefError::Count { what, found, wanted: patches });
         }
     }
-    let arrays: Vec<Result<Vec<DVec3>, ReliefError>> =
-        surfaces.par_iter().zip(reliefs).map(|(s, r)| displace(s, r)).collect();
+    let one = |(s, r): (&Surface, &Relief)| {
+        observer.check()?;
+        displace(s, r)
+    };
+    let arrays: Vec<Result<Vec<DVec3>, ReliefError>> = surfaces.par_iter().zip(reliefs).map(one).collect();
     let mut nodes = Vec::with_capacity(patches);
     for (patch, (points, relief)) in arrays.into_iter().zip(reliefs).enumerate() {
         let points = points.map_err(|e| match e {
@@ -46,8 +55,13 @@ pub fn displaced_mesh(network: &Network, surfaces: &[Surface], reliefs: &[Relief
 /// * `shapes` - per patch the nodes along `v` and along `u`, equal along every curve; see [`span_shapes`]
 ///
 /// # Errors
-/// Lists that are not one per patch, or counts that differ along a curve.
-pub fn surface_mesh(network: &Network, surfaces: &[Surface], shapes: &[[usize; 2]]) -> Result<TriMesh, ReliefError> {
+/// Lists that are not one per patch, or counts that differ along a curve; [`ReliefError::Cancelled`].
+pub fn surface_mesh(
+    network: &Network,
+    surfaces: &[Surface],
+    shapes: &[[usize; 2]],
+    observer: &dyn Observer,
+) -> Result<TriMesh, ReliefError> {
     let patches = network.patches.len();
     for (what, found) in [("surfaces", surfaces.len()), ("shapes", shapes.len())] {
         if found != patches {
@@ -55,17 +69,13 @@ pub fn surface_mesh(network: &Network, surfaces: &[Surface], shapes: &[[usize; 2
         }
     }
     surfaces.iter().try_for_each(Surface::check)?;
-    let nodes: Vec<Grid> = surfaces
-        .par_iter()
-        .zip(shapes)
-        .map(|(surface, &[rows, cols])| Grid {
-            rows,
-            cols,
-            points: surface.sample(&uniform_parameters(cols), &uniform_parameters(rows), [0, 0]),
-            places: Vec::new(),
-        })
-        .collect();
-    weld(network, &nodes)
+    let one = |(surface, &[rows, cols]): (&Surface, &[usize; 2])| {
+        observer.check()?;
+        let points = surface.sample(&uniform_parameters(cols), &uniform_parameters(rows), [0, 0]);
+        Ok(Grid { rows, cols, points, places: Vec::new() })
+    };
+    let nodes: Result<Vec<Grid>, Cancelled> = surfaces.par_iter().zip(shapes).map(one).collect();
+    weld(network, &nodes?)
 }
 
 /// Nodes along `v` and `u` of each surface with `per_span` (at least 1) quads per knot span.

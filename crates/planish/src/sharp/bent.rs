@@ -11,6 +11,7 @@
 use super::lines::Lines;
 use crate::mesh::intersect::intersections_of;
 use crate::mesh::{FeatureKind, FeatureTags, TriMesh, next, previous};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -24,9 +25,17 @@ const TURNED: f64 = 0.5;
 /// Splits the edges that pass `least` or more beside the surface, the new vertices on it. Returns how many.
 ///
 /// No face turns over, and none comes to meet another.
-pub fn split_bent(mesh: &mut TriMesh, tags: &mut FeatureTags, least: f64) -> usize {
+/// # Errors
+/// [`Cancelled`]; the mesh is then as it was.
+pub fn split_bent(
+    mesh: &mut TriMesh,
+    tags: &mut FeatureTags,
+    least: f64,
+    observer: &dyn Observer,
+) -> Result<usize, Cancelled> {
     let mut splits = bends(mesh, tags, least);
     let refined = loop {
+        observer.check()?;
         let refined = Refined::new(mesh, &splits);
         let mut bad: Vec<u32> = refined.turned(mesh);
         if bad.is_empty() {
@@ -60,7 +69,7 @@ pub fn split_bent(mesh: &mut TriMesh, tags: &mut FeatureTags, least: f64) -> usi
     edges.sort_unstable();
     *tags = FeatureTags { vertices, edges };
     *mesh = refined.mesh;
-    splits.len()
+    Ok(splits.len())
 }
 
 /// An edge that is split: its ends, the lesser first, and where its middle goes.
@@ -238,7 +247,7 @@ mod tests {
             .flat_map(|i| (0..count).map(move |k| [i * count + k, i * count + (k + 1) % count]));
         let mut mesh = TriMesh::new(points, triangles);
         let mut tags = FeatureTags::from_edges(mesh.points.len(), rims);
-        let split = split_bent(&mut mesh, &mut tags, 1e-3);
+        let split = split_bent(&mut mesh, &mut tags, 1e-3, &crate::Silent).unwrap();
         // All edges around and across the rows are split, those along the axis and in the flat ends are not.
         assert_eq!(split, (count * rows + count * (rows - 1)) as usize);
         let off = |p: &DVec3| (p.truncate().length() - 1.0).abs();
@@ -248,7 +257,7 @@ mod tests {
         assert_eq!(tags.edges.len(), 4 * count as usize);
         assert!(Adjacency::new(&mesh).opposite.iter().all(|&h| h != NONE));
         // What is flat enough stays as it is.
-        assert_eq!(split_bent(&mut mesh, &mut tags, 1e-2), 0);
+        assert_eq!(split_bent(&mut mesh, &mut tags, 1e-2, &crate::Silent).unwrap(), 0);
     }
 
     #[test]
@@ -264,7 +273,7 @@ mod tests {
         mesh.points.extend([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
         mesh.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t: [u32; 3]| t.map(|v| first + v)));
         let mut tags = FeatureTags::from_edges(mesh.points.len(), []);
-        let split = split_bent(&mut mesh, &mut tags, 1e-3);
+        let split = split_bent(&mut mesh, &mut tags, 1e-3, &crate::Silent).unwrap();
         // All but those of the two faces there.
         assert_eq!(split, edges - 5);
         assert_eq!(self_intersections(&mesh), Vec::<[u32; 2]>::new());
@@ -278,7 +287,7 @@ mod tests {
         let edges = (0..sharp.len() as u32).filter(|&h| sharp[h as usize]);
         let mut tags =
             FeatureTags::from_edges(mesh.points.len(), edges.map(|h| [mesh.origin(h), mesh.origin(next(h))]));
-        assert_eq!(split_bent(&mut mesh, &mut tags, 1e-9), 0);
+        assert_eq!(split_bent(&mut mesh, &mut tags, 1e-9, &crate::Silent).unwrap(), 0);
         assert_eq!(mesh, before);
     }
 }

@@ -7,6 +7,7 @@
 use crate::geom::graph::{Reached, Search};
 use crate::mesh::disjoint::disjoint;
 use crate::mesh::{Adjacency, FeatureTags, NONE, TriMesh, next, path, previous};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -38,14 +39,16 @@ const JOG_COST: f64 = 0.35;
 const SPIKE: f64 = 6.0;
 
 /// Bridges the gaps of the tagged lines of a mesh, and cuts their spurs, spikes and jogs. Returns how many gaps were bridged.
-pub fn mend_lines(mesh: &TriMesh, tags: &mut FeatureTags) -> usize {
+/// # Errors
+/// [`Cancelled`]; the tags are then as they were.
+pub fn mend_lines(mesh: &TriMesh, tags: &mut FeatureTags, observer: &dyn Observer) -> Result<usize, Cancelled> {
     let adjacency = Adjacency::new(mesh);
     let mut sharp = tags.on(mesh);
     sharp.iter_mut().zip(&adjacency.opposite).for_each(|(s, &o)| *s &= o != NONE);
-    let bridged = bridge_gaps(mesh, &adjacency, &mut sharp);
+    let bridged = bridge_gaps(mesh, &adjacency, &mut sharp, observer)?;
     cut_spikes(mesh, &adjacency, SPIKE * mesh.mean_edge(), &mut sharp);
     *tags = tags.with_edges((0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| ends(mesh, h)));
-    bridged
+    Ok(bridged)
 }
 
 /// The last part of a line with a loose end.
@@ -119,21 +122,29 @@ fn cut_spurs(mesh: &TriMesh, adjacency: &Adjacency, edge: f64, sharp: &mut [bool
 /// Leads loose ends of sharp lines on to the loose ends that face them, to a line ahead, or to the boundary, where these are
 /// a few edges away; spurs are cut first. Returns how many gaps were bridged.
 /// * `sharp` - for each half-edge whether it is on a sharp line; both halves of an edge alike
-pub fn bridge_gaps(mesh: &TriMesh, adjacency: &Adjacency, sharp: &mut [bool]) -> usize {
+pub fn bridge_gaps(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    sharp: &mut [bool],
+    observer: &dyn Observer,
+) -> Result<usize, Cancelled> {
     let edge = mesh.mean_edge();
     cut_spurs(mesh, adjacency, edge, sharp);
     let mut bridged = 0;
     loop {
         let (lines, ends) = loose_ends(mesh, adjacency, sharp, edge);
-        let search = |v: &u32| bridge(mesh, adjacency, &lines, &ends, *v, edge);
-        let mut bridges: Vec<Bridge> = ends.keys().filter_map(search).collect();
+        let mut bridges: Vec<Bridge> = Vec::new();
+        for &v in ends.keys() {
+            observer.check()?;
+            bridges.extend(bridge(mesh, adjacency, &lines, &ends, v, edge));
+        }
         bridges.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.vertices.cmp(&b.vertices)));
         // One at each place and time: others may lead elsewhere after it.
         let (now, _) = disjoint(bridges, |bridge| bridge.vertices.clone(), Some);
         now.iter().for_each(|bridge| mark(mesh, adjacency, &bridge.vertices, sharp, true));
         bridged += now.len();
         if now.is_empty() {
-            return bridged;
+            return Ok(bridged);
         }
     }
 }
@@ -357,7 +368,7 @@ mod tests {
     fn bridged(chains: &[&[(usize, usize)]]) -> (usize, usize) {
         let (mesh, adjacency, mut sharp) = lines(chains);
         let before = sharp.iter().filter(|&&s| s).count() / 2;
-        let count = bridge_gaps(&mesh, &adjacency, &mut sharp);
+        let count = bridge_gaps(&mesh, &adjacency, &mut sharp, &crate::Silent).unwrap();
         (count, sharp.iter().filter(|&&s| s).count() / 2 - before)
     }
 
@@ -386,7 +397,7 @@ mod tests {
         // The line ends two edges before a column, and an edge of noise leaves it two edges before its end.
         let column: Vec<(usize, usize)> = (5..=55).map(|j| (31, j)).collect();
         let (mesh, adjacency, mut sharp) = lines(&[&row(30, 5, 30), &[(28, 30), (28, 31)], &column]);
-        assert_eq!(bridge_gaps(&mesh, &adjacency, &mut sharp), 1);
+        assert_eq!(bridge_gaps(&mesh, &adjacency, &mut sharp, &crate::Silent).unwrap(), 1);
         let degree = |i: usize, j: usize| {
             let p = mesh.bounds().min + DVec3::new(i as f64, j as f64, 0.0) / CELLS as f64;
             (0..sharp.len() as u32)
@@ -403,10 +414,10 @@ mod tests {
         let (last, before) = (place(30), place(29));
         let v = mesh.points.iter().position(|p| p.distance(last) < 1e-9).expect("a vertex there");
         let count = |sharp: &[bool]| sharp.iter().filter(|&&s| s).count() / 2;
-        bridge_gaps(&mesh, &adjacency, &mut sharp);
+        bridge_gaps(&mesh, &adjacency, &mut sharp, &crate::Silent).unwrap();
         assert_eq!(count(&sharp), 25);
         mesh.points[v] = before.lerp(last, 0.1);
-        bridge_gaps(&mesh, &adjacency, &mut sharp);
+        bridge_gaps(&mesh, &adjacency, &mut sharp, &crate::Silent).unwrap();
         assert_eq!(count(&sharp), 24);
     }
 
@@ -427,7 +438,7 @@ mod tests {
         let (mesh, _, sharp) = lines(&[&row(30, 5, 30), &row(31, 30, 55)]);
         let edges = (0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| ends(&mesh, h));
         let mut tags = FeatureTags::from_edges(mesh.points.len(), edges);
-        assert_eq!(mend_lines(&mesh, &mut tags), 1);
+        assert_eq!(mend_lines(&mesh, &mut tags, &crate::Silent).unwrap(), 1);
         assert_eq!(tags.vertices.iter().filter(|&&k| k == FeatureKind::Corner).count(), 2);
     }
 }

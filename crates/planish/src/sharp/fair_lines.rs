@@ -18,6 +18,7 @@ use super::merging::{Fault, Merging};
 use super::rounded::{self, meet};
 use crate::mesh::intersect::intersections_of;
 use crate::mesh::{FeatureTags, TriMesh};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -49,29 +50,37 @@ const MERGES: usize = 24;
 /// there. Returns the number of vertices that moved.
 ///
 /// No triangle turns over, and none comes to meet another. A mesh without noise stays as it is.
-pub fn fair_lines(mesh: &mut TriMesh, tags: &mut FeatureTags, scale: &ScanScale) -> usize {
+/// # Errors
+/// [`Cancelled`]; the mesh is then half done.
+pub fn fair_lines(
+    mesh: &mut TriMesh,
+    tags: &mut FeatureTags,
+    scale: &ScanScale,
+    observer: &dyn Observer,
+) -> Result<usize, Cancelled> {
     let usable = [scale.noise, scale.spacing, scale.cell].iter().all(|x| *x > 0.0 && x.is_finite());
     if tags.edges.is_empty() || !usable {
-        return 0;
+        return Ok(0);
     }
     let mut lines = Lines::new(mesh, tags);
-    let mut flanks = lines.flanks(scale);
+    let mut flanks = lines.flanks(scale, observer)?;
+    observer.check()?;
     let [sharp, round] = rounded::split(&lines, &tags.edges, &flanks, scale);
     if !round.is_empty() {
         *tags = tags.with_edges(sharp);
         lines.mark(tags);
         flanks.retain(|f| lines.on_line[f.0 as usize]);
     }
-    let mut wishes = wishes(&lines, &flanks, scale);
+    let mut wishes = wishes(&lines, &flanks, scale, observer)?;
     wishes.add(mesh, rounded::smoothed(&lines, &round, scale));
     let mut moved = vec![false; mesh.points.len()];
-    settle(mesh, &wishes, &mut moved);
-    tidy(mesh, tags, &mut wishes);
-    settle(mesh, &wishes, &mut moved);
+    settle(mesh, &wishes, &mut moved, observer)?;
+    tidy(mesh, tags, &mut wishes, observer)?;
+    settle(mesh, &wishes, &mut moved, observer)?;
     let mut stays = vec![false; mesh.points.len()];
     mesh.triangles.iter().flatten().for_each(|&v| stays[v as usize] = true);
     tags.keep(mesh, &stays);
-    moved.into_iter().zip(stays).filter(|x| x.0 && x.1).count()
+    Ok(moved.into_iter().zip(stays).filter(|x| x.0 && x.1).count())
 }
 
 struct Wishes {
@@ -130,23 +139,30 @@ impl Shared {
     }
 }
 
-fn wishes(lines: &Lines, flanks: &[(u32, Vec<Flank>)], scale: &ScanScale) -> Wishes {
+fn wishes(
+    lines: &Lines,
+    flanks: &[(u32, Vec<Flank>)],
+    scale: &ScanScale,
+    observer: &dyn Observer,
+) -> Result<Wishes, Cancelled> {
     let mesh = lines.mesh;
     let reach = REACH * scale.cell;
     // What each flank says of the faces beside it.
-    let beside: Vec<Vec<Vec<u32>>> = flanks
+    let beside: Result<Vec<Vec<Vec<u32>>>, Cancelled> = flanks
         .par_iter()
         .map_init(
             || Seen::new(mesh.triangles.len()),
             |seen, (_, flanks)| {
+                observer.check()?;
                 let one = |f: &Flank, seen: &mut Seen| {
                     let near = |t: u32| mesh.corners(t as usize).iter().any(|p| p.distance(f.at) < reach);
                     lines.grow(&f.sector, seen, |t| near(t) && lines.is_facing(t, f.axes[2]))
                 };
-                flanks.iter().map(|f| one(f, seen)).collect()
+                Ok(flanks.iter().map(|f| one(f, seen)).collect())
             },
         )
         .collect();
+    let beside = beside?;
     let count = mesh.points.len();
     let mut expected = vec![DVec3::ZERO; mesh.triangles.len()];
     let (mut sum, mut weight, mut least) = (vec![DVec3::ZERO; count], vec![0.0; count], vec![f64::INFINITY; count]);
@@ -161,6 +177,7 @@ fn wishes(lines: &Lines, flanks: &[(u32, Vec<Flank>)], scale: &ScanScale) -> Wis
     let mut shared = vec![Shared::default(); flanks.iter().map(|f| f.1.len()).sum()];
     let all = flanks.iter().flat_map(|(_, f)| f).zip(beside.iter().flatten());
     for (n, (flank, faces)) in all.enumerate() {
+        observer.check()?;
         for &t in faces {
             let corners = mesh.corners(t as usize);
             let center = corners.into_iter().sum::<DVec3>() / 3.0;
@@ -212,11 +229,11 @@ fn wishes(lines: &Lines, flanks: &[(u32, Vec<Flank>)], scale: &ScanScale) -> Wis
     }
     moves.sort_unstable_by_key(|m| m.0);
     expected.iter_mut().for_each(|n| *n = n.normalize_or_zero());
-    Wishes { moves, expected, cell: scale.cell }
+    Ok(Wishes { moves, expected, cell: scale.cell })
 }
 
 /// Moves vertices as far as the triangles allow, and marks them.
-fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool]) {
+fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool], observer: &dyn Observer) -> Result<(), Cancelled> {
     let before = mesh.points.clone();
     let mut share = vec![0.0; mesh.points.len()];
     let is_there = |v: u32, p: DVec3| before[v as usize].distance(p) <= THERE * wishes.cell;
@@ -228,6 +245,7 @@ fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool]) {
     // Vertices whose triangles were not asked yet whether they meet others.
     let mut fresh: Vec<bool> = share.iter().map(|s| *s > 0.0).collect();
     for round in 0..ROUNDS {
+        observer.check()?;
         for &(v, p) in &wishes.moves {
             mesh.points[v as usize] = before[v as usize].lerp(p, share[v as usize]);
         }
@@ -246,7 +264,7 @@ fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool]) {
         }
         if bad.is_empty() {
             (0..share.len()).filter(|&v| share[v] > 0.0).for_each(|v| moved[v] = true);
-            return;
+            return Ok(());
         }
         let mut back: Vec<u32> = bad.iter().flat_map(|&t| mesh.triangles[t as usize]).collect();
         back.sort_unstable();
@@ -257,10 +275,16 @@ fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool]) {
         }
     }
     mesh.points = before;
+    Ok(())
 }
 
 /// Merges vertices and flips edges where triangles look the wrong way or are too small.
-fn tidy(mesh: &mut TriMesh, tags: &mut FeatureTags, wishes: &mut Wishes) {
+fn tidy(
+    mesh: &mut TriMesh,
+    tags: &mut FeatureTags,
+    wishes: &mut Wishes,
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
     let mut merging = Merging::new(mesh, &tags.vertices, &tags.edges);
     let fault = |t: u32, corners: [DVec3; 3]| {
         let [a, b, c] = corners;
@@ -275,6 +299,7 @@ fn tidy(mesh: &mut TriMesh, tags: &mut FeatureTags, wishes: &mut Wishes) {
     let all = 0..mesh.triangles.len() as u32;
     let mut faulty: Vec<u32> = all.filter(|&t| fault(t, mesh.corners(t as usize)) != Fault::None).collect();
     for _ in 0..MERGES {
+        observer.check()?;
         faulty = merging.round(&faulty, fault, MERGED * wishes.cell);
     }
     let merged = merging.mesh;
@@ -285,4 +310,5 @@ fn tidy(mesh: &mut TriMesh, tags: &mut FeatureTags, wishes: &mut Wishes) {
     });
     tags.edges = merged.lines.iter().copied().collect();
     mesh.triangles = merged.into_triangles();
+    Ok(())
 }

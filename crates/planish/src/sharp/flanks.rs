@@ -9,6 +9,7 @@
 
 use super::lines::{Lines, Seen};
 use crate::linalg::solve_dense;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -96,25 +97,27 @@ impl Flank {
 impl Lines<'_> {
     /// The flanks of every vertex on a line that parts its surroundings, in the order of the vertices; none where one of them
     /// is not known.
-    pub fn flanks(&self, scale: &ScanScale) -> Vec<(u32, Vec<Flank>)> {
+    pub fn flanks(&self, scale: &ScanScale, observer: &dyn Observer) -> Result<Vec<(u32, Vec<Flank>)>, Cancelled> {
         let inside = |v: &u32| self.on_line[*v as usize] && !self.adjacency.is_boundary_vertex(*v);
         let vertices: Vec<u32> = (0..self.on_line.len() as u32).filter(inside).collect();
         let seen = || Seen::new(self.mesh.triangles.len());
         let beside = |seen: &mut Seen, &v: &u32| {
+            observer.check()?;
             let at = self.mesh.points[v as usize];
             let near = |f: u32| self.centers[f as usize].distance(at) < ROUNDING * scale.cell;
-            self.sectors(v).iter().flat_map(|sector| self.grow(sector, seen, near)).collect::<Vec<u32>>()
+            Ok(self.sectors(v).iter().flat_map(|sector| self.grow(sector, seen, near)).collect())
         };
         let mut is_beside = vec![false; self.mesh.triangles.len()];
-        let found: Vec<Vec<u32>> = vertices.par_iter().map_init(seen, beside).collect();
-        found.into_iter().flatten().for_each(|f| is_beside[f as usize] = true);
+        let found: Result<Vec<Vec<u32>>, Cancelled> = vertices.par_iter().map_init(seen, beside).collect();
+        found?.into_iter().flatten().for_each(|f| is_beside[f as usize] = true);
         let found = vertices.into_par_iter().map_init(seen, |seen, v| {
-            let along = self.direction(v, NEAR * scale.cell)?;
+            observer.check()?;
+            let Some(along) = self.direction(v, NEAR * scale.cell) else { return Ok(None) };
             let one = |sector| self.flank(v, sector, along, scale, &is_beside, seen);
             let flanks: Option<Vec<Flank>> = self.sectors(v).into_iter().map(one).collect();
-            flanks.filter(|f| f.len() > 1).map(|flanks| (v, flanks))
+            Ok(flanks.filter(|f| f.len() > 1).map(|flanks| (v, flanks)))
         });
-        found.flatten().collect()
+        Ok(found.collect::<Result<Vec<_>, Cancelled>>()?.into_iter().flatten().collect())
     }
 
     fn flank(
@@ -263,7 +266,7 @@ mod tests {
         assert_eq!(tags.edges.len(), n);
         let lines = Lines::new(&mesh, &tags);
         let scale = ScanScale { noise: 0.01, spacing: 0.02, cell: 0.1 };
-        let flanks = lines.flanks(&scale);
+        let flanks = lines.flanks(&scale, &crate::observe::Silent).expect("nobody cancels");
         let center = mesh.bounds().center();
         let (_, beside) = (flanks.iter())
             .min_by(|a, b| a.1[0].at.distance(center).total_cmp(&b.1[0].at.distance(center)))

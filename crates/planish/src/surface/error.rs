@@ -1,5 +1,7 @@
 //! Why a fit is not possible: what is wrong, by how much, and the way out (`docs/guide/fit.md`).
 
+use crate::observe::Cancelled;
+
 /// Errors of the surface stage.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
@@ -102,6 +104,6 @@ pub enum FitError {
         patch: usize,
     },
     /// The observer asked to stop.
-    #[error("the fit was cancelled")]
-    Cancelled,
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }

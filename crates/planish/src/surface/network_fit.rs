@@ -153,9 +153,7 @@ fn fit_counts(
         .zip(grids)
         .zip(smoothing)
         .map(|((patch, grid), &smoothing)| {
-            if observer.cancelled() {
-                return Err(FitError::Cancelled);
-            }
+            observer.check()?;
             let [along_u, along_v] = patch_directions(patch, grid, &directions, counts);
             let projection = project(&grid.points, along_u, along_v);
             let smooth = |d: &Direction| Direction::new(d.basis.len(), d.control(), smoothing);

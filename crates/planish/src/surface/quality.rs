@@ -9,6 +9,7 @@ use super::{RowSampler, Surface};
 use crate::geom::polyline;
 use crate::grid::Grid;
 use crate::network::{CurveKind, Network};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -92,12 +93,19 @@ pub struct SeamQuality {
 ///
 /// Surfaces must be those of the network's patches. Samples where a surface has no normal (a corner with an
 /// angle of 0 or 180 degrees) count for the gap only.
-pub fn measure_seams(network: &Network, surfaces: &[Surface]) -> Vec<SeamQuality> {
+pub fn measure_seams(
+    network: &Network,
+    surfaces: &[Surface],
+    observer: &dyn Observer,
+) -> Result<Vec<SeamQuality>, Cancelled> {
     let uses = network.uses();
     (0..uses.len())
         .into_par_iter()
         .filter(|&c| uses[c].len() == 2 && uses[c].iter().all(|&(p, _)| (p as usize) < surfaces.len()))
-        .map(|c| measure(network, surfaces, c, [uses[c][0], uses[c][1]]))
+        .map(|c| {
+            observer.check()?;
+            Ok(measure(network, surfaces, c, [uses[c][0], uses[c][1]]))
+        })
         .collect()
 }
 

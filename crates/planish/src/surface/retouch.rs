@@ -81,9 +81,7 @@ pub fn retouch(
             let mut best = made(params.smoothing)?;
             let mut fewest = folds(&best, grid);
             for weight in SMOOTHING.into_iter().filter(|&w| w > params.smoothing) {
-                if observer.cancelled() {
-                    return Err(FitError::Cancelled);
-                }
+                observer.check()?;
                 if fewest == 0 {
                     break;
                 }

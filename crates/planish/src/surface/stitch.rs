@@ -27,7 +27,7 @@ use super::{FitError, Surface};
 use crate::grid::Grid;
 use crate::linalg::{Banded, BandedCholesky};
 use crate::network::{CurveKind, Network, Patch};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -88,7 +88,7 @@ pub fn stitch(
         return Err(FitError::Parameter { name: "stiffness", value: params.stiffness, wanted: "0 or more" });
     }
     let Some(work) = Work::new(network, grids, surfaces)? else { return Ok(surfaces.to_vec()) };
-    let stop = || if observer.cancelled() { Err(FitError::Cancelled) } else { Ok(()) };
+    let stop = || observer.check();
     let curves = work.curves();
     stop()?;
     let filled = work.filled(&curves, observer)?;
@@ -186,7 +186,7 @@ impl<'a> Work<'a> {
             let net = fill(patch, curves, &projection, along_u, along_v);
             Some(Filled { surface: surface_of(net, along_u, along_v), projection })
         };
-        self.network.patches.par_iter().enumerate().map(one).collect::<Option<_>>().ok_or(FitError::Cancelled)
+        self.network.patches.par_iter().enumerate().map(one).collect::<Option<_>>().ok_or(Cancelled.into())
     }
 
     /// The normals along every smooth seam; none along other curves.

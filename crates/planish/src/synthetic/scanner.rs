@@ -9,27 +9,36 @@
 use crate::cloud::{Cloud, CloudError};
 use crate::geom::{Bvh, KdTree, random};
 use crate::mesh::TriMesh;
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// How a virtual scan is made. Lengths are fractions of the diagonal of the shape.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
 pub struct ScannerParams {
-    /// Stations around the shape.
+    /// Stations around the shape
+    #[schemars(range(min = 1, max = 160))]
     pub stations: usize,
-    /// Points of all stations, about.
+    /// Points of all stations, about
+    #[schemars(range(min = 5_000, max = 5_000_000))]
     pub points: usize,
-    /// Standard deviation along the ray, of the diagonal.
+    /// Standard deviation of the points along the ray
+    #[schemars(range(min = 0.0, max = 0.1), extend("unit" = "diagonal"))]
     pub noise: f64,
-    /// Share of the hits whose range is wrong.
+    /// Share of the hits whose range is wrong
+    #[schemars(range(min = 0.0, max = 0.5), extend("unit" = "share"))]
     pub outliers: f64,
-    /// Standard deviation of the misplacement of a station along each axis, of the diagonal.
+    /// Standard deviation of the misplacement of a station along each axis
+    #[schemars(range(min = 0.0, max = 0.1), extend("unit" = "diagonal"))]
     pub shift: f64,
-    /// Standard deviation of its turn about the middle of the shape, degrees.
+    /// Standard deviation of the turn of a station about the middle of the shape
+    #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "degrees"))]
     pub turn_deg: f64,
-    /// Seed of everything random.
+    /// Seed of everything random
     pub seed: u64,
 }
 
@@ -92,14 +101,17 @@ pub fn virtual_scan(
     if truth.triangles.is_empty() || params.stations == 0 {
         return Err(nothing);
     }
-    let tree = Bvh::new(truth);
+    let tree = Bvh::watched(truth, observer)?;
     let bounds = truth.bounds();
     let (center, size) = (bounds.center(), bounds.diagonal());
-    let (places, thinning) = chosen(truth, &tree, params);
+    let (places, thinning) = chosen(truth, &tree, params, observer)?;
     let stations: Vec<Station> =
         places.into_iter().enumerate().map(|(k, out)| Station::new(k, out, center, size, params)).collect();
-    let seen: f64 =
-        stations.iter().map(|s| s.look(truth, &tree, &thinning, TRIAL).iter().map(|h| h.chance).sum::<f64>()).sum();
+    let mut seen = 0.0;
+    for station in &stations {
+        observer.check()?;
+        seen += station.look(truth, &tree, &thinning, TRIAL).iter().map(|h| h.chance).sum::<f64>();
+    }
     if seen == 0.0 {
         return Err(nothing);
     }
@@ -107,9 +119,7 @@ pub fn virtual_scan(
     let pixels = (wanted.round() as usize).clamp(8, MOST);
     let mut scan = VirtualScan::default();
     for (k, station) in stations.iter().enumerate() {
-        if observer.cancelled() {
-            return Err(CloudError::Cancelled);
-        }
+        observer.check()?;
         observer.progress(k as f64 / stations.len() as f64);
         scan.cloud.scanners.push(station.placed(station.eye));
         for hit in station.look(truth, &tree, &thinning, pixels) {
@@ -133,7 +143,12 @@ pub fn virtual_scan(
 }
 
 /// Directions from the middle to the stations, and what is kept where many of them see the same.
-fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> (Vec<DVec3>, Thinning) {
+fn chosen(
+    truth: &TriMesh,
+    tree: &Bvh,
+    params: &ScannerParams,
+    observer: &dyn Observer,
+) -> Result<(Vec<DVec3>, Thinning), Cancelled> {
     let bounds = truth.bounds();
     let (center, size) = (bounds.center(), bounds.diagonal());
     let start = TAU * random::unit(params.seed, u64::MAX);
@@ -161,9 +176,10 @@ fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> (Vec<DVec3>, T
             (a * (1.0 - r) + b * (r * (1.0 - draw(2))) + c * (r * draw(2)), truth.normal(t))
         })
         .collect();
-    let chances: Vec<Vec<f32>> = places
+    let chances: Result<Vec<Vec<f32>>, Cancelled> = places
         .par_iter()
         .map(|&out| {
+            observer.check()?;
             let eye = center + out * AWAY * size;
             let sees = |&(p, n): &(DVec3, DVec3)| {
                 let (far, ray) = ((p - eye).length(), (p - eye).normalize());
@@ -172,9 +188,10 @@ fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> (Vec<DVec3>, T
                     && tree.first_hit(eye, ray, f64::INFINITY).is_some_and(|h| h.distance > far - 1e-6 * size);
                 if clear { chance as f32 } else { 0.0 }
             };
-            spots.iter().map(sees).collect()
+            Ok(spots.iter().map(sees).collect())
         })
         .collect();
+    let chances = chances?;
     let mut seen = vec![0f32; SPOTS];
     let mut density = vec![0.0; SPOTS];
     let places = (0..params.stations)
@@ -195,7 +212,7 @@ fn chosen(truth: &TriMesh, tree: &Bvh, params: &ScannerParams) -> (Vec<DVec3>, T
             places[best]
         })
         .collect();
-    (places, Thinning::new(spots, density))
+    Ok((places, Thinning::new(spots, density)))
 }
 
 /// How much of the hits around each spot is kept.

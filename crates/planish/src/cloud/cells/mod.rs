@@ -25,7 +25,7 @@ use super::sites::front::{PRICE, VARIATION_PRICE};
 use super::sites::{Sites, in_pieces};
 use super::{Blend, Quadric, Sample};
 use crate::geom::{Aabb, KdTree};
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -104,7 +104,7 @@ impl Cell {
     }
 }
 
-/// The cells of all sites. `None` if cancelled.
+/// The cells of all sites.
 pub(crate) fn cells(
     points: &[DVec3],
     tree: &KdTree,
@@ -112,7 +112,7 @@ pub(crate) fn cells(
     samples: &[Sample],
     of_site: &[u32],
     observer: &dyn Observer,
-) -> Option<Vec<Cell>> {
+) -> Result<Vec<Cell>, Cancelled> {
     let mut owned = vec![(DVec3::ZERO, 0usize); sites.point.len()];
     for (p, &o) in points.iter().zip(&sites.owner) {
         if o != u32::MAX {
@@ -165,7 +165,7 @@ pub(crate) fn cells(
     let home =
         made.iter().zip(&places).filter_map(|(f, p)| Some((f.as_ref().filter(|f| f.at_home(p))?.cell(p), p.noise)));
     let (cells, noise): (Vec<Cell>, Vec<f64>) = home.unzip();
-    Some(outvoted(cells, &noise))
+    Ok(outvoted(cells, &noise))
 }
 
 /// How far beside a cell its neighbours are asked, in noise levels, and how sure they must be of the other side.

@@ -25,7 +25,7 @@ use crate::cloud::local::nest::{Seen, cost, nest};
 use crate::cloud::local::points::Points;
 use crate::geom::KdTree;
 use crate::geom::tolerance::divisor;
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -73,7 +73,7 @@ const STRAY: f64 = 0.011;
 const WIDEN: f64 = 1.35;
 const STEPS: usize = 3;
 
-/// Fits sites, leaning on what is fitted already, and adds what it found. `None` if cancelled.
+/// Fits sites, leaning on what is fitted already, and adds what it found.
 /// * `open` - the sites, ascending
 pub(crate) fn grow(
     tree: &KdTree,
@@ -81,7 +81,7 @@ pub(crate) fn grow(
     open: &[u32],
     mut closed: Vec<Fit>,
     observer: &dyn Observer,
-) -> Option<Vec<Fit>> {
+) -> Result<Vec<Fit>, Cancelled> {
     let irregularity: Vec<f64> = sites
         .survey
         .iter()
@@ -110,7 +110,7 @@ pub(crate) fn grow(
         })?;
         closed.extend(fitted.into_iter().flatten());
     }
-    Some(closed)
+    Ok(closed)
 }
 
 /// What is fitted already.

@@ -12,7 +12,7 @@ pub(crate) mod survey;
 
 use super::sites::survey::{Prior, Scratch, Survey, survey};
 use crate::geom::KdTree;
-use crate::observe::Observer;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -53,29 +53,27 @@ pub(crate) struct Sites {
     pub owner: Vec<u32>,
 }
 
-/// Runs `work` over `0..count` in parallel pieces, in order; `None` if cancelled.
+/// Runs `work` over `0..count` in parallel pieces, in order.
 pub(crate) fn in_pieces<T: Send>(
     count: usize,
     span: (f64, f64),
     observer: &dyn Observer,
     work: impl Fn(&mut Scratch, usize) -> T + Sync,
-) -> Option<Vec<T>> {
+) -> Result<Vec<T>, Cancelled> {
     let mut all = Vec::with_capacity(count);
     // Large pieces keep the threads busy, small ones keep the observer informed.
     let piece = CHUNK * rayon::current_num_threads().max(1) * 2;
     while all.len() < count {
-        if observer.cancelled() {
-            return None;
-        }
+        observer.check()?;
         let range = all.len()..(all.len() + piece).min(count);
         all.par_extend(range.into_par_iter().with_min_len(16).map_init(Scratch::default, &work));
         observer.progress(span.0 + (span.1 - span.0) * all.len() as f64 / count as f64);
     }
-    Some(all)
+    Ok(all)
 }
 
-/// Chooses and surveys the sites of points in the order of their tree. `None` if cancelled.
-pub(crate) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -> Option<Sites> {
+/// Chooses and surveys the sites of points in the order of their tree.
+pub(crate) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -> Result<Sites, Cancelled> {
     let scouts: Vec<u32> = (0..points.len() as u32).step_by(SCOUT.min(points.len() / 8 + 1)).collect();
     let blank = Prior { noise: 0.0, sure: false, one: false };
     let first = in_pieces(scouts.len(), (0.0, 0.2), observer, |s, i| {
@@ -96,7 +94,7 @@ pub(crate) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
     let (known, places): (Vec<Survey>, Vec<DVec3>) =
         seen.into_iter().zip(&scouts).filter_map(|(s, &i)| Some((s?, points[i as usize]))).unzip();
     if known.is_empty() {
-        return Some(Sites { owner: vec![u32::MAX; points.len()], ..Sites::default() });
+        return Ok(Sites { owner: vec![u32::MAX; points.len()], ..Sites::default() });
     }
     let regions = Regions::new(&places, &known);
     let mut there = Vec::new();
@@ -125,7 +123,7 @@ pub(crate) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
     };
     sites.owner = points.par_iter().map_init(Default::default, closest).collect();
     sites.even(&places, &site_tree);
-    Some(sites)
+    Ok(sites)
 }
 
 /// What the scouts around a place say of it.

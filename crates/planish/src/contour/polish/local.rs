@@ -29,6 +29,15 @@ const SLACK: f64 = 1e-6;
 /// A vertex reaches over so many triangles at most.
 const FLIPS: usize = 4;
 
+/// Whether a move may make triangles lean.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Lean {
+    /// No more of them than before.
+    NoMore,
+    /// As many as it takes.
+    Any,
+}
+
 /// A mesh in the cells of its field, around some vertices.
 pub struct Local<'a> {
     /// The mesh. Merged triangles stay as [`GONE`].
@@ -201,17 +210,8 @@ impl<'a> Local<'a> {
         self.mesh.points[v as usize]
     }
 
-    /// Moves vertices together, if the mesh stays embedded and no more triangles lean than before; returns whether.
-    pub fn shift(&mut self, moves: &[(u32, DVec3)]) -> bool {
-        self.shift_if(moves, true)
-    }
-
-    /// [`Local::shift`] that lets triangles lean.
-    pub fn shift_leaning(&mut self, moves: &[(u32, DVec3)]) -> bool {
-        self.shift_if(moves, false)
-    }
-
-    fn shift_if(&mut self, moves: &[(u32, DVec3)], upright: bool) -> bool {
+    /// Moves vertices together, if the mesh stays embedded and triangles lean as `lean` says; returns whether.
+    pub fn shift(&mut self, moves: &[(u32, DVec3)], lean: Lean) -> bool {
         // What is too far from the seeds has no star that could be checked.
         if moves.iter().any(|m| self.star(m.0).is_empty()) {
             return false;
@@ -229,7 +229,7 @@ impl<'a> Local<'a> {
             self.mesh.points[v as usize] = p;
         }
         let kept = self.is_wide(&changed, &areas)
-            && (!upright || self.leaning(&changed) <= leaning)
+            && (lean == Lean::Any || self.leaning(&changed) <= leaning)
             && self.is_embedded(&changed);
         if kept {
             self.stray(&changed, before.into_iter());

@@ -19,7 +19,7 @@ pub use refine::FieldCreases;
 
 use super::cell::face::Wish;
 use super::polish::lines::{Lines, TAKEN, follow, insert_missing, join_ends};
-use super::polish::local::{CellRange, GONE, Local};
+use super::polish::local::{CellRange, GONE, Lean, Local};
 use crate::field::{Creases, Directed};
 use crate::geom::KdTree;
 use crate::mesh::{DEGENERATE_AREA, FeatureKind, TriMesh};
@@ -102,7 +102,7 @@ pub fn polish(
     let mut arrived: Vec<u32> = Vec::new();
     for (p, vertices) in &calls {
         let free = |v: u32, arrived: &[u32]| !arrived.contains(&v);
-        if let Some(&v) = vertices.iter().find(|&&v| free(v, &arrived) && local.shift(&[(v, *p)])) {
+        if let Some(&v) = vertices.iter().find(|&&v| free(v, &arrived) && local.shift(&[(v, *p)], Lean::NoMore)) {
             kinds[v as usize] = FeatureKind::Corner;
             arrived.push(v);
             open.retain(|&o| o != v);
@@ -121,7 +121,7 @@ pub fn polish(
         let before = open.len();
         together(&mut local, &lines, &targets, &mut open);
         let [single, merged, flipped] = &mut tried;
-        open.retain(|&v| !single.again(&local, &lines, &targets, v) || !local.shift(&[(v, targets[&v])]));
+        open.retain(|&v| !single.again(&local, &lines, &targets, v) || !local.shift(&[(v, targets[&v])], Lean::NoMore));
         merge_along(&mut local, &mut lines, kinds, &targets, &mut open, merged);
         open.retain(|&v| {
             let fixed = |a: u32, b: u32| lines.beside(a).contains(&b);
@@ -199,7 +199,9 @@ fn call_again(
     let mut ask = |local: &mut Local, calls: Vec<(DVec3, Vec<u32>)>| {
         for (p, vertices) in calls {
             let fixed = |a: u32, b: u32| lines.beside(a).contains(&b);
-            let first = vertices.into_iter().find(|&v| local.shift(&[(v, p)]) || local.flip_and_shift(v, p, fixed));
+            let first = vertices
+                .into_iter()
+                .find(|&v| local.shift(&[(v, p)], Lean::NoMore) || local.flip_and_shift(v, p, fixed));
             if let Some(v) = first {
                 kinds[v as usize] = FeatureKind::Corner;
                 open.retain(|&o| o != v);
@@ -258,7 +260,7 @@ fn together(local: &mut Local, lines: &Lines, targets: &HashMap<u32, DVec3>, ope
         seen.extend(&group);
         if group.len() > 1 {
             let moves: Vec<(u32, DVec3)> = group.iter().map(|&v| (v, targets[&v])).collect();
-            if local.shift(&moves) {
+            if local.shift(&moves, Lean::NoMore) {
                 arrived.extend(group);
             }
         }
@@ -326,7 +328,7 @@ fn approach(local: &mut Local, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32
             let (start, target) = (local.position(v), targets[&v]);
             !WAYS.into_iter().any(|way| {
                 let p = if way == 1.0 { target } else { start.lerp(target, way) };
-                local.shift_leaning(&[(v, p)]) && way == 1.0
+                local.shift(&[(v, p)], Lean::Any) && way == 1.0
             })
         });
         if open.len() == before {
@@ -341,9 +343,9 @@ fn approach(local: &mut Local, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32
             if turned == 0 || here == start || local.star(v).is_empty() {
                 continue;
             }
-            if local.shift_leaning(&[(v, start)]) {
+            if local.shift(&[(v, start)], Lean::Any) {
                 if local.turned(v) >= turned {
-                    local.shift_leaning(&[(v, here)]);
+                    local.shift(&[(v, here)], Lean::Any);
                     continue;
                 }
                 back = true;
@@ -394,7 +396,9 @@ fn ask_corners(
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let taken = near.first().is_some_and(|n| n.0 < TAKEN * size);
         for &(_, w) in near.iter().take(CALLED).filter(|_| !taken) {
-            if local.shift(&[(w, corner)]) || local.flip_and_shift(w, corner, |a, b| lines.beside(a).contains(&b)) {
+            if local.shift(&[(w, corner)], Lean::NoMore)
+                || local.flip_and_shift(w, corner, |a, b| lines.beside(a).contains(&b))
+            {
                 kinds[w as usize] = FeatureKind::Corner;
                 open.retain(|&o| o != w);
                 break;

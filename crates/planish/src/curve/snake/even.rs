@@ -38,9 +38,7 @@ impl Snake<'_> {
     /// Puts the moving points of every stretch between fixed ones at equal distances along the surface.
     pub(super) fn even_out(&mut self, observer: &dyn Observer) -> Result<(), CurveError> {
         for stretch in self.stretches() {
-            if observer.cancelled() {
-                return Err(CurveError::Cancelled);
-            }
+            observer.check()?;
             let places: Vec<FacePoint> = stretch.iter().map(|&i| self.points[i]).collect();
             let even = self.evened(places, observer)?;
             for (&i, &place) in stretch.iter().zip(&even).skip(1).take(stretch.len() - 2) {
@@ -126,9 +124,7 @@ impl Snake<'_> {
         let mut best: Option<(f64, Vec<FacePoint>)> = None;
         let (mut low, mut high) = (0.0, 2.0 * length / (count - 1) as f64);
         for _ in 0..HALVINGS {
-            if observer.cancelled() {
-                return Err(CurveError::Cancelled);
-            }
+            observer.check()?;
             let step = (low + high) / 2.0;
             let (mut places, mut at) = (vec![fine[0]], 0.0);
             let mut beyond = false;

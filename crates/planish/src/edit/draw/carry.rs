@@ -59,9 +59,7 @@ pub fn carry_network(
     out.corners = network.corners.iter().map(|c| Corner { place: carry_place(map, from, bvh, &c.place) }).collect();
     let sharp = sharp_edges(mesh, adjacency, SHARP_DEG);
     for (k, curve) in network.curves.iter().enumerate() {
-        if observer.cancelled() {
-            return Err(ApplyError::Cancelled);
-        }
+        observer.check()?;
         observer.progress(k as f64 / network.curves.len() as f64);
         let ends = curve.corners.map(|c| out.corners[c as usize].place);
         let open = SurfaceCurve::open(curve.points.clone());

@@ -11,7 +11,7 @@
 use super::{EditError, Editor};
 use crate::curve::without_repeats;
 use crate::layout::LayoutParams;
-use crate::layout::layout_around;
+use crate::layout::{Known, layout};
 use crate::mesh::{Adjacency, FacePoint, NONE, next};
 use crate::network::diagnose::{Regions, regions};
 use crate::network::disk::{Disk, Met};
@@ -244,7 +244,8 @@ impl Editor<'_> {
                 kind[h as usize] = Some(self.network.curves[half / 2].kind);
             }
         }
-        let laid = layout_around(&drawn.cut.mesh, &drawn.barrier, &corner, &[], params, observer)?;
+        let known = Known { lines: &drawn.barrier, corners: &corner, ..Known::default() };
+        let laid = layout(&drawn.cut.mesh, known, params, observer)?;
         let triangles = &drawn.cut.mesh.triangles;
         let to_input = |p: &FacePoint| drawn.cut.to_uncut(self.adjacency, &self.mesh.triangles, p.face, p.bary);
         let mut network = Network { patches: laid.patches.clone(), ..Network::default() };

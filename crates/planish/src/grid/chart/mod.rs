@@ -23,6 +23,7 @@ use crate::geom::tolerance::divisor;
 use crate::linalg::SparseCholesky;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
 use crate::network::PatchMesh;
+use crate::observe::{Cancelled, Observer};
 use glam::{DVec2, DVec3};
 
 /// Bounds of a cotangent weight: below, the weight would no longer hold a vertex; above, the slivers of scans would
@@ -62,9 +63,9 @@ pub fn flatten(
     patch: &PatchMesh,
     stops: &SideStops,
     counts: [usize; 2],
-    cancelled: &(dyn Fn() -> bool + Sync),
+    observer: &dyn Observer,
 ) -> Result<Chart, Fault> {
-    let stop = || if cancelled() { Err(Fault::Cancelled) } else { Ok(()) };
+    let stop = || observer.check();
     let adjacency = check(patch)?;
     stop()?;
     let (mut chart, boundary) = split(input, patch, &adjacency);
@@ -91,7 +92,7 @@ pub fn flatten(
             };
         }
     }
-    chart.solve_without_folds(&boundary, cancelled)?;
+    chart.solve_without_folds(&boundary, observer)?;
     let length =
         |k: usize| side::length(&patch.sides[k].iter().map(|&v| patch.mesh.points[v as usize]).collect::<Vec<_>>());
     loosen(&mut chart, &boundary, DVec2::new(length(0) + length(2), length(1) + length(3)) / 2.0);
@@ -301,13 +302,13 @@ impl Chart {
         weights
     }
 
-    fn solve_without_folds(&mut self, boundary: &[bool], cancelled: &(dyn Fn() -> bool + Sync)) -> Result<(), Fault> {
+    fn solve_without_folds(&mut self, boundary: &[bool], observer: &dyn Observer) -> Result<(), Fault> {
         let cotangents = self.cotangents();
         let uniform = vec![0.5; cotangents.len()];
         let few = 1 + (FEW_FOLDS * self.triangles.len() as f64) as usize;
         for (weights, clamped) in [(&cotangents, false), (&cotangents, true), (&uniform, true)] {
             let limit = |w: f64| if clamped { w.clamp(WEIGHT_RANGE[0], WEIGHT_RANGE[1]) } else { w };
-            if self.solve(boundary, weights, &limit, cancelled).is_ok() {
+            if self.solve(boundary, weights, &limit, observer).is_ok() {
                 let folds = self.folds();
                 if folds > 0 && folds <= few {
                     self.untangle(boundary);
@@ -316,9 +317,7 @@ impl Chart {
                     return Ok(());
                 }
             }
-            if cancelled() {
-                return Err(Fault::Cancelled);
-            }
+            observer.check()?;
         }
         // Spread: a triangle that came out too small gets softer springs, which lets it grow.
         let mut weights = uniform;
@@ -330,15 +329,13 @@ impl Chart {
                 }
             }
             let plain = |w: f64| w.max(f64::MIN_POSITIVE);
-            if self.solve(boundary, &weights, &plain, cancelled).is_err() {
+            if self.solve(boundary, &weights, &plain, observer).is_err() {
                 break;
             }
             if self.folds() == 0 {
                 return Ok(());
             }
-            if cancelled() {
-                return Err(Fault::Cancelled);
-            }
+            observer.check()?;
         }
         self.untangle(boundary);
         let size = |&[a, b, c]: &[u32; 3]| {
@@ -373,7 +370,7 @@ impl Chart {
         boundary: &[bool],
         weights: &[f64],
         clamp: &dyn Fn(f64) -> f64,
-        cancelled: &(dyn Fn() -> bool + Sync),
+        observer: &dyn Observer,
     ) -> Result<(), Fault> {
         let mut index = vec![NONE; boundary.len()];
         let mut n = 0u32;
@@ -413,9 +410,9 @@ impl Chart {
             }
         }
         lower.extend(diagonal.iter().enumerate().map(|(i, &d)| (i, i, d)));
-        let factor = match SparseCholesky::factor_watched(n, lower, cancelled) {
+        let factor = match SparseCholesky::factor_watched(n, lower, &|| observer.cancelled()) {
             Some(factor) => factor.map_err(|_| Fault::Folded(self.triangles.len()))?,
-            None => return Err(Fault::Cancelled),
+            None => return Err(Cancelled.into()),
         };
         factor.solve(&mut sides);
         if sides.iter().any(|x| !x.is_finite()) {
@@ -506,7 +503,7 @@ pub mod tests {
             (0..n).rev().map(|j| j * n).collect(),
         ];
         let patch = PatchMesh { mesh: input.clone(), origin, face_origin, sides };
-        flatten(&input, &patch, &SideStops::default(), [2, 2], &|| false).expect("a flat chart")
+        flatten(&input, &patch, &SideStops::default(), [2, 2], &crate::Silent).expect("a flat chart")
     }
 
     #[test]

@@ -138,7 +138,7 @@ pub(crate) fn relax_along(
     let Woven { first, lines, network } = weave(patch, strands)?;
     let ground = &first.mesh;
     // 3. Every sub-patch is resampled on its own; shared sides get the same points.
-    let sub = imprint::imprint(ground, &network)?;
+    let sub = imprint::imprint(ground, &network, observer)?;
     let (u, v) = (&cells[0], &cells[1]);
     let (nu, nv) = (u.len(), v.len());
     let starts = |cells: &[usize]| -> Vec<usize> {

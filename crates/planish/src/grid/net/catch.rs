@@ -11,6 +11,7 @@ use crate::grid::chart::Chart;
 use crate::grid::chart::locate::Spot;
 use crate::grid::quality::{halves, surface};
 use crate::mesh::NONE;
+use crate::observe::Observer;
 use rayon::prelude::*;
 
 /// Sweeps over the missed vertices; each sees the points that the one before moved.
@@ -26,13 +27,11 @@ const CLEARLY: f64 = 1.0 - 1e-6;
 const LEAST_SINE: f64 = 0.15;
 
 /// Moves points of `net` onto vertices of its chart that lie further than `allowed` from the grid's surface.
-pub fn catch(net: &mut Net, allowed: f64, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<(), Fault> {
+pub fn catch(net: &mut Net, allowed: f64, observer: &dyn Observer) -> Result<(), Fault> {
     let spots = vertex_spots(net.chart);
     let mut moved = vec![false; net.points.len()];
     for _ in 0..SWEEPS {
-        if cancelled() {
-            return Err(Fault::Cancelled);
-        }
+        observer.check()?;
         let suspects = suspects(net, allowed);
         if suspects.is_empty() {
             break;
@@ -148,7 +147,7 @@ mod tests {
             chart.points.iter().filter(|&&p| bvh.closest(p).distance > 0.01).count()
         };
         let before = missed(&net);
-        catch(&mut net, 0.01, &|| false).expect("not cancelled");
+        catch(&mut net, 0.01, &crate::Silent).expect("not cancelled");
         assert!(3 * missed(&net) < before, "{} of {before}", missed(&net));
         assert!((0..64).all(|c| !crate::grid::net::turns_over(&net.uv, 9, c)));
     }

@@ -5,17 +5,16 @@
 
 use super::Net;
 use crate::grid::Fault;
+use crate::observe::Observer;
 use glam::DVec2;
 
 /// Part of the way that a round goes.
 const SHARE: f64 = 0.6;
 
 /// Evens the spacing of `net` in `rounds` rounds over lines and columns.
-pub fn even<'a>(mut net: Net<'a>, rounds: usize, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<Net<'a>, Fault> {
+pub fn even<'a>(mut net: Net<'a>, rounds: usize, observer: &dyn Observer) -> Result<Net<'a>, Fault> {
     for round in 0..2 * rounds {
-        if cancelled() {
-            return Err(Fault::Cancelled);
-        }
+        observer.check()?;
         let along_u = round % 2 == 0;
         let (curves, count) = if along_u { (net.rows, net.cols) } else { (net.cols, net.rows) };
         let mut target = net.uv.clone();

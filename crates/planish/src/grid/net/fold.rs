@@ -11,6 +11,7 @@
 use super::{Net, cell_corners, turns_over};
 use crate::grid::Fault;
 use crate::grid::chart::locate::Spot;
+use crate::observe::Observer;
 use glam::DVec3;
 
 /// Cells to each side over which the normal is averaged.
@@ -107,7 +108,7 @@ fn cells_around(cols: usize, k: usize) -> [usize; 4] {
 ///
 /// Source: Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov 2021: the squares of the edges over twice the
 /// area, where an area that is not positive is taken for a small one; the smaller, the less is folded.
-pub fn open_folds(net: &mut Net, strictly: bool, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<bool, Fault> {
+pub fn open_folds(net: &mut Net, strictly: bool, observer: &dyn Observer) -> Result<bool, Fault> {
     let mut before = (net.points.len() as f64 * FEW) as usize;
     for round in 0..ROUNDS {
         let folded = folded_cells(net);
@@ -120,9 +121,7 @@ pub fn open_folds(net: &mut Net, strictly: bool, cancelled: &(dyn Fn() -> bool +
         before = before.min((folded.len() as f64 * WORTH) as usize).max(HANDFUL);
         let region = Region::new(net, &folded, RINGS + round);
         for _ in 0..SWEEPS {
-            if cancelled() {
-                return Err(Fault::Cancelled);
-            }
+            observer.check()?;
             if region.sweep(net, strictly) < STILL {
                 break;
             }

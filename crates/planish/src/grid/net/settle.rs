@@ -11,6 +11,7 @@
 
 use super::{Net, PARALLEL_LENGTH};
 use crate::grid::{Fault, GridParams};
+use crate::observe::{Cancelled, Observer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -41,7 +42,7 @@ pub fn settle<'a>(
     mut net: Net<'a>,
     (rounds, steps): (usize, usize),
     params: &GridParams,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    observer: &dyn Observer,
 ) -> Result<Net<'a>, Fault> {
     let mut known = None;
     let mut damping = DAMPING;
@@ -50,7 +51,7 @@ pub fn settle<'a>(
         let before = known.unwrap_or_else(|| system.energy());
         let mut least = before;
         for attempt in 0..ATTEMPTS {
-            let Some(moves) = system.solve(damping, steps, cancelled) else { return Err(Fault::Cancelled) };
+            let moves = system.solve(damping, steps, observer)?;
             let trial = net.moved(true, &|k, fraction| {
                 let m = moves[k].clamp_length_max(LARGEST_MOVE) * fraction;
                 let [u, v] = system.tangents[k];
@@ -353,7 +354,7 @@ impl System {
     }
 
     /// Moves that lower the linearised energy: conjugate gradients, preconditioned by the 2 x 2 blocks.
-    fn solve(&self, damping: f64, steps: usize, cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Vec<DVec2>> {
+    fn solve(&self, damping: f64, steps: usize, observer: &dyn Observer) -> Result<Vec<DVec2>, Cancelled> {
         let count = self.cols * self.rows;
         let inverse = self.preconditioner(damping);
         let precondition = |r: DVec2, [a, b, c]: [f64; 3]| DVec2::new(a * r.x + b * r.y, b * r.x + c * r.y);
@@ -366,7 +367,8 @@ impl System {
         let mut rz = sum(count, |k| r[k].dot(p[k]));
         let first = rz;
         for _ in 0..steps {
-            if rz <= CG_REST * first || cancelled() {
+            observer.check()?;
+            if rz <= CG_REST * first {
                 break;
             }
             self.apply(&p, &mut moves, &mut changes);
@@ -383,6 +385,6 @@ impl System {
                 p[k] = precondition(r[k], inverse[k]) + beta * p[k];
             }
         }
-        (!cancelled()).then_some(x)
+        Ok(x)
     }
 }

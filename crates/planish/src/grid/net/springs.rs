@@ -12,6 +12,7 @@ use super::settle::{CG_STEPS, settle};
 use crate::grid::chart::Chart;
 use crate::grid::chart::locate::Spot;
 use crate::grid::{Fault, GridParams};
+use crate::observe::Observer;
 
 /// Cells along the longer direction from which a grid is not made coarser.
 const COARSEST: usize = 32;
@@ -36,7 +37,7 @@ pub fn relax(
     rows: usize,
     params: &GridParams,
     caught: f64,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    observer: &dyn Observer,
 ) -> Result<Vec<Spot>, Fault> {
     let mut levels = vec![(cols, rows)];
     while let Some(&(c, r)) = levels.last()
@@ -46,14 +47,14 @@ pub fn relax(
         levels.push((halved(c), halved(r)));
     }
     let (c, r) = levels[levels.len() - 1];
-    let mut net = coarsest(chart, c, r, params, cancelled)?;
+    let mut net = coarsest(chart, c, r, params, observer)?;
     for (k, &(c, r)) in levels.iter().rev().skip(1).enumerate() {
         net = net.resampled(c, r);
         let rounds = LATER_ROUNDS[k.min(LATER_ROUNDS.len() - 1)];
-        net = settle(net, (rounds, CG_STEPS), params, cancelled)?;
+        net = settle(net, (rounds, CG_STEPS), params, observer)?;
     }
-    catch(&mut net, caught, cancelled)?;
-    open_folds(&mut net, false, cancelled)?;
+    catch(&mut net, caught, observer)?;
+    open_folds(&mut net, false, observer)?;
     Ok(net.spots)
 }
 
@@ -64,13 +65,13 @@ fn coarsest<'a>(
     cols: usize,
     rows: usize,
     params: &GridParams,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    observer: &dyn Observer,
 ) -> Result<Net<'a>, Fault> {
     let mut best: Option<(f64, Net<'a>)> = None;
     for rounds in EVEN_ROUNDS {
-        let mut net = even(Net::regular(chart, cols, rows), rounds, cancelled)?;
-        net = settle(net, (FIRST_ROUNDS, CG_STEPS), params, cancelled)?;
-        open_folds(&mut net, true, cancelled)?;
+        let mut net = even(Net::regular(chart, cols, rows), rounds, observer)?;
+        net = settle(net, (FIRST_ROUNDS, CG_STEPS), params, observer)?;
+        open_folds(&mut net, true, observer)?;
         let folded = folded_cells(&net).len() as f64 / (net.points.len() as f64);
         let score = unevenness(&net) + FOLD_COST * folded;
         if best.as_ref().is_none_or(|(b, _)| score < *b) {
@@ -95,7 +96,7 @@ mod tests {
         let bump = |s: f64, t: f64| (-30.0 * ((s - 0.6).powi(2) + (t - 0.45).powi(2))).exp();
         let chart = chart(|s, t| DVec3::new(s, t, 1.5 * bump(s, t)));
         for (cols, rows) in [(9, 9), (40, 71), (130, 100)] {
-            let spots = relax(&chart, cols, rows, &GridParams::default(), 1e-3, &|| false).expect("a grid");
+            let spots = relax(&chart, cols, rows, &GridParams::default(), 1e-3, &crate::Silent).expect("a grid");
             let uv: Vec<_> = spots.iter().map(|&s| chart.uv_of(s)).collect();
             let turned = (0..(cols - 1) * (rows - 1)).filter(|&c| turns_over(&uv, cols, c)).count();
             assert_eq!(turned, 0, "{cols} x {rows}");

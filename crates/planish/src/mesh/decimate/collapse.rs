@@ -291,9 +291,7 @@ impl<'a> Collapse<'a> {
             }
             steps += 1;
             if steps % LOOK == 0 {
-                if observer.cancelled() {
-                    return Err(DecimateError::Cancelled);
-                }
+                observer.check()?;
                 observer.progress((start - self.count) as f64 / (start - count.min(start - 1)) as f64);
             }
         }
