@@ -32,7 +32,7 @@ pub fn close_holes(
     let mut area = vec![0.0; pieces];
     (0..mesh.triangles.len()).for_each(|t| area[piece[t] as usize] += mesh.area(t));
     let loops = boundary_loops(&adjacency);
-    let made: Result<Vec<Option<(Vec<u32>, Lid)>>, Cancelled> = loops
+    let made: Result<Vec<_>, Cancelled> = loops
         .par_iter()
         .map(|around| {
             observer.check()?;

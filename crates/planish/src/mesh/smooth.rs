@@ -8,7 +8,8 @@
 //!
 //! Volume is restored by a shift along the normals. What would turn a triangle or make two meet is taken back.
 
-use super::{Adjacency, FeatureKind, FeatureTags, MeshError, NONE, TriMesh, check, next, self_intersections};
+use super::intersect::intersections_of;
+use super::{Adjacency, FeatureKind, FeatureTags, MeshError, NONE, TriMesh, check, next};
 use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -106,11 +107,12 @@ pub fn smooth(
     if size == 0.0 {
         return Ok(Smoothed { mesh: mesh.clone(), noise, kept: 0 });
     }
-    let filter = Filter::new(mesh, &adjacency, tags, size);
+    observer.check()?;
+    let filter = Filter::new(mesh, &adjacency, tags, size, observer)?;
     let mut normals: Vec<DVec3> = (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.normal(t)).collect();
     for round in 0..NORMAL_ROUNDS {
         observer.check()?;
-        normals = filter.filtered(&normals);
+        normals = filter.filtered(&normals, observer)?;
         observer.progress(0.6 * (round + 1) as f64 / NORMAL_ROUNDS as f64);
     }
     let mut points = mesh.points.clone();
@@ -123,8 +125,9 @@ pub fn smooth(
         observer.progress(0.6 + 0.3 * (round + 1) as f64 / VERTEX_ROUNDS as f64);
     }
     let mut smooth = TriMesh { points, ..mesh.clone() };
+    observer.check()?;
     restore_volume(mesh, &mut smooth, &adjacency, tags);
-    let kept = guard(mesh, &mut smooth);
+    let kept = guard(mesh, &mut smooth, observer)?;
     observer.progress(1.0);
     Ok(Smoothed { mesh: smooth, noise, kept })
 }
@@ -167,7 +170,13 @@ struct Filter<'a> {
 }
 
 impl<'a> Filter<'a> {
-    fn new(mesh: &'a TriMesh, adjacency: &'a Adjacency, tags: &'a FeatureTags, size: f64) -> Filter<'a> {
+    fn new(
+        mesh: &'a TriMesh,
+        adjacency: &'a Adjacency,
+        tags: &'a FeatureTags,
+        size: f64,
+        observer: &dyn Observer,
+    ) -> Result<Filter<'a>, Cancelled> {
         let mut line_ends: Vec<(u32, u32)> = tags.edges.iter().flat_map(|&[a, b]| [(a, b), (b, a)]).collect();
         line_ends.sort_unstable();
         let mut lines = vec![[NONE; 2]; mesh.points.len()];
@@ -184,9 +193,10 @@ impl<'a> Filter<'a> {
             (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.corners(t).iter().sum::<DVec3>() / 3.0).collect();
         let edge = mean_edge(mesh);
         // Two rings: triangles around the triangles around.
-        let rings: Vec<Vec<(u32, f64)>> = (0..mesh.triangles.len())
+        let rings: Result<Vec<Vec<(u32, f64)>>, Cancelled> = (0..mesh.triangles.len())
             .into_par_iter()
             .map(|t| {
+                observer.check()?;
                 let mut found = vec![t as u32];
                 let mut first = 0;
                 for _ in 0..2 {
@@ -216,40 +226,39 @@ impl<'a> Filter<'a> {
                     }
                     first = end;
                 }
-                found[1..]
-                    .iter()
-                    .map(|&s| {
-                        let d2 = centers[t].distance_squared(centers[s as usize]);
-                        (s, mesh.area(s as usize) * (-d2 / (2.0 * edge * edge)).exp())
-                    })
-                    .collect()
+                let weighted = found[1..].iter().map(|&s| {
+                    let d2 = centers[t].distance_squared(centers[s as usize]);
+                    (s, mesh.area(s as usize) * (-d2 / (2.0 * edge * edge)).exp())
+                });
+                Ok(weighted.collect())
             })
             .collect();
         let mut start = vec![0u32];
         let mut around = Vec::new();
-        for ring in rings {
+        for ring in rings? {
             around.extend(ring);
             start.push(around.len() as u32);
         }
         // A vertex that is off by the noise turns its triangles by about the noise over their height.
         let turn = 2.0 * size / (edge * 0.866);
         let range = (RANGE * turn).clamp(RANGE_LEAST, RANGE_MOST);
-        Filter { mesh, adjacency, kinds: &tags.vertices, start, around, range, lines }
+        Ok(Filter { mesh, adjacency, kinds: &tags.vertices, start, around, range, lines })
     }
 
     /// One round of the normal filter.
-    fn filtered(&self, normals: &[DVec3]) -> Vec<DVec3> {
+    fn filtered(&self, normals: &[DVec3], observer: &dyn Observer) -> Result<Vec<DVec3>, Cancelled> {
         let two = 2.0 * self.range * self.range;
         (0..normals.len())
             .into_par_iter()
             .map(|t| {
+                observer.check()?;
                 let n = normals[t];
                 let mut sum = n * self.mesh.area(t);
                 for &(s, weight) in &self.around[self.start[t] as usize..self.start[t + 1] as usize] {
                     let m = normals[s as usize];
                     sum += m * (weight * (-n.distance_squared(m) / two).exp());
                 }
-                sum.try_normalize().unwrap_or(n)
+                Ok(sum.try_normalize().unwrap_or(n))
             })
             .collect()
     }
@@ -328,8 +337,8 @@ fn restore_volume(from: &TriMesh, to: &mut TriMesh, adjacency: &Adjacency, tags:
 }
 
 /// Puts back vertices of triangles that turned over or that meet now and did not before; returns how many.
-fn guard(from: &TriMesh, to: &mut TriMesh) -> usize {
-    let own = self_intersections(from);
+fn guard(from: &TriMesh, to: &mut TriMesh, observer: &dyn Observer) -> Result<usize, Cancelled> {
+    let own = intersections_of(from, |_| true, observer)?;
     let mut kept = vec![false; from.points.len()];
     for round in 0..GUARD_ROUNDS {
         let mut bad: Vec<u32> = (0..to.triangles.len() as u32)
@@ -339,7 +348,9 @@ fn guard(from: &TriMesh, to: &mut TriMesh) -> usize {
                 a.dot(b) <= 0.0 && a != DVec3::ZERO && !to.triangles[t as usize].iter().all(|&v| kept[v as usize])
             })
             .collect();
-        bad.extend(self_intersections(to).into_iter().filter(|p| own.binary_search(p).is_err()).flatten());
+        bad.extend(
+            intersections_of(to, |_| true, observer)?.into_iter().filter(|p| own.binary_search(p).is_err()).flatten(),
+        );
         if bad.is_empty() {
             break;
         }
@@ -363,7 +374,7 @@ fn guard(from: &TriMesh, to: &mut TriMesh) -> usize {
             kept.fill(true);
         }
     }
-    kept.into_iter().filter(|&k| k).count()
+    Ok(kept.into_iter().filter(|&k| k).count())
 }
 
 #[cfg(test)]
@@ -424,7 +435,7 @@ mod tests {
             }
         }
         assert!(worst < 0.012, "{worst} from {low}");
-        assert!(self_intersections(&found.mesh).is_empty());
+        assert!(crate::mesh::self_intersections(&found.mesh).is_empty());
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::mesh::intersect::intersections_of;
 use crate::mesh::{FeatureKind, TriMesh};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use std::collections::BTreeSet;
 
@@ -59,7 +60,13 @@ impl<'a> Merging<'a> {
     /// triangles that may be faulty still; empty if nothing changed.
     /// * `fault` - of a triangle with these corners
     /// * `longest` - vertices are merged over edges that are at most so long
-    pub fn round(&mut self, faulty: &[u32], fault: impl Fn(u32, [DVec3; 3]) -> Fault, longest: f64) -> Vec<u32> {
+    pub fn round(
+        &mut self,
+        faulty: &[u32],
+        fault: impl Fn(u32, [DVec3; 3]) -> Fault,
+        longest: f64,
+        observer: &dyn Observer,
+    ) -> Result<Vec<u32>, Cancelled> {
         let mut taken = BTreeSet::new();
         let mut changes: Vec<Change> = Vec::new();
         for &t in faulty {
@@ -77,17 +84,17 @@ impl<'a> Merging<'a> {
                 changes.push(change);
             }
         }
-        let back = self.undo_meeting(&mut changes);
+        let back = self.undo_meeting(&mut changes, observer)?;
         if changes.is_empty() {
-            return Vec::new();
+            return Ok(Vec::new());
         }
         let changed = changes.iter().flat_map(|c| c.triangles.iter().map(|t| t.0));
         let next: BTreeSet<u32> = faulty.iter().copied().chain(changed).collect();
-        next.difference(&back).copied().collect()
+        Ok(next.difference(&back).copied().collect())
     }
 
     /// Takes back changes whose triangles meet others; returns the triangles of these.
-    fn undo_meeting(&mut self, changes: &mut Vec<Change>) -> BTreeSet<u32> {
+    fn undo_meeting(&mut self, changes: &mut Vec<Change>, observer: &dyn Observer) -> Result<BTreeSet<u32>, Cancelled> {
         let mut undone = BTreeSet::new();
         while !changes.is_empty() {
             let left: Vec<u32> =
@@ -96,7 +103,7 @@ impl<'a> Merging<'a> {
             let mesh = TriMesh { points: self.points.to_vec(), triangles, attributes: Vec::new() };
             let mut changed = vec![false; self.triangles.len()];
             changes.iter().flat_map(|c| &c.triangles).for_each(|t| changed[t.0 as usize] = true);
-            let meeting = intersections_of(&mesh, |t| changed[left[t as usize] as usize]);
+            let meeting = intersections_of(&mesh, |t| changed[left[t as usize] as usize], observer)?;
             let meeting: BTreeSet<u32> = meeting.into_iter().flatten().map(|t| left[t as usize]).collect();
             let meets = |c: &Change| c.triangles.iter().any(|t| meeting.contains(&t.0));
             let (back, stay): (Vec<Change>, Vec<Change>) = std::mem::take(changes).into_iter().partition(meets);
@@ -109,7 +116,7 @@ impl<'a> Merging<'a> {
                 self.undo(change);
             }
         }
-        undone
+        Ok(undone)
     }
 
     fn undo(&mut self, change: Change) {
@@ -300,7 +307,7 @@ mod tests {
         let mut merging = Merging::new(mesh, &tags.vertices, &tags.edges);
         let mut faulty: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
         while !faulty.is_empty() {
-            faulty = merging.round(&faulty, &fault, 2.0);
+            faulty = merging.round(&faulty, &fault, 2.0, &crate::Silent).unwrap();
         }
         let triangles = merging.triangles.into_iter().flatten().collect();
         let lines = merging.lines.into_iter().collect();
