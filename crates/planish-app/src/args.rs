@@ -17,7 +17,6 @@ use planish::pipeline::{PipelineParams, RunParams, ScanParams};
 use planish::surface::{FitParams, StitchParams};
 use planish::synthetic::ScannerParams;
 use planish_io::Up;
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// Turns raw scans and dense triangle meshes into smooth B-spline patches with displacement maps.

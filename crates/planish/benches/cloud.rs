@@ -112,8 +112,8 @@ fn row(kind: &str, mesh: &TriMesh, level: f64) -> Option<BTreeMap<&'static str, 
     let params = ScanParams {
         clean: CleanParams::default(),
         contour: ContourParams::default(),
-        voxel: None,
-        resolution: None,
+        points: Default::default(),
+        cells: None,
         memory: 4 << 30,
         close: None,
     };

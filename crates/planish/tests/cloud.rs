@@ -244,8 +244,8 @@ fn a_box_with_noise_gives_one_watertight_manifold_mesh() {
     let params = ScanParams {
         clean: CleanParams::default(),
         contour: ContourParams::default(),
-        voxel: None,
-        resolution: Some(64),
+        points: Default::default(),
+        cells: Some(planish::field::Spacing::Resolution(64)),
         memory: 1 << 30,
         close: None,
     };
@@ -411,8 +411,8 @@ fn scanned(points: Vec<DVec3>, close: Option<bool>) -> ScanMeshed {
     let params = ScanParams {
         clean: CleanParams::default(),
         contour: ContourParams::default(),
-        voxel: None,
-        resolution: None,
+        points: Default::default(),
+        cells: None,
         memory: 1 << 30,
         close,
     };

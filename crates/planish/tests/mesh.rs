@@ -693,7 +693,7 @@ fn line_errors(mesh: &TriMesh, tags: &FeatureTags) -> (f64, f64) {
 fn lines_of_a_scanned_cube_come_three_times_as_near_and_their_angles_within_a_third() {
     let (mut mesh, mut tags, scale) = scanned_cube();
     let before = line_errors(&mesh, &tags);
-    let moved = fair_lines(&mut mesh, &mut tags, &scale, &Silent);
+    let moved = fair_lines(&mut mesh, &mut tags, &scale, &Silent).unwrap();
     let after = line_errors(&mesh, &tags);
     assert!(moved > 1000, "{moved} moved");
     assert!(after.0 < before.0 / 3.0, "lines off by {before:?} before, {after:?} after");
@@ -707,11 +707,11 @@ fn lines_of_an_exact_cube_stay_where_they_are_within_1e_9() {
     let (_, mut tags, scale) = scanned_cube();
     let exact = shapes::cuboid(DVec3::ONE, 32);
     let mut mesh = exact.clone();
-    fair_lines(&mut mesh, &mut tags, &scale, &Silent);
+    fair_lines(&mut mesh, &mut tags, &scale, &Silent).unwrap();
     let most = exact.points.iter().zip(&mesh.points).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
     assert!(most < 1e-9, "{most:e}");
     // Nothing is known of a mesh that was not scanned.
-    assert_eq!(fair_lines(&mut mesh, &mut tags, &ScanScale { noise: 0.0, ..scale }, &Silent), 0);
+    assert_eq!(fair_lines(&mut mesh, &mut tags, &ScanScale { noise: 0.0, ..scale }, &Silent).unwrap(), 0);
 }
 
 /// The cube with the edge at x = y = 1/2 rounded by two cells, off by a third of the noise as the other edges are; the tags are
@@ -740,7 +740,7 @@ fn a_rounded_edge_is_no_line_and_becomes_smooth_while_the_other_eleven_stay() {
         (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
     };
     let (before, was) = (rms(&mesh), tags.edges.len());
-    fair_lines(&mut mesh, &mut tags, &scale, &Silent);
+    fair_lines(&mut mesh, &mut tags, &scale, &Silent).unwrap();
     let on_rounding = |e: &&[u32; 2]| e.iter().all(|&v| off(mesh.points[v as usize]).is_some());
     assert_eq!(tags.edges.iter().filter(on_rounding).count(), 0);
     assert!(tags.edges.len() > was * 10 / 12, "{} of {was} edges", tags.edges.len());
@@ -752,7 +752,7 @@ fn lines_are_faired_to_the_bit_on_1_and_4_threads() {
     let run = |threads| {
         let (mut mesh, mut tags, scale) = scanned_cube();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| fair_lines(&mut mesh, &mut tags, &scale, &Silent));
+        pool.install(|| fair_lines(&mut mesh, &mut tags, &scale, &Silent).unwrap());
         mesh
     };
     assert_eq!(run(1), run(4));

@@ -82,7 +82,7 @@ fn refit(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
         report.stages.extend(pipeline::refit(&mut model, &params, &session.bars).map_err(wrong)?);
         pipeline::assess(&model, &session.bars).map_err(wrong)?
     } else {
-        pipeline::rework(&mut model, &params, &session.bars).map_err(wrong)?
+        pipeline::rework(&mut model, None, &params, &session.bars).map_err(wrong)?
     };
     report.stages.extend(found.stages);
     report.quality = found.quality;

@@ -33,7 +33,7 @@ pub fn close_holes(
     let mut area = vec![0.0; pieces];
     (0..mesh.triangles.len()).for_each(|t| area[piece[t] as usize] += mesh.area(t));
     let loops = boundary_loops(&adjacency);
-    let made = loops
+    let made: Result<Vec<_>, Cancelled> = loops
         .par_iter()
         .map(|around| {
             observer.check()?;
@@ -49,7 +49,7 @@ pub fn close_holes(
             let rim: Vec<u32> = around.iter().rev().map(|&h| mesh.origin(h)).collect();
             Ok(lid_over(mesh, &adjacency, around, &rim).map(|lid| (rim, lid)))
         })
-        .collect::<Result<Vec<Option<_>>, Cancelled>>();
+        .collect();
     let mut count = 0;
     for (rim, lid) in made?.into_iter().flatten() {
         let first = mesh.points.len() as u32;

@@ -12,6 +12,7 @@
 mod collapse;
 mod queue;
 
+use super::intersect::intersections_of;
 use super::{FeatureTags, MeshError, TriMesh, check, self_intersections};
 use crate::geom::Bvh;
 use crate::observe::{Cancelled, Observer};
@@ -146,7 +147,7 @@ pub fn decimate(
             }
             distance = Some(farthest);
         }
-        let meeting = self_intersections(&result);
+        let meeting = intersections_of(&result, |_| true, observer)?;
         if !meeting.is_empty() && round < ROUNDS {
             // What the input has already is not ours to mend.
             let own = *before.get_or_insert_with(|| self_intersections(mesh).len());

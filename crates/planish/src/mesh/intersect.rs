@@ -7,19 +7,31 @@
 
 use super::TriMesh;
 use crate::geom::predicates::triangles_meet;
+use crate::observe::{Cancelled, Observer, Silent};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// All pairs of triangles that meet in more than the vertices they share, ascending.
 ///
 /// A triangle without area is a segment or a point, and counts as such. Vertices are told apart by their index: weld
 /// first where cracks shall not count.
 pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
-    intersections_of(mesh, |_| true)
+    match intersections_of(mesh, |_| true, &Silent) {
+        Ok(pairs) => pairs,
+        Err(Cancelled) => unreachable!("nobody cancels"),
+    }
 }
 
-/// As [`self_intersections`], of pairs of which one is `active`.
-pub(crate) fn intersections_of(mesh: &TriMesh, active: impl Fn(u32) -> bool + Sync) -> Vec<[u32; 2]> {
+/// As [`self_intersections`], of pairs of which one is `active`, where an observer may stop it.
+/// # Errors
+/// [`Cancelled`].
+pub(crate) fn intersections_of(
+    mesh: &TriMesh,
+    active: impl Fn(u32) -> bool + Sync,
+    observer: &dyn Observer,
+) -> Result<Vec<[u32; 2]>, Cancelled> {
+    observer.check()?;
     let active: Vec<bool> = (0..mesh.triangles.len() as u32).into_par_iter().map(&active).collect();
     let boxes: Vec<[DVec3; 2]> = (0..mesh.triangles.len())
         .into_par_iter()
@@ -28,7 +40,7 @@ pub(crate) fn intersections_of(mesh: &TriMesh, active: impl Fn(u32) -> bool + Sy
             [a.min(b).min(c), a.max(b).max(c)]
         })
         .collect();
-    let Some(usual) = cell_size(&boxes) else { return Vec::new() };
+    let Some(usual) = cell_size(&boxes) else { return Ok(Vec::new()) };
     let origin = boxes.iter().fold(DVec3::INFINITY, |m, b| m.min(b[0]));
     let end = boxes.iter().fold(DVec3::NEG_INFINITY, |m, b| m.max(b[1]));
     let size = usual.max((end - origin).max_element() / MOST_CELLS);
@@ -40,6 +52,7 @@ pub(crate) fn intersections_of(mesh: &TriMesh, active: impl Fn(u32) -> bool + Sy
     };
     let actives: Vec<usize> = (0..boxes.len()).filter(|&t| active[t]).collect();
     let mut wanted: Vec<u64> = actives.par_iter().flat_map_iter(|&t| cells(&boxes[t])).collect();
+    observer.check()?;
     wanted.par_sort_unstable();
     wanted.dedup();
     // A table of hashes rules out nearly all cells that are not.
@@ -48,17 +61,26 @@ pub(crate) fn intersections_of(mesh: &TriMesh, active: impl Fn(u32) -> bool + Sy
     let slot = |c: u64| (c.wrapping_mul(SPREAD) >> 32 & (slots - 1)) as usize;
     wanted.iter().for_each(|&c| table[slot(c)] = true);
     let is_wanted = |c: &u64| table[slot(*c)] && wanted.binary_search(c).is_ok();
+    observer.check()?;
     let mut entries: Vec<(u64, u32)> = boxes
         .par_iter()
         .enumerate()
         .flat_map_iter(|(t, b)| cells(b).filter(is_wanted).map(move |c| (c, t as u32)))
         .collect();
+    observer.check()?;
     entries.par_sort_unstable();
     let runs: Vec<&[(u64, u32)]> = entries.chunk_by(|a, b| a.0 == b.0).filter(|r| r.len() > 1).collect();
+    let stopped = AtomicBool::new(false);
     let mut found: Vec<[u32; 2]> = runs
         .par_iter()
         .flat_map_iter(|run| {
             let (boxes, active) = (&boxes, &active);
+            let run: &[(u64, u32)] = if observer.cancelled() {
+                stopped.store(true, Ordering::Relaxed);
+                &[]
+            } else {
+                run
+            };
             run.iter().enumerate().flat_map(move |(n, &(at, s))| {
                 run[..n].iter().filter_map(move |&(_, t)| {
                     let (a, b) = (&boxes[s as usize], &boxes[t as usize]);
@@ -74,8 +96,11 @@ pub(crate) fn intersections_of(mesh: &TriMesh, active: impl Fn(u32) -> bool + Sy
             })
         })
         .collect();
+    if stopped.into_inner() {
+        return Err(Cancelled);
+    }
     found.par_sort_unstable();
-    found
+    Ok(found)
 }
 
 /// Bits of a cell's place along an axis, and most cells along one.

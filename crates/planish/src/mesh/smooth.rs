@@ -9,7 +9,7 @@
 //! Volume is restored by a shift along the normals. What would turn a triangle or make two meet is taken back.
 
 use super::intersect::intersections_of;
-use super::{Adjacency, FeatureKind, FeatureTags, MeshError, NONE, TriMesh, check, next, previous, self_intersections};
+use super::{Adjacency, FeatureKind, FeatureTags, MeshError, NONE, TriMesh, check, next, previous};
 use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -107,11 +107,12 @@ pub fn smooth(
     if size == 0.0 {
         return Ok(Smoothed { mesh: mesh.clone(), noise, kept: 0 });
     }
-    let filter = Filter::new(mesh, &adjacency, tags, size);
+    observer.check()?;
+    let filter = Filter::new(mesh, &adjacency, tags, size, observer)?;
     let mut normals: Vec<DVec3> = (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.normal(t)).collect();
     for round in 0..NORMAL_ROUNDS {
         observer.check()?;
-        normals = filter.filtered(&normals);
+        normals = filter.filtered(&normals, observer)?;
         observer.progress(0.6 * (round + 1) as f64 / NORMAL_ROUNDS as f64);
     }
     let mut points = mesh.points.clone();
@@ -124,8 +125,9 @@ pub fn smooth(
         observer.progress(0.6 + 0.3 * (round + 1) as f64 / VERTEX_ROUNDS as f64);
     }
     let mut smooth = TriMesh { points, ..mesh.clone() };
+    observer.check()?;
     restore_volume(mesh, &mut smooth, &adjacency, tags);
-    let kept = guard(mesh, &mut smooth);
+    let kept = guard(mesh, &mut smooth, observer)?;
     observer.progress(1.0);
     Ok(Smoothed { mesh: smooth, noise, kept })
 }
@@ -167,7 +169,13 @@ struct Filter<'a> {
 }
 
 impl<'a> Filter<'a> {
-    fn new(mesh: &'a TriMesh, adjacency: &'a Adjacency, tags: &'a FeatureTags, size: f64) -> Filter<'a> {
+    fn new(
+        mesh: &'a TriMesh,
+        adjacency: &'a Adjacency,
+        tags: &'a FeatureTags,
+        size: f64,
+        observer: &dyn Observer,
+    ) -> Result<Filter<'a>, Cancelled> {
         let mut line_ends: Vec<(u32, u32)> = tags.edges.iter().flat_map(|&[a, b]| [(a, b), (b, a)]).collect();
         line_ends.sort_unstable();
         let mut lines = vec![[NONE; 2]; mesh.points.len()];
@@ -179,9 +187,9 @@ impl<'a> Filter<'a> {
         let centers: Vec<DVec3> =
             (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.corners(t).iter().sum::<DVec3>() / 3.0).collect();
         let edge = mesh.mean_edge();
-        let first = first_rings(mesh, adjacency, tags);
+        let first = first_rings(mesh, adjacency, tags, observer)?;
         // Two rings: triangles around the triangles around.
-        let around = Lists::new(mesh.triangles.len(), |t, marks, list| {
+        let around = Lists::new(mesh.triangles.len(), observer, |t, marks, list| {
             let mut add = |s: u32| {
                 if std::mem::replace(&mut marks[s as usize], t) != t {
                     let d2 = centers[t as usize].distance_squared(centers[s as usize]);
@@ -190,26 +198,27 @@ impl<'a> Filter<'a> {
             };
             first.of(t).iter().for_each(|&s| add(s));
             first.of(t).iter().flat_map(|&s| first.of(s)).filter(|&&s| s != t).for_each(|&s| add(s));
-        });
+        })?;
         // A vertex that is off by the noise turns its triangles by about the noise over their height.
         let turn = 2.0 * size / (edge * 0.866);
         let range = (RANGE * turn).clamp(RANGE_LEAST, RANGE_MOST);
-        Filter { mesh, adjacency, kinds: &tags.vertices, around, range, lines }
+        Ok(Filter { mesh, adjacency, kinds: &tags.vertices, around, range, lines })
     }
 
     /// One round of the normal filter.
-    fn filtered(&self, normals: &[DVec3]) -> Vec<DVec3> {
+    fn filtered(&self, normals: &[DVec3], observer: &dyn Observer) -> Result<Vec<DVec3>, Cancelled> {
         let two = 2.0 * self.range * self.range;
         (0..normals.len())
             .into_par_iter()
             .map(|t| {
+                observer.check()?;
                 let n = normals[t];
                 let mut sum = n * self.mesh.area(t);
                 for &(s, weight) in self.around.of(t as u32) {
                     let m = normals[s as usize];
                     sum += m * (weight * (-n.distance_squared(m) / two).exp());
                 }
-                sum.try_normalize().unwrap_or(n)
+                Ok(sum.try_normalize().unwrap_or(n))
             })
             .collect()
     }
@@ -262,28 +271,34 @@ const TOGETHER: usize = 4096;
 impl<T: Copy + Send + Sync> Lists<T> {
     /// Makes the lists of `count` triangles; `fill` is given marks of all triangles to tell by its own number what it
     /// has met.
-    fn new(count: usize, fill: impl Fn(u32, &mut [u32], &mut Vec<T>) + Sync) -> Lists<T> {
-        let parts: Vec<(Vec<usize>, Vec<T>)> = (0..count.div_ceil(TOGETHER))
+    fn new(
+        count: usize,
+        observer: &dyn Observer,
+        fill: impl Fn(u32, &mut [u32], &mut Vec<T>) + Sync,
+    ) -> Result<Lists<T>, Cancelled> {
+        let parts: Result<Vec<(Vec<usize>, Vec<T>)>, Cancelled> = (0..count.div_ceil(TOGETHER))
             .into_par_iter()
             .map_init(
                 || vec![NONE; count],
                 |marks, k| {
+                    observer.check()?;
                     let (mut ends, mut list) = (Vec::with_capacity(TOGETHER), Vec::new());
                     for t in k * TOGETHER..((k + 1) * TOGETHER).min(count) {
                         fill(t as u32, marks, &mut list);
                         ends.push(list.len());
                     }
-                    (ends, list)
+                    Ok((ends, list))
                 },
             )
             .collect();
+        let parts = parts?;
         let mut lists = Lists { start: vec![0], all: Vec::with_capacity(parts.iter().map(|p| p.1.len()).sum()) };
         for (ends, list) in parts {
             let before = lists.all.len();
             lists.start.extend(ends.into_iter().map(|end| before + end));
             lists.all.extend(list);
         }
-        lists
+        Ok(lists)
     }
 
     fn of(&self, t: u32) -> &[T] {
@@ -296,12 +311,17 @@ const MOST_AROUND: usize = 32;
 
 /// For each triangle those that share a vertex with it, met by turning around its corners both ways until a feature or
 /// a rim.
-fn first_rings(mesh: &TriMesh, adjacency: &Adjacency, tags: &FeatureTags) -> Lists<u32> {
+fn first_rings(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    tags: &FeatureTags,
+    observer: &dyn Observer,
+) -> Result<Lists<u32>, Cancelled> {
     let is_line = |h: u32| {
         let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
         tags.edges.binary_search(&[a.min(b), a.max(b)]).is_ok()
     };
-    Lists::new(mesh.triangles.len(), |t, marks, list| {
+    Lists::new(mesh.triangles.len(), observer, |t, marks, list| {
         marks[t as usize] = t;
         for corner in 3 * t..3 * t + 3 {
             for back in [false, true] {
@@ -353,9 +373,9 @@ fn restore_volume(from: &TriMesh, to: &mut TriMesh, adjacency: &Adjacency, tags:
 }
 
 /// Puts back vertices of triangles that turned over or that meet now and did not before; returns how many.
-fn guard(from: &TriMesh, to: &mut TriMesh) -> usize {
+fn guard(from: &TriMesh, to: &mut TriMesh, observer: &dyn Observer) -> Result<usize, Cancelled> {
     // What met before is asked for only when something meets.
-    let mut own: Option<Vec<[u32; 2]>> = None;
+    let mut known: Option<Vec<[u32; 2]>> = None;
     let mut kept = vec![false; from.points.len()];
     // Pairs that no round has moved since they were asked about are as they were.
     let mut moved = vec![true; from.triangles.len()];
@@ -367,10 +387,14 @@ fn guard(from: &TriMesh, to: &mut TriMesh) -> usize {
                 a.dot(b) <= 0.0 && a != DVec3::ZERO && !to.triangles[t as usize].iter().all(|&v| kept[v as usize])
             })
             .collect();
-        let meeting = intersections_of(to, |t| moved[t as usize]);
+        let meeting = intersections_of(to, |t| moved[t as usize], observer)?;
         if !meeting.is_empty() {
-            let own = own.get_or_insert_with(|| self_intersections(from));
+            let own = match known.take() {
+                Some(own) => own,
+                None => intersections_of(from, |_| true, observer)?,
+            };
             bad.extend(meeting.into_iter().filter(|p| own.binary_search(p).is_err()).flatten());
+            known = Some(own);
         }
         if bad.is_empty() {
             break;
@@ -396,7 +420,7 @@ fn guard(from: &TriMesh, to: &mut TriMesh) -> usize {
             kept.fill(true);
         }
     }
-    kept.into_iter().filter(|&k| k).count()
+    Ok(kept.into_iter().filter(|&k| k).count())
 }
 
 #[cfg(test)]
@@ -457,7 +481,7 @@ mod tests {
             }
         }
         assert!(worst < 0.012, "{worst} from {low}");
-        assert!(self_intersections(&found.mesh).is_empty());
+        assert!(crate::mesh::self_intersections(&found.mesh).is_empty());
     }
 
     #[test]

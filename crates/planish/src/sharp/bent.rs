@@ -39,7 +39,7 @@ pub fn split_bent(
         let refined = Refined::new(mesh, &splits);
         let mut bad: Vec<u32> = refined.turned(mesh);
         if bad.is_empty() {
-            let pairs = intersections_of(&refined.mesh, |t| refined.is_piece(mesh, t)).into_iter().flatten();
+            let pairs = intersections_of(&refined.mesh, |t| refined.is_piece(mesh, t), observer)?.into_iter().flatten();
             bad = pairs.map(|t| refined.parent[t as usize]).collect();
         }
         let before = splits.len();

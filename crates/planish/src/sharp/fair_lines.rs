@@ -257,7 +257,7 @@ fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool], observer: &dy
         let mut left = if round < HALVES { 0.5 } else { 0.0 };
         if bad.is_empty() {
             let is_fresh = |t: u32| mesh.triangles[t as usize].iter().any(|&v| fresh[v as usize]);
-            let pairs = intersections_of(mesh, is_fresh).into_iter();
+            let pairs = intersections_of(mesh, is_fresh, observer)?.into_iter();
             bad = pairs.filter(|pair| pair.iter().any(|&t| moves(t, &share, mesh))).flatten().collect();
             fresh.fill(false);
             left = 0.0;
@@ -300,7 +300,7 @@ fn tidy(
     let mut faulty: Vec<u32> = all.filter(|&t| fault(t, mesh.corners(t as usize)) != Fault::None).collect();
     for _ in 0..MERGES {
         observer.check()?;
-        faulty = merging.round(&faulty, fault, MERGED * wishes.cell);
+        faulty = merging.round(&faulty, fault, MERGED * wishes.cell, observer)?;
     }
     let merged = merging.mesh;
     let mut t = 0;

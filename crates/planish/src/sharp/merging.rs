@@ -6,6 +6,7 @@ use crate::mesh::change::{Change, Changing};
 use crate::mesh::disjoint::Taken;
 use crate::mesh::intersect::intersections_of;
 use crate::mesh::{FeatureKind, TriMesh};
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use std::collections::BTreeSet;
 
@@ -42,7 +43,13 @@ impl<'a> Merging<'a> {
     /// Returns triangles that may be faulty still; empty if nothing changed.
     /// * `fault` - of a triangle with these corners
     /// * `longest` - vertices are merged over edges that are at most so long
-    pub fn round(&mut self, faulty: &[u32], fault: impl Fn(u32, [DVec3; 3]) -> Fault, longest: f64) -> Vec<u32> {
+    pub fn round(
+        &mut self,
+        faulty: &[u32],
+        fault: impl Fn(u32, [DVec3; 3]) -> Fault,
+        longest: f64,
+        observer: &dyn Observer,
+    ) -> Result<Vec<u32>, Cancelled> {
         let mut taken = Taken::default();
         let mut changes: Vec<Change> = Vec::new();
         for &t in faulty {
@@ -60,17 +67,17 @@ impl<'a> Merging<'a> {
                 changes.push(change);
             }
         }
-        let back = self.undo_meeting(&mut changes);
+        let back = self.undo_meeting(&mut changes, observer)?;
         if changes.is_empty() {
-            return Vec::new();
+            return Ok(Vec::new());
         }
         let changed = changes.iter().flat_map(Change::triangles);
         let next: BTreeSet<u32> = faulty.iter().copied().chain(changed).collect();
-        next.difference(&back).copied().collect()
+        Ok(next.difference(&back).copied().collect())
     }
 
     /// Takes back changes whose triangles meet others; returns the triangles of these.
-    fn undo_meeting(&mut self, changes: &mut Vec<Change>) -> BTreeSet<u32> {
+    fn undo_meeting(&mut self, changes: &mut Vec<Change>, observer: &dyn Observer) -> Result<BTreeSet<u32>, Cancelled> {
         let mut undone = BTreeSet::new();
         while !changes.is_empty() {
             let left: Vec<u32> = (0..self.mesh.len()).filter(|&t| self.mesh.get(t).is_some()).collect();
@@ -78,7 +85,7 @@ impl<'a> Merging<'a> {
             let mesh = TriMesh { points: self.points.to_vec(), triangles, attributes: Vec::new() };
             let mut changed = vec![false; self.mesh.len() as usize];
             changes.iter().flat_map(Change::triangles).for_each(|t| changed[t as usize] = true);
-            let meeting = intersections_of(&mesh, |t| changed[left[t as usize] as usize]);
+            let meeting = intersections_of(&mesh, |t| changed[left[t as usize] as usize], observer)?;
             let meeting: BTreeSet<u32> = meeting.into_iter().flatten().map(|t| left[t as usize]).collect();
             let meets = |c: &Change| c.triangles().any(|t| meeting.contains(&t));
             let (back, stay): (Vec<Change>, Vec<Change>) = std::mem::take(changes).into_iter().partition(meets);
@@ -91,7 +98,7 @@ impl<'a> Merging<'a> {
                 self.mesh.undo(change);
             }
         }
-        undone
+        Ok(undone)
     }
 
     fn places(&self, corners: [u32; 3]) -> [DVec3; 3] {
@@ -203,7 +210,7 @@ mod tests {
         let mut merging = Merging::new(mesh, &tags.vertices, &tags.edges);
         let mut faulty: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
         while !faulty.is_empty() {
-            faulty = merging.round(&faulty, &fault, 2.0);
+            faulty = merging.round(&faulty, &fault, 2.0, &crate::Silent).unwrap();
         }
         let lines = merging.mesh.lines.iter().copied().collect();
         let triangles = merging.mesh.into_triangles();
