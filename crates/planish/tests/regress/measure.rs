@@ -15,7 +15,7 @@ pub const NOISES: [f64; 3] = [0.1, 0.25, 0.5];
 /// Seeds of the parts and of their scans.
 pub const SEEDS: [u64; 3] = [1, 2, 3];
 /// Points of a scan: few enough for all rows to take minutes, enough for holes and ribs to be seen.
-const POINTS: usize = 20_000;
+const POINTS: usize = 24_000;
 /// Triangles of the demonstration part, cells along the others: facets leave them by a tenth of the least noise.
 const DEMO_TRIANGLES: usize = 60_000;
 const CELLS: usize = 180;
