@@ -276,7 +276,7 @@ impl<T: Copy + Send + Sync> Lists<T> {
         observer: &dyn Observer,
         fill: impl Fn(u32, &mut [u32], &mut Vec<T>) + Sync,
     ) -> Result<Lists<T>, Cancelled> {
-        let parts: Result<Vec<(Vec<usize>, Vec<T>)>, Cancelled> = (0..count.div_ceil(TOGETHER))
+        let parts = (0..count.div_ceil(TOGETHER))
             .into_par_iter()
             .map_init(
                 || vec![NONE; count],
@@ -290,8 +290,7 @@ impl<T: Copy + Send + Sync> Lists<T> {
                     Ok((ends, list))
                 },
             )
-            .collect();
-        let parts = parts?;
+            .collect::<Result<Vec<_>, Cancelled>>()?;
         let mut lists = Lists { start: vec![0], all: Vec::with_capacity(parts.iter().map(|p| p.1.len()).sum()) };
         for (ends, list) in parts {
             let before = lists.all.len();

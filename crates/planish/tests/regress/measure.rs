@@ -2,10 +2,9 @@
 
 use super::cpu;
 use planish::Silent;
-use planish::cloud::{CleanParams, Cloud};
-use planish::contour::ContourParams;
+use planish::cloud::Cloud;
 use planish::mesh::TriMesh;
-use planish::pipeline::{self, Fitted, ScanMeshed, ScanParams};
+use planish::pipeline::{self, Fitted, Input, RunParams};
 use planish::synthetic;
 use planish::synthetic::{ScannerParams, virtual_scan};
 use std::collections::BTreeMap;
@@ -16,7 +15,7 @@ pub const NOISES: [f64; 3] = [0.1, 0.25, 0.5];
 /// Seeds of the parts and of their scans.
 pub const SEEDS: [u64; 3] = [1, 2, 3];
 /// Points of a scan: few enough for all rows to take minutes, enough for holes and ribs to be seen.
-const POINTS: usize = 20_000;
+const POINTS: usize = 24_000;
 /// Triangles of the demonstration part, cells along the others: facets leave them by a tenth of the least noise.
 const DEMO_TRIANGLES: usize = 60_000;
 const CELLS: usize = 180;
@@ -50,20 +49,11 @@ pub fn scan(name: &str, percent: f64, seed: u64) -> Scanned {
     Scanned { truth, cloud, noise }
 }
 
-/// The whole way from a scan to a model, as `planish run` goes it.
-fn run(scan: &Cloud) -> Result<(ScanMeshed, Fitted), String> {
-    let params = ScanParams {
-        clean: CleanParams::default(),
-        contour: ContourParams::default(),
-        voxel: None,
-        resolution: None,
-        memory: 4 << 30,
-        close: None,
-    };
-    let made = pipeline::mesh_scan(scan, &params, &Silent).map_err(|e| e.to_string())?;
-    let (mesh, tags) = (&made.meshed.extracted.mesh, &made.meshed.extracted.tags);
-    let fitted = pipeline::fit_tagged(mesh, Some(tags), None, &pipeline::params_for(&made), &Silent);
-    Ok((made, fitted.map_err(|e| e.to_string())?))
+/// The whole way from a scan to a model, as `planish run` goes it: the mesh of the scan, and what was fitted to it.
+fn run(scan: &Cloud) -> Result<(TriMesh, Fitted), String> {
+    let made = pipeline::run(Input::Scan(scan), &RunParams::default(), &Silent).map_err(|e| e.to_string())?;
+    let scanned = made.scan.ok_or("a scan that was not meshed")?;
+    Ok((scanned.meshed.meshed.extracted.mesh, made.fitted))
 }
 
 /// Takes a scan the whole way on one thread and measures the result. On one thread the time is that of the work alone,
@@ -73,14 +63,13 @@ pub fn measure(scan: &Scanned) -> Result<Figures, String> {
     pool.install(|| {
         let before = cpu::calibration();
         let start = cpu::seconds();
-        let (made, fitted) = run(&scan.cloud)?;
+        let (mesh, fitted) = run(&scan.cloud)?;
         let spent = cpu::seconds().zip(start).map(|(end, start)| end - start);
         // The machine before and after: others come and go.
         let unit = before.zip(cpu::calibration()).map(|(a, b)| (a + b) / 2.0);
         let within = pipeline::edge_reach(&scan.truth, scan.noise);
-        let mesh = &made.meshed.extracted.mesh;
         let against =
-            pipeline::truth_figures(&scan.truth, mesh, &fitted.model, within, &Silent).map_err(|e| e.to_string())?;
+            pipeline::truth_figures(&scan.truth, &mesh, &fitted.model, within, &Silent).map_err(|e| e.to_string())?;
         let mut figures: Figures =
             fitted.quality.into_iter().chain(against).map(|(key, figure)| (key, figure.value())).collect();
         figures.extend(spent.zip(unit).map(|(spent, unit)| ("cpu".to_owned(), spent / unit)));

@@ -84,6 +84,11 @@ pub struct Kept {
 
 type Table = BTreeMap<String, BTreeMap<String, Kept>>;
 
+/// A floor is at most this share of the median away from it: one seed of three that goes astray makes no guard loose.
+const MOST_ROOM: f64 = 0.5;
+/// Shares are at most so many percent away.
+const MOST_SHARE: f64 = 5.0;
+
 /// Significant digits in the table.
 const DIGITS: i32 = 4;
 
@@ -98,11 +103,12 @@ fn digits(x: f64, round: fn(f64) -> f64) -> f64 {
 
 impl Headline {
     /// The entry of the table for measured values, lowest first: the floor is the spread of the seeds below the median,
-    /// so that a change which only draws other seeds passes, and the least room if that is more.
+    /// so that a change which only draws other numbers passes, but not farther than the most room.
     fn keep(&self, [low, median, high]: [f64; 3]) -> Kept {
-        let room = (high - low).max(self.least_room[0]).max(self.least_room[1] * median);
+        let least = self.least_room[0].max(self.least_room[1] * median);
+        let most = if self.unit == SHARE.0 { MOST_SHARE } else { MOST_ROOM * median };
         // Of the time the spread is the machine's.
-        let room = if self.key == "cpu" { self.least_room[1] * median } else { room };
+        let room = if self.key == "cpu" { least } else { (high - low).min(most).max(least) };
         let (floor, ceiling) = match self.better {
             Better::Higher => (Some(digits((median - room).max(0.0), f64::floor)), None),
             Better::Lower => (None, Some(digits(median + room, f64::ceil))),
