@@ -4,7 +4,7 @@
 //! * `<file>_<noise>` - 100 000 points spread evenly over a truth mesh of the data folder, noise in all directions
 //!
 //! Noise in percent of the diagonal; a figure is the median of its seeds with the least and greatest. Arguments: shapes
-//! (`casting,fandisk.ply`), noise (`0.1,0.25`), seeds (`1,2,3`). Writes `bench/runs/<date>-<machine>-figures.json`.
+//! (`casting,fandisk.ply`), noise (`0.1,0.25`; the usual ones of each shape if not given), seeds (`1,2,3`). Writes `bench/runs/<date>-<machine>-figures.json`.
 
 #![allow(clippy::print_stdout)] // a bench tells its figures on the terminal
 
@@ -54,12 +54,14 @@ fn main() {
     let list = |k: usize| -> Option<Vec<&str>> { args.get(k).map(|words| words.split(',').collect()) };
     let seeds: Vec<u64> = list(2).map_or(SEEDS.to_vec(), |words| words.iter().filter_map(|w| w.parse().ok()).collect());
     let noises = list(1).map(|words| words.iter().filter_map(|w| w.parse().ok()).collect::<Vec<f64>>());
-    let noises_of = |usual: Vec<f64>| noises.clone().unwrap_or(usual);
+    let usual: Vec<(&str, f64)> = PARTS.iter().flat_map(|&p| NOISES.map(|n| (p, n))).chain(MEASURED).collect();
+    let noises_of = |shape: &str| -> Vec<f64> {
+        let own: Vec<f64> = usual.iter().filter(|row| row.0 == shape).map(|row| row.1).collect();
+        noises.clone().unwrap_or(if own.is_empty() { NOISES.to_vec() } else { own })
+    };
     let rows: Vec<(&str, f64)> = match list(0) {
-        Some(shapes) => {
-            shapes.iter().flat_map(|&s| noises_of(NOISES.to_vec()).into_iter().map(move |n| (s, n))).collect()
-        }
-        None => PARTS.iter().flat_map(|&p| NOISES.map(|n| (p, n))).chain(MEASURED).collect(),
+        Some(shapes) => shapes.into_iter().flat_map(|s| noises_of(s).into_iter().map(move |n| (s, n))).collect(),
+        None => usual.clone(),
     };
     let shapes: BTreeMap<&str, Option<TriMesh>> =
         rows.iter().filter(|r| r.0.ends_with(".ply")).map(|r| (r.0, common::data_mesh(r.0))).collect();

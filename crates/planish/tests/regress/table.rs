@@ -63,8 +63,8 @@ pub const HEADLINES: [Headline; 19] = [
     headline("truth.displaced_max_rel", LENGTH, Better::Lower, [0.0, 0.1]),
     headline("seam.angle_rms_deg", ANGLE, Better::Lower, [0.0, 0.05]),
     headline("seam.angle_max_deg", ANGLE, Better::Lower, [0.0, 0.1]),
-    // Machines are noisy, and one has larger caches than the other.
-    headline("cpu", ("calibration loops", 1.0), Better::Lower, [0.0, 0.6]),
+    // Machines are noisy: beside six other jobs the median was half as much again as without.
+    headline("cpu", ("calibration loops", 1.0), Better::Lower, [0.0, 1.0]),
 ];
 
 /// A figure of a row as it was when the table was taken, in the unit of its headline.
