@@ -15,15 +15,15 @@ use crate::geom::Aabb;
 use glam::DVec3;
 
 /// Normals of cells that differ by less than this cosine are one side of an edge.
-const SAME: f64 = 0.85;
+const SAME_SIDE_COSINE: f64 = 0.85;
 /// Cells in a leaf of the tree.
-const LEAF: usize = 4;
+const CELLS_PER_LEAF: usize = 4;
 /// Cells at one point that are told apart.
-const ASKED: usize = 64;
+const MOST_CELLS_HEARD: usize = 64;
 /// A cell that is so many of its errors off the mean has a quarter of its weight left (squared Cauchy weights).
-const OFF: f64 = 3.5;
+const OUTLIER_ERRORS: f64 = 3.5;
 /// Rounds of that: a fixed number, so that the blend stays as smooth as its weights.
-const ROUNDS: usize = 2;
+const REWEIGHTINGS: usize = 2;
 
 /// Cells in a tree over their supports.
 #[derive(Clone, Debug, Default)]
@@ -171,7 +171,7 @@ impl Blend {
             let t2 = reach.share(p);
             if t2 < 1.0 {
                 let (d, n) = cell.evaluate(p);
-                if d.is_finite() && n.dot(lead) > SAME {
+                if d.is_finite() && n.dot(lead) > SAME_SIDE_COSINE {
                     sum += reach.bell(t2) * n;
                 }
             }
@@ -213,10 +213,10 @@ impl Blend {
 /// The cells that are heard at a point.
 struct Heard {
     p: DVec3,
-    values: [f64; ASKED],
-    weights: [f64; ASKED],
-    /// One over the variance of each value, and over the square of [`OFF`].
-    sure: [f64; ASKED],
+    values: [f64; MOST_CELLS_HEARD],
+    weights: [f64; MOST_CELLS_HEARD],
+    /// One over the variance of each value, and over the square of [`OUTLIER_ERRORS`].
+    sure: [f64; MOST_CELLS_HEARD],
     count: usize,
     sum: f64,
     weight: f64,
@@ -228,7 +228,7 @@ struct Heard {
 impl Heard {
     #[inline]
     fn new(p: DVec3) -> Heard {
-        let none = [0.0; ASKED];
+        let none = [0.0; MOST_CELLS_HEARD];
         let lead = (0.0, 0);
         Heard { p, values: none, weights: none, sure: none, count: 0, sum: 0.0, weight: 0.0, aside: 1.0, lead }
     }
@@ -245,10 +245,10 @@ impl Heard {
             if w > self.lead.0 {
                 self.lead = (w, i);
             }
-            if self.count < ASKED {
+            if self.count < MOST_CELLS_HEARD {
                 self.values[self.count] = d;
                 self.weights[self.count] = w;
-                self.sure[self.count] = reach.sure(t2) / (OFF * OFF);
+                self.sure[self.count] = reach.sure(t2) / (OUTLIER_ERRORS * OUTLIER_ERRORS);
                 self.count += 1;
             }
         }
@@ -261,7 +261,7 @@ impl Heard {
         let n = self.count;
         let mean = self.sum / self.weight;
         let mut value = mean;
-        for _ in 0..ROUNDS {
+        for _ in 0..REWEIGHTINGS {
             let (mut sum, mut weight) = (0.0, 0.0);
             for ((d, w), sure) in self.values[..n].iter().zip(&self.weights[..n]).zip(&self.sure[..n]) {
                 let off = 1.0 + (d - value) * (d - value) * sure;
@@ -281,7 +281,7 @@ fn build(cells: &mut [Cell], start: u32, nodes: &mut Vec<Node>) {
     let low = cells.iter().map(|c| reach(c, -1.0)).fold(DVec3::INFINITY, DVec3::min);
     let high = cells.iter().map(|c| reach(c, 1.0)).fold(DVec3::NEG_INFINITY, DVec3::max);
     nodes.push(Node { low, high, start, count: cells.len() as u32, right: 0 });
-    if cells.len() <= LEAF {
+    if cells.len() <= CELLS_PER_LEAF {
         return;
     }
     let size = Aabb::of(cells.iter().map(|c| &c.center)).size();

@@ -201,10 +201,10 @@ pub struct Samples {
 }
 
 /// Fewest different points: those of the smallest ball.
-pub const FEWEST: usize = 18;
+pub const FEWEST_POINTS: usize = 18;
 
 /// Times that sheets which turn out to be one surface, seen twice, are fitted anew.
-const JOINS: usize = 4;
+const JOIN_ROUNDS: usize = 4;
 
 /// Fits oriented samples to a scan.
 /// # Errors
@@ -236,7 +236,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
         let normals = given_normals(cloud).filter(|_| !params.ignore_normals).map(|of| known(&of));
         let hints = Hints { toward: toward.as_deref(), normals: normals.as_deref(), areas: &areas };
         let oriented = orient::orient(&fits, &votes, &hints);
-        let twice = if round < JOINS { views::aside(&fits, &oriented.sign, &hints) } else { Vec::new() };
+        let twice = if round < JOIN_ROUNDS { views::aside(&fits, &oriented.sign, &hints) } else { Vec::new() };
         if twice.is_empty() {
             break (fits, areas, oriented);
         }
@@ -322,8 +322,8 @@ fn distinct(cloud: &Cloud) -> Result<(Vec<DVec3>, Vec<u32>), CloudError> {
         }
     }
     ids.retain(|&i| !repeats[i as usize]);
-    if ids.len() < FEWEST {
-        return Err(CloudError::TooFew { given: cloud.points.len(), distinct: ids.len(), needed: FEWEST });
+    if ids.len() < FEWEST_POINTS {
+        return Err(CloudError::TooFew { given: cloud.points.len(), distinct: ids.len(), needed: FEWEST_POINTS });
     }
     let points: Vec<DVec3> = ids.iter().map(|&i| cloud.points[i as usize]).collect();
     let center = points.iter().sum::<DVec3>() / points.len() as f64;

@@ -14,17 +14,17 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Samples asked for each point.
-const ASKED: usize = 10;
+const SAMPLES_PER_POINT: usize = 10;
 /// Samples of two sheets meet at an edge if their normals differ by more than this, degrees.
 const SHARP_DEG: f64 = 30.0;
 /// Points within this many noise levels (and one spacing) of a second sheet are feature points.
-const BESIDE: f64 = 2.0;
+const FEATURE_NOISE: f64 = 2.0;
 /// Distance of points of a sharp line, in spacings.
-const LINE: f64 = 3.0;
+const LINE_SPACING: f64 = 3.0;
 /// Steps to the surface at most.
-const STEPS: usize = 4;
+const PROJECTION_STEPS: usize = 4;
 /// Points between two looks at the observer.
-const CHUNK: usize = 1 << 15;
+const POINTS_PER_CHUNK: usize = 1 << 15;
 
 /// Which points are kept.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -86,7 +86,7 @@ pub fn project(
     while placed.len() < finite.len() {
         observer.check()?;
         observer.progress(placed.len() as f64 / finite.len() as f64);
-        let range = placed.len()..(placed.len() + CHUNK).min(finite.len());
+        let range = placed.len()..(placed.len() + POINTS_PER_CHUNK).min(finite.len());
         placed.par_extend(range.into_par_iter().map_init(Vec::new, |near, k| {
             place(cloud.points[finite[k] as usize], samples, &tree, &blend, outlier, near)
         }));
@@ -96,7 +96,7 @@ pub fn project(
     let moved_rms = (placed.iter().filter(|p| !p.outlier).map(|p| p.moved * p.moved).sum::<f64>() / inner).sqrt();
     let mut strays = vec![true; cloud.points.len()];
     placed.iter().zip(&finite).for_each(|(p, &i)| strays[i as usize] = p.outlier);
-    let lines = feature_lines(&placed, LINE * samples.spacing);
+    let lines = feature_lines(&placed, LINE_SPACING * samples.spacing);
     let thinned = params.spacing > 0.0;
     let mut kept: Vec<u32> =
         (0..placed.len() as u32).filter(|&k| !placed[k as usize].outlier || (params.outliers && !thinned)).collect();
@@ -150,7 +150,7 @@ fn place(
     outlier: f64,
     near: &mut Vec<(f64, u32)>,
 ) -> Placed {
-    tree.nearest(p, ASKED, near);
+    tree.nearest(p, SAMPLES_PER_POINT, near);
     let first = near.first().map_or(0, |n| n.1);
     let stray = |moved: f64| Placed {
         at: p,
@@ -165,7 +165,7 @@ fn place(
     // Down the gradient to the surface; the blend is no exact distance, so more than once.
     let mut at = p;
     let mut here = None;
-    for _ in 0..STEPS {
+    for _ in 0..PROJECTION_STEPS {
         let Some(b) = blend.at(at) else { return stray(f64::INFINITY) };
         let normal = blend.normal(at, &b);
         at -= b.value * normal;
@@ -202,7 +202,7 @@ fn place(
             .iter()
             .filter(|q| {
                 let (d, n) = q.distance(at);
-                n.dot(normal) < SHARP_DEG.to_radians().cos() && d.abs() < BESIDE * noise + samples.spacing
+                n.dot(normal) < SHARP_DEG.to_radians().cos() && d.abs() < FEATURE_NOISE * noise + samples.spacing
             })
             .find_map(|q| meet(*own, *q, at));
     }

@@ -22,7 +22,7 @@ mod survey;
 mod walk;
 
 use crate::contour::cell::face::FacePoints;
-use crate::contour::cell::patch::{INNER, Patcher, Scratch, Sheet};
+use crate::contour::cell::patch::{FIRST_INNER, Patcher, Scratch, Sheet};
 use crate::contour::octree::Octree;
 use crate::contour::survey::Survey;
 use crate::field::{Creases, Directed};
@@ -117,9 +117,9 @@ pub struct Thresholds {
 }
 
 /// Layers of cells that a task takes at once.
-const LAYERS: usize = 8;
+const LAYERS_PER_TASK: usize = 8;
 /// Normals within one merged cell of the standard algorithm differ by less than this (cosine).
-const SMOOTH: f64 = 0.9;
+const SMOOTH_COSINE: f64 = 0.9;
 /// Normals that differ by less than so many times their noise are no evidence of a feature.
 const NOISE: f64 = 3.0;
 
@@ -137,14 +137,14 @@ pub fn extract(
     let creases = creases.filter(|_| !params.plain);
     let limits = thresholds(field, creases, params);
     let hits = field.hit_count();
-    if hits as u64 >= INNER as u64 {
+    if hits as u64 >= FIRST_INNER as u64 {
         return Err(ContourError::TooLarge { vertices: hits });
     }
     let [nx, ny, _] = [0, 1, 2].map(|a| field.axes[a].len() as u32);
     let base = [0, nx, nx + ny];
     let layers = field.lattice.cells[2];
     let chunks: Vec<(usize, usize)> =
-        (0..layers).step_by(LAYERS).map(|from| (from, (from + LAYERS).min(layers))).collect();
+        (0..layers).step_by(LAYERS_PER_TASK).map(|from| (from, (from + LAYERS_PER_TASK).min(layers))).collect();
 
     let mut points = hit_positions(field);
     let octree = params.adaptive.filter(|t| *t > 0.0).map(|tolerance| {
@@ -154,7 +154,7 @@ pub fn extract(
             cells
         });
         // Standard cells have no features to keep, but no reason to bend either.
-        let sharp = if params.plain { SMOOTH } else { limits.faint };
+        let sharp = if params.plain { SMOOTH_COSINE } else { limits.faint };
         Octree::new(field, base, cells.collect(), sharp, tolerance)
     });
     let merged = |at: [usize; 3]| octree.as_ref().is_some_and(|o| o.is_merged(at));
@@ -199,7 +199,7 @@ pub fn extract(
 
     let outer = hits + faces.len();
     let inner: usize = sheets.iter().map(|s| s.inner.len()).sum();
-    if (outer + inner) as u64 >= INNER as u64 {
+    if (outer + inner) as u64 >= FIRST_INNER as u64 {
         return Err(ContourError::TooLarge { vertices: outer + inner });
     }
     let count = surveys.iter().map(Survey::triangles).chain(sheets.iter().map(|s| s.triangles.len())).sum();
@@ -216,7 +216,7 @@ pub fn extract(
     for (survey, sheet) in surveys.iter().zip(&sheets) {
         // Inner vertices get their numbers after all those before.
         let first = points.len() as u32;
-        let name = |id: u32| if id >= INNER { id - INNER + first } else { id };
+        let name = |id: u32| if id >= FIRST_INNER { id - FIRST_INNER + first } else { id };
         survey.merge(sheet, name, &mut triangles);
         edges.extend(sheet.edges.iter().map(|e| e.map(name)));
         wishes.extend(sheet.wishes.iter().map(|(id, p)| (name(*id), *p)));

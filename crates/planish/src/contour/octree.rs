@@ -203,7 +203,7 @@ impl<'a> Octree<'a> {
         let mut all = Sheet::default();
         for sheet in sheets {
             let (inner, first) = (all.inner.len() as u32, all.triangles.len() as u32);
-            let name = |id: u32| if id >= patch::INNER { id + inner } else { id };
+            let name = |id: u32| if id >= patch::FIRST_INNER { id + inner } else { id };
             all.triangles.extend(sheet.triangles.iter().map(|t| t.map(name)));
             all.inner.extend(&sheet.inner);
             all.cells.extend(sheet.cells.iter().map(|&(at, a, b)| (at, a + first, b + first)));
@@ -235,7 +235,7 @@ impl<'a> Octree<'a> {
         if !patch::flat(&l, &mut sheet.triangles) {
             let p = patch::inside(patch::center(&l), low, high).0;
             sheet.inner.push(Inner { p, kind: FeatureKind::None });
-            patch::fan(&l, patch::INNER + sheet.inner.len() as u32 - 1, &mut sheet.triangles);
+            patch::fan(&l, patch::FIRST_INNER + sheet.inner.len() as u32 - 1, &mut sheet.triangles);
         }
         // Whoever looks for triangles nearby finds them in every cell of the block.
         let end = sheet.triangles.len() as u32;

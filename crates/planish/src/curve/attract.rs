@@ -11,7 +11,7 @@ use rayon::prelude::*;
 /// Slides of one place at most; each follows a face plane to the foot of the attractor, so a few are the rule.
 const SLIDES: usize = 48;
 /// A slide shorter than this share of the distance to the attractor ends the sliding.
-const SETTLED: f64 = 1e-7;
+const LEAST_SLIDE: f64 = 1e-7;
 /// Halvings of a slide that would lead away (over a ridge).
 const HALVINGS: usize = 6;
 /// Places that one task slides at least.
@@ -49,7 +49,7 @@ pub(crate) fn slide_within(
         let Some((trial, q, d)) = better else { break };
         let moved = p.distance(q);
         (at, p, away) = (trial, q, d);
-        if moved <= (SETTLED * away).max(tolerance) {
+        if moved <= (LEAST_SLIDE * away).max(tolerance) {
             break;
         }
     }

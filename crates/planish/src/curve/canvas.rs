@@ -36,7 +36,7 @@ pub struct Magnet {
 const LEAST_COST: f64 = 0.2;
 /// Shares of the vertices below the values of no pull and of full pull.
 const MIDDLE: f64 = 0.5;
-const HIGH: f64 = 0.95;
+const FULL_PULL_SHARE: f64 = 0.95;
 /// A magnetic search looks ahead as if edges cost at least this: it may miss the cheapest path by as much as this is
 /// above the least cost, and looks at a small part of the mesh instead of most of it.
 const EAGER: f64 = 0.7;
@@ -57,7 +57,7 @@ impl Magnet {
         let mut sorted: Vec<f64> = field.values.iter().copied().filter(|s| s.is_finite()).collect();
         sorted.sort_unstable_by(f64::total_cmp);
         let at = |share: f64| sorted.get((share * sorted.len() as f64) as usize).copied().unwrap_or(0.0);
-        let (low, high) = (at(MIDDLE), at(HIGH));
+        let (low, high) = (at(MIDDLE), at(FULL_PULL_SHARE));
         let scale = if high > low { 1.0 / (high - low) } else { 0.0 };
         let pull = field.values.iter().map(|s| ((s - low) * scale).clamp(0.0, 1.0) as f32).collect();
         Magnet { pull, least_cost: LEAST_COST }

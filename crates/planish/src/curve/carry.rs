@@ -112,8 +112,8 @@ pub fn carry_curve(
     let carried = SurfaceCurve { points, closed: curve.closed };
     let even = carried.resampled(mesh, adjacency, curve.points.len().max(3))?;
     let mut snake = Snake::new(mesh, adjacency, &even)?;
-    let params = SnakeParams { fairness: 0.0, curvature: 1.0, sweeps: SMOOTHING, ..SnakeParams::default() };
-    for _ in 0..SMOOTHING {
+    let params = SnakeParams { fairness: 0.0, curvature: 1.0, sweeps: SMOOTHING_SWEEPS, ..SnakeParams::default() };
+    for _ in 0..SMOOTHING_SWEEPS {
         snake.step(&params, super::Sweep::Single);
         observer.check()?;
     }
@@ -123,7 +123,7 @@ pub fn carry_curve(
 /// A place that slid along counts if it is at most this much further from its target than the nearest one.
 const SAME_SHEET: f64 = 1.5;
 /// Sweeps of a stiff wire that take out the jitter of the nearest places and leave the course.
-const SMOOTHING: usize = 12;
+const SMOOTHING_SWEEPS: usize = 12;
 
 #[cfg(test)]
 mod tests {

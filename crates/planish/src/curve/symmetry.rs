@@ -27,7 +27,7 @@ pub struct Plane {
 /// Sample points that a plane is judged by.
 const SAMPLES: usize = 1500;
 /// Rounds of matching per candidate, and for the best at the end.
-const ROUNDS: usize = 12;
+const MATCH_ROUNDS: usize = 12;
 const LAST_ROUNDS: usize = 40;
 /// A plane is one of symmetry if mirrored points miss the surface by less than this in the mean, over the diagonal.
 pub const SYMMETRIC: f64 = 0.01;
@@ -96,7 +96,7 @@ pub fn find(mesh: &TriMesh, bvh: &Bvh, observer: &dyn Observer) -> Result<(Plane
     for (k, &normal) in candidates.iter().enumerate() {
         observer.check()?;
         observer.progress(k as f64 / candidates.len() as f64);
-        let (plane, miss) = refine(bvh, &samples, Plane { point: center, normal }, ROUNDS);
+        let (plane, miss) = refine(bvh, &samples, Plane { point: center, normal }, MATCH_ROUNDS);
         if best.as_ref().is_none_or(|b| miss < b.0) {
             best = Some((miss, plane));
         }

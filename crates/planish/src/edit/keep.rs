@@ -13,7 +13,7 @@ use crate::network::{Network, Patch};
 use std::collections::BTreeMap;
 
 /// Sides that a patch before the plane or across it keeps at least: across it up to two sides lie behind it.
-const ACROSS: usize = 2;
+const FEWEST_KEPT_SIDES: usize = 2;
 
 /// Fewest cells of a section over the plane: two on each side of it.
 const FEWEST_ACROSS: usize = 4;
@@ -112,8 +112,8 @@ pub(super) fn mirror(ground: &Ground, drawing: &mut Drawing, before: &Drawing, p
         let Some(patch) = old.patches.get(p as usize) else { return (None, None) };
         let kept = |c: u32| images.kept(c);
         let image = |c: u32| images.kept(c).map(|c| images.image[c as usize]);
-        let first = Onto::find(patch, &kept, &new.patches, false, ACROSS);
-        let second = Onto::find(patch, &image, &new.patches, true, ACROSS);
+        let first = Onto::find(patch, &kept, &new.patches, false, FEWEST_KEPT_SIDES);
+        let second = Onto::find(patch, &image, &new.patches, true, FEWEST_KEPT_SIDES);
         (first, second)
     };
     let near = ON_PLANE * mesh.bounds().diagonal();

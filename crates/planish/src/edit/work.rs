@@ -14,7 +14,7 @@ use glam::DVec3;
 use std::sync::OnceLock;
 
 /// A position further off the mesh than this share of its diagonal is a mistake: of units, or of axes.
-const FAR: f64 = 0.25;
+const FARTHEST_OFF_MESH: f64 = 0.25;
 /// Picks go to edges sharper than this, degrees.
 const SHARP_DEG: f64 = 40.0;
 
@@ -76,7 +76,7 @@ impl Work<'_, '_> {
     pub(super) fn nearest(&self, p: [f64; 3]) -> Result<FacePoint, ApplyError> {
         let found = self.ground.bvh.closest(DVec3::from_array(p));
         let away = found.distance / self.mesh().bounds().diagonal().max(f64::MIN_POSITIVE);
-        if away > FAR { Err(ApplyError::OffMesh { place: p, away }) } else { Ok(found.place) }
+        if away > FARTHEST_OFF_MESH { Err(ApplyError::OffMesh { place: p, away }) } else { Ok(found.place) }
     }
 
     /// A vector of a move, no longer than the diagonal.

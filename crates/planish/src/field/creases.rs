@@ -49,7 +49,7 @@ const BEND: f64 = 0.82;
 /// less.
 const FADING: f64 = 0.966;
 /// Other edges whose normals have a cosine below this (5 degrees) are bends: facets larger than a cell keep their edges.
-const FAINT: f64 = 0.9962;
+const BEND_COSINE: f64 = 0.9962;
 /// Normals of two hits may differ by less than those beside the faint edge between them (cosine of 4 degrees).
 const FAINT_HITS: f64 = 0.9976;
 /// A hit beside a faint edge has the normal of its side within this (cosine of 18 degrees).
@@ -58,11 +58,11 @@ const FAINT_AGREE: f64 = 0.95;
 /// turn within a cell.
 const AGREE: f64 = 0.75;
 /// Around a face that several lines pass, they are told apart within this distance, in cells.
-const CROWD: f64 = 2.0;
+const CROWD_CELLS: f64 = 2.0;
 /// Cuts of one edge that are farther apart than this, in cells, have another place between them.
 const HALF: f64 = 0.5;
 /// The lines are followed within this distance of the guess, in cells.
-const REACH: f64 = 0.9;
+const LINE_REACH_CELLS: f64 = 0.9;
 
 impl MeshCreases {
     /// Collects the sharp edges of `mesh`: those between faces whose normals have a cosine below `sharp`, and where a
@@ -84,7 +84,7 @@ impl MeshCreases {
             }
             let n = normals(h);
             let cosine = n[0].dot(n[1]);
-            if cosine >= sharp.max(FAINT) || n.contains(&DVec3::ZERO) {
+            if cosine >= sharp.max(BEND_COSINE) || n.contains(&DVec3::ZERO) {
                 continue;
             }
             if cosine < sharp {
@@ -152,7 +152,7 @@ fn crowded(mesh: &TriMesh, lattice: &Lattice, cuts: &[Vec<Cut>; 3]) -> Vec<(DVec
     let tree = KdTree::new(&shared);
     let mut found = Vec::new();
     let mut near = |p: DVec3| {
-        tree.nearest_within(p, 1, CROWD * size, &mut found);
+        tree.nearest_within(p, 1, CROWD_CELLS * size, &mut found);
         !found.is_empty()
     };
     let mut all: Vec<&Cut> = cuts.iter().flatten().filter(|c| c.tagged && near(c.p)).collect();
@@ -268,7 +268,7 @@ impl Creases for MeshCreases {
                     continue;
                 }
                 let d = c.p.distance(guess);
-                if d < REACH * size && best.is_none_or(|b| d < b.0) {
+                if d < LINE_REACH_CELLS * size && best.is_none_or(|b| d < b.0) {
                     best = Some((d, c.p));
                 }
             }
@@ -294,7 +294,7 @@ impl Creases for MeshCreases {
         }
         let near = if through.len() == 2 { (through[0] + through[1]) / 2.0 } else { guess };
         let hit = self.lines.as_ref()?.closest(near);
-        (hit.distance < REACH * size).then_some(hit.position)
+        (hit.distance < LINE_REACH_CELLS * size).then_some(hit.position)
     }
 
     fn nearest(&self, p: DVec3, reach: f64, _hits: &[(DVec3, DVec3)]) -> Option<DVec3> {
@@ -336,7 +336,7 @@ impl Creases for MeshCreases {
         let knot = here.min_by(|p, q| p.distance_squared(guess).total_cmp(&q.distance_squared(guess)));
         let near = || {
             let hit = self.bends.as_ref()?.closest(guess);
-            (hit.distance < REACH * (high - low).max_element()).then_some(hit.position)
+            (hit.distance < LINE_REACH_CELLS * (high - low).max_element()).then_some(hit.position)
         };
         knot.or_else(near)
     }

@@ -14,9 +14,9 @@ use glam::DVec3;
 
 /// Slopes and differences are those of a kink if they change by more than this within a step, as a fraction of the
 /// gradient: surfaces whose radius is above ten steps bend by less.
-const BENT: f64 = 0.1;
+const KINK_CHANGE: f64 = 0.1;
 /// A side goes on straight if its own second difference is below this fraction of that at the kink.
-const STRAIGHT: f64 = 0.5;
+const STRAIGHT_SHARE: f64 = 0.5;
 
 /// True if numbers beside an edge of the lattice bend as they do at a kink.
 /// * `below`, `above` - the numbers a step beside both ends of the edge
@@ -25,7 +25,7 @@ const STRAIGHT: f64 = 0.5;
 pub fn is_bent(below: [f64; 2], above: [f64; 2], t: f64, rise: f64) -> bool {
     let (low, high) = (below[0] + above[0], below[1] + above[1]);
     let twist = (above[1] - below[1]) - (above[0] - below[0]);
-    (low + (high - low) * t).abs().max(twist.abs() / 2.0) > BENT * rise
+    (low + (high - low) * t).abs().max(twist.abs() / 2.0) > KINK_CHANGE * rise
 }
 
 /// The numbers around an edge of the lattice, at least two steps on all sides.
@@ -84,7 +84,7 @@ impl<F: Fn(usize) -> f64> Around<'_, F> {
         let linear = (f0 / (f0 - f1), slope, None);
         // Second differences at both ends, and beyond them.
         let (at, beyond) = ([slope - left, right - slope], [left - (low[1] - low[0]), (high[4] - high[3]) - right]);
-        let straight = |k: usize| beyond[k].abs() < STRAIGHT * at[k].abs();
+        let straight = |k: usize| beyond[k].abs() < STRAIGHT_SHARE * at[k].abs();
         if !(at[0] * at[1] > 0.0 && straight(0) && straight(1)) {
             return linear;
         }
@@ -113,7 +113,7 @@ fn slopes(f: [f64; 5]) -> [Slope; 3] {
     // Beside a step the other side bends back.
     let back = |other: f64| (-other * here.signum()).max(0.0);
     [
-        Slope { slope: (d[1] + d[2]) / 2.0, off: STRAIGHT * here.abs() },
+        Slope { slope: (d[1] + d[2]) / 2.0, off: STRAIGHT_SHARE * here.abs() },
         Slope { slope: d[1], off: below.abs() + back(above) },
         Slope { slope: d[2], off: above.abs() + back(below) },
     ]

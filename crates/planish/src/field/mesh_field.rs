@@ -265,16 +265,16 @@ fn starts(crossings: &[Crossing], lines: usize) -> Vec<usize> {
 }
 
 /// Triangles a task takes at once.
-const CHUNK: usize = 1 << 12;
+const TRIANGLES_PER_CHUNK: usize = 1 << 12;
 
 /// All crossings of each axis, sorted along its lines.
 fn rasterise(mesh: &TriMesh, lattice: &Lattice, observer: &dyn Observer) -> Result<[Vec<Crossing>; 3], Cancelled> {
-    let parts: Result<Vec<[Vec<Crossing>; 3]>, Cancelled> = (0..mesh.triangles.len().div_ceil(CHUNK))
+    let parts: Result<Vec<[Vec<Crossing>; 3]>, Cancelled> = (0..mesh.triangles.len().div_ceil(TRIANGLES_PER_CHUNK))
         .into_par_iter()
         .map(|c| {
             observer.check()?;
             let mut out: [Vec<Crossing>; 3] = Default::default();
-            for t in c * CHUNK..((c + 1) * CHUNK).min(mesh.triangles.len()) {
+            for t in c * TRIANGLES_PER_CHUNK..((c + 1) * TRIANGLES_PER_CHUNK).min(mesh.triangles.len()) {
                 rasterise_one(mesh.corners(t), t as u32, lattice, &mut out);
             }
             Ok(out)

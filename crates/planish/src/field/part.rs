@@ -53,14 +53,14 @@ impl MeshBody {
         let sign = if self.winding.number(p) > 0.5 { -1.0 } else { 1.0 };
         let normal = self.mesh.normal(hit.place.face as usize);
         // On the surface the difference has no direction; beside it the normal says the same but on edges.
-        let near = hit.distance <= NEAR * self.bounds.diagonal();
+        let near = hit.distance <= ON_SURFACE * self.bounds.diagonal();
         let out = if near { normal } else { (p - hit.position) / hit.distance * sign };
         (hit.distance * sign, out)
     }
 }
 
 /// Nearer than this fraction of the diagonal a point counts as on the surface.
-const NEAR: f64 = 1e-9;
+const ON_SURFACE: f64 = 1e-9;
 
 impl Part {
     /// The part scaled, then turned, then moved.

@@ -13,7 +13,7 @@ const STEEP: f64 = 1.2;
 /// From this share of the support on a point is beside the data: cells stand less than .38 supports apart.
 const BESIDE: f64 = 0.42;
 /// A winding number closer to one half than this says nothing beside cells, and twice as far off all.
-const UNSURE: f64 = 0.15;
+const UNSURE_WINDING: f64 = 0.15;
 /// From this share on the winding number decides alone.
 const BEYOND: f64 = 0.84;
 
@@ -81,7 +81,7 @@ impl SampleField {
         if beyond * here.value > 0.0 {
             return None;
         }
-        let share = share * ((beyond.abs() / size - UNSURE) / UNSURE).clamp(0.0, 1.0);
+        let share = share * ((beyond.abs() / size - UNSURE_WINDING) / UNSURE_WINDING).clamp(0.0, 1.0);
         Some((winding, share, beyond))
     }
 

@@ -108,9 +108,9 @@ struct Node {
 }
 
 /// Moves in a leaf at most.
-const LEAF: usize = 4;
+const MOVES_PER_LEAF: usize = 4;
 /// Steps of the search along a sloped move: each leaves 62 % of the room.
-const STEPS: usize = 44;
+const SECTION_STEPS: usize = 44;
 
 impl Milling {
     /// Stock and moves. A move names its tool by its place in `tools`.
@@ -129,7 +129,7 @@ impl Milling {
         let bounds = Aabb::of(moves.iter().flat_map(|m| [&m.from, &m.to]));
         let radius = moves.iter().map(|m| self.tools[m.tool].radius()).fold(0.0, f64::max);
         self.nodes.push(Node { bounds, radius, first: first as u32, count: moves.len() as u32, second: 0 });
-        if moves.len() <= LEAF {
+        if moves.len() <= MOVES_PER_LEAF {
             return;
         }
         let size = bounds.size();
@@ -181,7 +181,7 @@ impl Milling {
         let (mut a, mut b) = (0.0, 1.0);
         let (mut x, mut y) = (1.0 - golden, golden);
         let (mut fx, mut fy) = (at(x), at(y));
-        for _ in 0..STEPS {
+        for _ in 0..SECTION_STEPS {
             if fx.0 <= fy.0 {
                 (b, y, fy) = (y, x, fx);
                 x = b - golden * (b - a);

@@ -36,13 +36,13 @@ struct Node {
 }
 
 /// A group counts as one dipole from this many radii on: the first order is then right to about 5e-4.
-const FAR: f64 = 3.5;
+const FAR_RADII: f64 = 3.5;
 /// Triangles in a leaf at most.
-const LEAF: usize = 8;
+const TRIANGLES_PER_LEAF: usize = 8;
 /// What the dipoles may be wrong together.
 const SLACK: f64 = 0.02;
 /// Step of the differences for the gradient, as a fraction of the diagonal.
-const STEP: f64 = 1e-5;
+const GRADIENT_STEP: f64 = 1e-5;
 
 impl Winding {
     /// Builds the tree.
@@ -65,7 +65,7 @@ impl Winding {
             let node = &self.nodes[at];
             let away = node.center - p;
             let d2 = away.length_squared();
-            if d2 > (FAR * node.radius).powi(2) {
+            if d2 > (FAR_RADII * node.radius).powi(2) {
                 sum += node.vector.dot(away) / (d2 * d2.sqrt());
             } else if node.second == 0 {
                 let (a, b) = (node.first as usize, (node.first + node.count) as usize);
@@ -121,7 +121,7 @@ impl Field for Winding {
     }
 
     fn gradient(&self, p: DVec3) -> DVec3 {
-        let e = STEP * self.bounds.diagonal();
+        let e = GRADIENT_STEP * self.bounds.diagonal();
         let along = |d: DVec3| self.value(p + d * e) - self.value(p - d * e);
         DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)).normalize_or_zero()
     }
@@ -146,7 +146,7 @@ fn build(corners: &mut [[DVec3; 3]], first: usize, nodes: &mut Vec<Node>) {
     let radius = corners.iter().flatten().map(|p| p.distance(center)).fold(0.0, f64::max);
     let count = corners.len() as u32;
     nodes.push(Node { bounds, center, radius, vector, area, first: first as u32, count, second: 0 });
-    if corners.len() <= LEAF {
+    if corners.len() <= TRIANGLES_PER_LEAF {
         return;
     }
     let size = bounds.size();

@@ -60,7 +60,7 @@ pub struct RayHit {
 }
 
 /// Children of a node.
-const WIDE: usize = 4;
+const CHILDREN: usize = 4;
 
 /// The boxes of up to four children, one per lane; lanes without a child hold an inverted box.
 #[derive(Clone, Copy)]
@@ -68,14 +68,14 @@ struct Node {
     min: [Vec4; 3],
     max: [Vec4; 3],
     /// Inner child: its node. Leaf: first triangle.
-    link: [u32; WIDE],
+    link: [u32; CHILDREN],
     /// Triangles of a leaf; 0 for an inner child.
-    count: [u32; WIDE],
+    count: [u32; CHILDREN],
 }
 
 impl Node {
     const EMPTY: Node =
-        Node { min: [Vec4::INFINITY; 3], max: [Vec4::NEG_INFINITY; 3], link: [0; WIDE], count: [0; WIDE] };
+        Node { min: [Vec4::INFINITY; 3], max: [Vec4::NEG_INFINITY; 3], link: [0; CHILDREN], count: [0; CHILDREN] };
 
     fn low(&self, k: usize) -> DVec3 {
         DVec3::new(self.min[0][k] as f64, self.min[1][k] as f64, self.min[2][k] as f64)
@@ -120,13 +120,13 @@ const PAD: f32 = 4.0 / (1 << 24) as f32;
 /// Bins per split: more do not make better trees.
 const BINS: usize = 16;
 /// Triangles in a leaf at most: a box is far cheaper to rule out than a triangle.
-const LEAF: usize = 2;
+const TRIANGLES_PER_LEAF: usize = 2;
 /// Below this many triangles a subtree is built by one thread.
-const ALONE: usize = 1 << 13;
+const SERIAL_TRIANGLES: usize = 1 << 13;
 /// From this depth on nodes are split in halves by count: 16 levels more at most, for 2^32 triangles.
 const HALVE: usize = 24;
 /// Places on the stack of a query: three brothers a level stay behind.
-const STACK: usize = (HALVE + 17) * (WIDE - 1) + 1;
+const STACK: usize = (HALVE + 17) * (CHILDREN - 1) + 1;
 
 impl Bvh {
     /// Builds the tree.
@@ -164,7 +164,7 @@ impl Bvh {
     /// The place of the surface closest to `point`.
     pub fn closest(&self, point: DVec3) -> SurfaceHit {
         let own = self.unit.tree_from_world(point);
-        let (i, bary) = if own.abs().max_element() < NEAR {
+        let (i, bary) = if own.abs().max_element() < NEAR_DIAGONALS {
             let interval = Interval::of(own);
             self.nearest(point, |node| interval.squares(node).to_array().map(f64::from))
         } else {
@@ -180,7 +180,7 @@ impl Bvh {
 
     /// Place in the leaves and weights of the closest place; `squares` are lower bounds of the squared distances of
     /// a node's children in the units of the boxes.
-    fn nearest(&self, point: DVec3, squares: impl Fn(&Node) -> [f64; WIDE]) -> (usize, [f64; 3]) {
+    fn nearest(&self, point: DVec3, squares: impl Fn(&Node) -> [f64; CHILDREN]) -> (usize, [f64; 3]) {
         let mut best = f64::INFINITY;
         // The same in the units of the boxes, a little more than that; no child is infinitely far, but a lane without.
         let mut reach = f64::MAX;
@@ -246,7 +246,7 @@ impl Bvh {
             }
             let node = &self.nodes[link as usize];
             let base = top;
-            for k in 0..WIDE {
+            for k in 0..CHILDREN {
                 // A lane without a child: between its planes lies everything.
                 if node.min[0][k] > node.max[0][k] {
                     continue;
@@ -272,7 +272,7 @@ fn put(stack: &mut [(u32, u32, f64); STACK], base: usize, top: &mut usize, child
 }
 
 /// Points within so many half diagonals are told apart by `f32`; from afar `f64` is needed to.
-const NEAR: f64 = 8.0;
+const NEAR_DIAGONALS: f64 = 8.0;
 
 /// A query point in the units of the boxes, as the interval that surely holds it.
 struct Interval {
@@ -299,7 +299,7 @@ impl Interval {
 /// The nodes of a subtree, the root first; `base` is the place of its first item among all.
 fn build(items: &mut [Item], base: usize, depth: usize, observer: &dyn Observer) -> Result<Vec<Node>, Cancelled> {
     observer.check()?;
-    if items.len() <= ALONE {
+    if items.len() <= SERIAL_TRIANGLES {
         let mut nodes = Vec::with_capacity(items.len() / 2 + 1);
         grow(items, base, depth, &mut nodes);
         return Ok(nodes);
@@ -323,7 +323,7 @@ fn build(items: &mut [Item], base: usize, depth: usize, observer: &dyn Observer)
         let at = nodes.len() as u32;
         nodes[0].link[k] = at;
         nodes.extend(subtree.into_iter().map(|mut node| {
-            for k in (0..WIDE).filter(|&k| node.count[k] == 0) {
+            for k in (0..CHILDREN).filter(|&k| node.count[k] == 0) {
                 node.link[k] += at;
             }
             node
@@ -349,15 +349,15 @@ fn grow(items: &mut [Item], base: usize, depth: usize, nodes: &mut Vec<Node>) {
 }
 
 /// Parts the items among the children of `node`, whose boxes and leaves it fills in; returns how many each has.
-fn divide(items: &mut [Item], depth: usize, node: &mut Node, base: usize) -> [usize; WIDE] {
-    let mut bounds = [(0, bounds_of(items)); WIDE];
+fn divide(items: &mut [Item], depth: usize, node: &mut Node, base: usize) -> [usize; CHILDREN] {
+    let mut bounds = [(0, bounds_of(items)); CHILDREN];
     bounds[0].0 = items.len();
     let mut parts = 1;
-    while parts < WIDE {
+    while parts < CHILDREN {
         // The child that rays and spheres meet most often; those that fit a leaf stay.
-        let weight = |b: &(usize, (Vec3A, Vec3A))| if b.0 > LEAF { half_area(b.1) } else { -1.0 };
+        let weight = |b: &(usize, (Vec3A, Vec3A))| if b.0 > TRIANGLES_PER_LEAF { half_area(b.1) } else { -1.0 };
         let pick = (0..parts).fold(0, |m, k| if weight(&bounds[k]) > weight(&bounds[m]) { k } else { m });
-        if bounds[pick].0 <= LEAF {
+        if bounds[pick].0 <= TRIANGLES_PER_LEAF {
             break;
         }
         let first: usize = bounds[..pick].iter().map(|b| b.0).sum();
@@ -369,14 +369,14 @@ fn divide(items: &mut [Item], depth: usize, node: &mut Node, base: usize) -> [us
         bounds[pick..pick + 2].copy_from_slice(&halves);
         parts += 1;
     }
-    let mut sizes = [0; WIDE];
+    let mut sizes = [0; CHILDREN];
     let mut first = base;
     for (k, &(size, (min, max))) in bounds[..parts].iter().enumerate() {
         for axis in 0..3 {
             node.min[axis][k] = min[axis];
             node.max[axis][k] = max[axis];
         }
-        if size <= LEAF {
+        if size <= TRIANGLES_PER_LEAF {
             node.link[k] = first as u32;
             node.count[k] = size as u32;
         }

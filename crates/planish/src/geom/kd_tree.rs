@@ -12,9 +12,9 @@ use rayon::prelude::*;
 use std::cmp::Ordering;
 
 /// Points per leaf: a leaf is scanned in about the time of one step down the tree.
-const LEAF: usize = 16;
+const POINTS_PER_LEAF: usize = 16;
 /// Subtrees above this size are built by another thread.
-const PARALLEL: usize = 1 << 13;
+const PARALLEL_POINTS: usize = 1 << 13;
 
 /// A k-d tree.
 #[derive(Clone, Debug, Default)]
@@ -148,13 +148,13 @@ impl KdTree {
 
 /// Number of nodes of a tree over `n > 0` points.
 fn node_count(n: usize) -> usize {
-    if n <= LEAF { 1 } else { 1 + node_count(n / 2) + node_count(n - n / 2) }
+    if n <= POINTS_PER_LEAF { 1 } else { 1 + node_count(n / 2) + node_count(n - n / 2) }
 }
 
 fn build(items: &mut [(DVec3, u32)], nodes: &mut [Node], start: u32, at: u32) {
     let bounds = Aabb::of(items.iter().map(|i| &i.0));
     nodes[0] = Node { low: bounds.min, high: bounds.max, start, count: items.len() as u32, right: 0 };
-    if items.len() <= LEAF {
+    if items.len() <= POINTS_PER_LEAF {
         items.sort_unstable_by(|a, b| by_axis(a, b, 0));
         return;
     }
@@ -168,7 +168,7 @@ fn build(items: &mut [(DVec3, u32)], nodes: &mut [Node], start: u32, at: u32) {
     let (na, nb) = nodes[1..].split_at_mut(left_nodes);
     let mut left = || build(a, na, start, at + 1);
     let mut right = || build(b, nb, start + mid as u32, at + 1 + left_nodes as u32);
-    if mid > PARALLEL {
+    if mid > PARALLEL_POINTS {
         rayon::join(left, right);
     } else {
         left();

@@ -23,14 +23,14 @@ use crate::observe::Observer;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-/// Rounds of Gauss-Newton and steps of conjugate gradients in each, on every [`COARSE`]-th line and then on all: the
+/// Rounds of Gauss-Newton and steps of conjugate gradients in each, on every [`COARSE_LINES`]-th line and then on all: the
 /// net as a whole comes to rest on the few lines, and what is left is a little from node to node.
 const COARSE_EFFORT: (usize, usize) = (4, 24);
 const FINE_EFFORT: (usize, usize) = (1, 8);
 /// One line of the coarse net per this many; nets of no more points across than twice its square have none.
-const COARSE: usize = 4;
+const COARSE_LINES: usize = 4;
 /// A side that moves by more than this share of the cells across it is no small edit: the grid is made from nothing.
-const FARTHEST: f64 = 0.5;
+const FARTHEST_SIDE: f64 = 0.5;
 /// Steps of Newton's method, each this many cells at most, until a step is shorter than the last number.
 const NEWTON_STEPS: usize = 60;
 const NEWTON_REACH: f64 = 4.0;
@@ -104,10 +104,10 @@ fn follow_patch(
 /// The net with the moves that bring its coarse net to rest, blended between the coarse nodes.
 fn settled_coarsely<'a>(net: Net<'a>, params: &GridParams, observer: &dyn Observer) -> Result<Net<'a>, Fault> {
     let (cols, rows) = (net.cols, net.rows);
-    if cols.min(rows) <= 2 * COARSE * COARSE {
+    if cols.min(rows) <= 2 * COARSE_LINES * COARSE_LINES {
         return Ok(net);
     }
-    let fewer = |n: usize| (n - 1).div_ceil(COARSE) + 1;
+    let fewer = |n: usize| (n - 1).div_ceil(COARSE_LINES) + 1;
     let before = net.resampled(fewer(cols), fewer(rows));
     let after = settle(before.clone(), COARSE_EFFORT, params, observer)?;
     let moves: Vec<DVec2> = before.uv.iter().zip(&after.uv).map(|(a, b)| *b - *a).collect();
@@ -129,7 +129,7 @@ fn settled_coarsely<'a>(net: Net<'a>, params: &GridParams, observer: &dyn Observ
 struct Map<'a>(&'a Grid);
 
 /// Cells over which the direction at a side is taken.
-const BEYOND: usize = 8;
+const DIRECTION_CELLS: usize = 8;
 
 impl Map<'_> {
     /// True for indices on the grid.
@@ -147,7 +147,7 @@ impl Map<'_> {
             2 => (DVec2::Y, -(*cols as isize), *rows),
             _ => (-DVec2::X, 1, *cols),
         };
-        let count = BEYOND.min(across - 1);
+        let count = DIRECTION_CELLS.min(across - 1);
         let place = |n: usize| points[(node as isize + n as isize * back) as usize];
         (out, (0..count).map(|n| place(n).distance(place(n + 1))).sum::<f64>() / count as f64)
     }
@@ -159,7 +159,7 @@ impl Map<'_> {
         let (mut p, mut along, mut across) = self.inside(on);
         let over = x - on;
         let toward = |end: f64, over: f64, n: usize| {
-            if over < 0.0 { (BEYOND.min(n - 1)) as f64 } else { end - BEYOND.min(n - 1) as f64 }
+            if over < 0.0 { (DIRECTION_CELLS.min(n - 1)) as f64 } else { end - DIRECTION_CELLS.min(n - 1) as f64 }
         };
         if over.x != 0.0 {
             let back = DVec2::new(toward(last.x, over.x, self.0.cols), on.y);
@@ -292,7 +292,9 @@ impl<'a> Carry<'a> {
                     shift[node] += out * (self.way_out(node, p, &mut hint) / cell - last.dot(out));
                 }
                 let far = shift[node].abs() / DVec2::new((cols - 1) as f64, (rows - 1) as f64);
-                if !(far.max_element() <= FARTHEST) || far.dot(out.abs()) > FARTHEST_OUT && shift[node].dot(out) > 0.0 {
+                if !(far.max_element() <= FARTHEST_SIDE)
+                    || far.dot(out.abs()) > FARTHEST_OUT && shift[node].dot(out) > 0.0
+                {
                     return None;
                 }
             }

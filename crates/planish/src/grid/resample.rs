@@ -13,7 +13,7 @@ use crate::observe::{Observer, Part};
 use rayon::prelude::*;
 
 /// Rounds of refinement; each may double a side.
-const ROUNDS: usize = 3;
+const REFINEMENT_ROUNDS: usize = 3;
 
 /// Least and greatest factor by which a side gets more points in a round. A grid misses a smooth bump by the square
 /// of its spacing, so the root of what is too much tells how much finer it must be.
@@ -21,10 +21,10 @@ const FACTOR: [f64; 2] = [1.25, 2.0];
 
 /// A grid with folds is refined as if it missed this many times what is allowed: cells turn over where relief is
 /// rougher than they are wide.
-const FOLDED: f64 = 2.0;
+const FOLDED_MISS: f64 = 2.0;
 
 /// Refinement may multiply the number of points by this ...
-const GROWTH: f64 = 3.0;
+const MOST_GROWTH: f64 = 3.0;
 /// ... and where it would do more, a miss must be this much greater to count, as often as needed.
 const LESS: f64 = 1.4;
 
@@ -32,7 +32,7 @@ const LESS: f64 = 1.4;
 /// that they leave with more folds: none reach down a needle, and cells finer than crumpled relief turn over with it.
 const HELPED: f64 = 0.7;
 /// Patches are tried alone if that takes at most this part of the points that refinement would add.
-const TRIAL: f64 = 0.5;
+const TRIAL_SHARE: f64 = 0.5;
 
 /// Both directions are refined if the greater bend is less than this part from the other.
 const EVEN_BEND: f64 = 0.7;
@@ -41,8 +41,8 @@ const EVEN_BEND: f64 = 0.7;
 const FIRST_SHARE: f64 = 0.6;
 
 /// Resamples every patch of `network`, with sides as [`choose_sizes`] gives them and more where a grid misses its
-/// patch by more than `params.miss` of the diagonal of `input` or is folded: at most [`ROUNDS`] times, each up to
-/// [`FACTOR`] along a side, and up to [`GROWTH`] times the points of the start, `params.max_side` and `params.max_points`.
+/// patch by more than `params.miss` of the diagonal of `input` or is folded: at most [`REFINEMENT_ROUNDS`] times, each up to
+/// [`FACTOR`] along a side, and up to [`MOST_GROWTH`] times the points of the start, `params.max_side` and `params.max_points`.
 ///
 /// Where a grid still misses more after a few rounds, it is what is reached: [`super::measure`] tells.
 /// * `drawn` - feature curves, which become iso-curves of the grids of their patches; cells that sections give go over
@@ -91,16 +91,16 @@ fn refined(
     let allowed = params.miss * input.bounds().diagonal();
     let chords = network.chords();
     let [_, most] = bounds(params);
-    let budget = ((GROWTH * total(&sizes) as f64) as usize).min(params.max_points);
+    let budget = ((MOST_GROWTH * total(&sizes) as f64) as usize).min(params.max_points);
     let mut suspects = all;
     let mut past_help = vec![false; patches.len()];
     // What was wrong with the patches that asked for the last round.
     let mut before: Vec<Option<Fault>> = vec![None; patches.len()];
-    for round in 0..ROUNDS {
+    for round in 0..REFINEMENT_ROUNDS {
         observer.check().map_err(GridError::from)?;
         let fault = |p: usize, grid: &Grid| {
             let folds = folds(grid, &patches[p]);
-            let floor = if folds > 0 { FOLDED * allowed } else { 0.0 };
+            let floor = if folds > 0 { FOLDED_MISS * allowed } else { 0.0 };
             Fault { folds, miss: miss(grid, &patches[p]).0.max(floor) }
         };
         suspects.retain(|&p| !past_help[p]);
@@ -125,14 +125,14 @@ fn refined(
             }
         };
         let mut wanted = wish(&misses)?;
-        let share = (1.0 - FIRST_SHARE) / ROUNDS as f64;
+        let share = (1.0 - FIRST_SHARE) / REFINEMENT_ROUNDS as f64;
         let start = FIRST_SHARE + share * round as f64;
         let needy: Vec<usize> = (0..suspects.len()).filter(|&k| misses[k] > allowed).collect();
         let tried: Vec<usize> = needy.iter().map(|&k| suspects[k]).collect();
         needy.iter().for_each(|&k| before[suspects[k]] = Some(faults[k]));
         let added = total(&wanted).saturating_sub(total(&sizes));
         let trial: usize = tried.iter().map(|&p| wanted[p].0 * wanted[p].1).sum();
-        if trial as f64 <= TRIAL * added as f64 {
+        if trial as f64 <= TRIAL_SHARE * added as f64 {
             for (&k, grid) in needy.iter().zip(make(&tried, &wanted, &Part::new(observer, start, 0.0))?) {
                 past_help[suspects[k]] = !fault(suspects[k], &grid).helped(faults[k]);
             }

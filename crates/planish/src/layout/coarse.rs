@@ -16,23 +16,23 @@ use glam::DVec3;
 
 /// A vertex may go to a neighbour that is nearer than this, in sides of a patch, and leave edges as long as that: a cell
 /// keeps some hundred faces.
-const NEAR: f64 = 0.09;
+const COLLAPSE_REACH: f64 = 0.09;
 const LONGEST: f64 = 0.14;
 
 /// Cosine of the greatest turn of a face: limbs and ridges stay.
-const TURN: f64 = 0.8;
+const FACE_TURN_COSINE: f64 = 0.8;
 
 /// Greatest number of neighbours.
 const VALENCE: usize = 12;
 
 /// Least shape of a face (1 for an equilateral triangle), unless it was worse before.
-const SHAPE: f64 = 0.15;
+const LEAST_FACE_SHAPE: f64 = 0.15;
 
 /// Passes over all vertices; each takes out at most one in four.
-const PASSES: usize = 24;
+const COARSENING_PASSES: usize = 24;
 
 /// A pass that takes out less than this part of the vertices is the last one.
-const WORTH: f64 = 0.01;
+const WORTHWHILE_PASS: f64 = 0.01;
 
 /// The coarse mesh must be smaller than this part of the fine one to be worth it.
 const SMALLER: f64 = 0.6;
@@ -78,14 +78,14 @@ pub(super) fn coarsen(
         around: vec![Vec::new(); mesh.points.len()],
         stays: fixed(mesh, adjacency, complex),
         longest: LONGEST * side,
-        near: NEAR * side,
+        near: COLLAPSE_REACH * side,
     };
     for (f, t) in mesh.triangles.iter().enumerate() {
         t.iter().for_each(|&v| melt.around[v as usize].push(f as u32));
     }
     let mut stars = Vec::new();
     let mut left: Vec<u32> = (0..mesh.points.len() as u32).filter(|&v| !melt.stays[v as usize]).collect();
-    for _ in 0..PASSES {
+    for _ in 0..COARSENING_PASSES {
         let mut quiet = vec![true; mesh.points.len()];
         let before = left.len();
         left.retain(|&v| {
@@ -99,7 +99,7 @@ pub(super) fn coarsen(
             stars.extend(star);
             keep
         });
-        if ((before - left.len()) as f64) < WORTH * before as f64 || observer.cancelled() {
+        if ((before - left.len()) as f64) < WORTHWHILE_PASS * before as f64 || observer.cancelled() {
             break;
         }
     }
@@ -180,9 +180,9 @@ impl Melt<'_> {
                 let face = (at(i) - at(apex)).cross(at(j) - at(apex));
                 least = least.min(shape([at(apex), at(i), at(j)]));
                 orient2d(flat[apex], flat[i], flat[j]) > 0.0
-                    && face.dot(mean) > TURN * face.length()
+                    && face.dot(mean) > FACE_TURN_COSINE * face.length()
                     && normal[i].dot(face) > 0.0
-                    && least > SHAPE.min(old)
+                    && least > LEAST_FACE_SHAPE.min(old)
                     && best.is_none_or(|b| least > b.0)
             });
             let spans = |i: usize| {

@@ -19,16 +19,16 @@ use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 /// Radii of the disks that are tried, in parts of the shortest arc at the node: disks of neighbours stay apart.
-const RADII: [f64; 3] = [0.3, 0.2, 0.12];
+const FAN_RADII: [f64; 3] = [0.3, 0.2, 0.12];
 
 /// Fewest faces of a disk: with less than three rings of them there is no smooth way to turn.
-const FEWEST: usize = 60;
+const FEWEST_FAN_FACES: usize = 60;
 
 /// How far from where it leaves the disk an arc may leave its node, radians.
 const GREATEST_TURN: f64 = 0.9;
 
 /// Parts of the radius at which the way of an arc is given.
-const STOPS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
+const FAN_STOPS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 
 /// New chains of the half-arcs at a node, from the node.
 type Fan = Vec<(u32, Vec<Place>)>;
@@ -65,7 +65,7 @@ fn fan(bench: &Bench, star: &[u32]) -> Option<Fan> {
         |chain: &[u32]| -> f64 { polyline::length(chain.iter().map(|&v| embedding.cut.mesh.points[v as usize])) };
     let chains: Vec<Vec<u32>> = star.iter().map(|&h| embedding.chain(h)).collect();
     let shortest = chains.iter().map(|c| length(c)).fold(f64::INFINITY, f64::min);
-    RADII.into_iter().find_map(|part| within(bench, star, &chains, part * shortest))
+    FAN_RADII.into_iter().find_map(|part| within(bench, star, &chains, part * shortest))
 }
 
 /// The same within a disk of `radius`.
@@ -105,7 +105,7 @@ fn within(bench: &Bench, star: &[u32], chains: &[Vec<u32>], radius: f64) -> Opti
             middle + DVec2::from_angle(turns[k] * (1.0 - smooth)).rotate(rays[k]) * part
         };
         let mut chain =
-            embedding.polyline((bench.mesh, bench.adjacency), (&disk, &uv), [center, ends[k]], &STOPS.map(way))?;
+            embedding.polyline((bench.mesh, bench.adjacency), (&disk, &uv), [center, ends[k]], &FAN_STOPS.map(way))?;
         let rest = &chains[k][exits[k] + 1..];
         chain.extend(rest.iter().map(|&v| embedding.cut.origin[v as usize]));
         if chain.iter().any(|p| matches!(p, Place::Face(_))) {
@@ -137,7 +137,7 @@ fn disc(embedding: &Embedding, star: &[u32], node: u32, radius: f64) -> Option<D
     let mut faces: Vec<u32> = near.keys().flat_map(|&v| adjacency.fan(v).map(|h| h / 3)).filter(whole).collect();
     faces.sort_unstable();
     faces.dedup();
-    if faces.len() < FEWEST {
+    if faces.len() < FEWEST_FAN_FACES {
         return None;
     }
     let inside = |h: u32| {

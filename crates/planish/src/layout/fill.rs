@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 const COUNT_COST: f64 = 2.0;
 
 /// Steps of a node to a better place, as parts of the way along its arcs.
-const STEPS: [f64; 2] = [0.35, 0.12];
+const NODE_STEPS: [f64; 2] = [0.35, 0.12];
 
 /// What the layout is measured by.
 pub(super) struct Scale<'a> {
@@ -92,7 +92,7 @@ impl<'a> Scale<'a> {
         if !change.spokes.is_empty() && change.pin.is_none() {
             let mut best = *fill.vertex.get(n)?;
             let free = self.bench.embedding.free_vertices(&fill.union.disk);
-            for step in STEPS {
+            for step in NODE_STEPS {
                 loop {
                     let from = fill.union.uv[best as usize];
                     let mut found = best;

@@ -26,7 +26,7 @@ const LEAST_SETTLING: f64 = 0.02;
 const CHANGE_ROUNDS: usize = 20;
 
 /// Rounds of drawing anew around changes before the next ones.
-const SETTLING: usize = 3;
+const SETTLING_AROUND_CHANGES: usize = 3;
 
 /// Parts every cell into quads. False if some cell could not be parted.
 pub(super) fn quads(bench: &mut Bench) -> bool {
@@ -78,7 +78,7 @@ pub(super) fn improve(bench: &mut Bench, patches: usize, observer: &dyn Observer
         let mut touched = nodes_of(&bench.complex, &chosen);
         bench.apply(&chosen);
         touched.resize(bench.complex.nodes.len(), true);
-        fresh = settle_some(bench, patches, SETTLING, touched.clone(), &mut drawn, observer)?;
+        fresh = settle_some(bench, patches, SETTLING_AROUND_CHANGES, touched.clone(), &mut drawn, observer)?;
         fresh.iter_mut().zip(touched).for_each(|(fresh, touched)| *fresh |= touched);
     }
     Ok(())

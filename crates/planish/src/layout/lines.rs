@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How far the mean normals reach, in mean edge lengths of the mesh.
-const REACH: f64 = 4.0;
+const NORMAL_REACH_EDGES: f64 = 4.0;
 
 /// The angle between the mean normals, against the angle asked for between the faces: the surfaces beside an
 /// edge may bend away from it.
@@ -44,7 +44,7 @@ pub(super) fn feature_lines(
     }
     let sharp = sharp_edges(mesh, adjacency, params.sharp_angle_deg);
     let edges: f64 = (0..sharp.len() as u32).map(|h| mesh.edge_length(h)).sum();
-    let reach = REACH * edges / sharp.len().max(1) as f64;
+    let reach = NORMAL_REACH_EDGES * edges / sharp.len().max(1) as f64;
     let least = (WIDE_ANGLE * params.sharp_angle_deg).to_radians().cos();
     let mut kept: Vec<bool> = (0..sharp.len() as u32)
         .into_par_iter()

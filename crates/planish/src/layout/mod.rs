@@ -42,7 +42,7 @@ use std::collections::HashSet;
 const EDGE_TO_SIDE: f64 = 0.12;
 
 /// Attempts with edges of half the length each, where the working mesh proves too coarse.
-const ATTEMPTS: usize = 5;
+const MESH_ATTEMPTS: usize = 5;
 
 /// Attempts at the number of patches asked for: the features decide how many patches a partition gives.
 const COUNT_ATTEMPTS: usize = 3;
@@ -58,7 +58,7 @@ const CROWDED: f64 = 0.05;
 const FORCED: f64 = 0.85;
 
 /// Rounds of settling for each round of smoothing asked for: a round redraws disjoint unions only.
-const SETTLING: usize = 8;
+const SETTLING_PER_SMOOTHING: usize = 8;
 
 /// Parameters of [`layout`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -146,7 +146,7 @@ pub fn layout(
             fixed[mesh.origin(next(h)) as usize] = true;
         }
     }
-    for _ in 0..ATTEMPTS {
+    for _ in 0..MESH_ATTEMPTS {
         let work = refine::refine(mesh, edge, &fixed);
         if let Some((work, complex)) = draft(work, (&sharp, corners), side, params, observer)? {
             let work_adjacency = Adjacency::new(&work.mesh);
@@ -204,10 +204,10 @@ fn make_good(
     let lines = bench.lines();
     let tips = tips::tips(&partition::Ground::new(bench.mesh, bench.adjacency, &lines), side);
     tips::plant(bench, &tips, patches);
-    improve::settle(bench, patches, SETTLING, observer)?;
+    improve::settle(bench, patches, SETTLING_PER_SMOOTHING, observer)?;
     improve::improve(bench, patches, observer)?;
     improve::relax(bench, observer)?;
-    improve::settle(bench, patches, SETTLING * params.smoothing, observer)
+    improve::settle(bench, patches, SETTLING_PER_SMOOTHING * params.smoothing, observer)
 }
 
 fn check(mesh: &TriMesh) -> Result<(), LayoutError> {

@@ -29,7 +29,7 @@ const FLAT_COST: f64 = 16.0;
 const IMPOSSIBLE: f64 = 1e6;
 
 /// Rounds over all cells; each sees the choices of its neighbours.
-const ROUNDS: usize = 6;
+const CHOICE_ROUNDS: usize = 6;
 
 /// What a path pays for each arc it splits, against an arc of the mean length divided by its own.
 const SPLIT_COST: f64 = 1.0;
@@ -262,7 +262,7 @@ pub(super) fn quadrangulate(mesh: &TriMesh, adjacency: &Adjacency, complex: &Com
     let mut sectors = Sectors::new(mesh, adjacency, complex);
     let cells: Vec<u32> = complex.live_cells().filter(|&c| complex.loop_of(c).len() > 4).collect();
     let mut lines: Vec<Vec<(usize, usize)>> = vec![Vec::new(); cells.len()];
-    for _ in 0..ROUNDS {
+    for _ in 0..CHOICE_ROUNDS {
         for (i, &c) in cells.iter().enumerate() {
             let sides = complex.loop_of(c);
             for &(a, b) in &lines[i] {

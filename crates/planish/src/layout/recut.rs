@@ -18,7 +18,7 @@ const INNER_RADIUS: f64 = 0.85;
 
 /// Curves that cross one edge keep at least this distance from each other and from its ends, as a fraction
 /// of the edge (less where many cross).
-const APART: f64 = 0.02;
+const CROSSINGS_APART: f64 = 0.02;
 
 /// A change inside the union of some cells.
 #[derive(Clone, Debug, Default)]
@@ -592,7 +592,7 @@ fn spread(complex: &mut Complex) {
     on_edge.sort_by(|x, y| x.0.cmp(&y.0).then(x.1.total_cmp(&y.1)).then((x.2, x.3).cmp(&(y.2, y.3))));
     for run in on_edge.chunk_by_mut(|x, y| x.0 == y.0) {
         let mut parts: Vec<f64> = run.iter().map(|x| x.1).collect();
-        keep_apart(&mut parts, APART);
+        keep_apart(&mut parts, CROSSINGS_APART);
         for (&(h, _, a, i), t) in run.iter().zip(parts) {
             complex.arcs[a as usize].as_mut().expect("a live arc").chain[i as usize] = Place::Edge(h, t);
         }

@@ -6,7 +6,7 @@ use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
 use std::collections::HashMap;
 
 /// Rounds of splitting; each halves an edge, so this reaches a 4096th of the longest edge.
-const ROUNDS: usize = 12;
+const SPLIT_ROUNDS: usize = 12;
 
 /// The refined mesh with the way back.
 pub(super) struct Refined {
@@ -23,7 +23,7 @@ pub(super) fn refine(mesh: &TriMesh, longest: f64, fixed: &[bool]) -> Refined {
         mesh: TriMesh::new(mesh.points.clone(), mesh.triangles.clone()),
         parent: (0..mesh.triangles.len() as u32).map(|f| (f, unit)).collect(),
     };
-    for round in 0..ROUNDS {
+    for round in 0..SPLIT_ROUNDS {
         let points = &work.mesh.points;
         let chosen = |a: u32, b: u32| {
             let narrow = round == 0 && fixed[a as usize] && fixed[b as usize];

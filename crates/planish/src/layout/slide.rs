@@ -11,10 +11,10 @@ use crate::network::imprint::Place;
 use rayon::prelude::*;
 
 /// A node keeps this fraction of the line between its neighbours to either side.
-const KEEP: f64 = 0.15;
+const KEPT_FRACTION: f64 = 0.15;
 
 /// How much even spacing along the line counts against lying across from the other ends of the smooth arcs.
-const EVEN: f64 = 0.5;
+const EVEN_WEIGHT: f64 = 0.5;
 
 /// A node's move along its line.
 #[derive(Clone, Debug)]
@@ -93,8 +93,8 @@ fn plan(mesh: &TriMesh, complex: &Complex, star: &[u32]) -> Option<Slide> {
     if count == 0.0 {
         return None;
     }
-    let target = EVEN * total / 2.0 + (1.0 - EVEN) * sum / count;
-    let target = target.clamp(KEEP * total, (1.0 - KEEP) * total);
+    let target = EVEN_WEIGHT * total / 2.0 + (1.0 - EVEN_WEIGHT) * sum / count;
+    let target = target.clamp(KEPT_FRACTION * total, (1.0 - KEPT_FRACTION) * total);
     let best = (1..line.len() - 1)
         .min_by(|&i, &j| (along[i] - target).abs().total_cmp(&(along[j] - target).abs()))
         .filter(|&i| i != old)?;

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 
 /// What meets one edge of a polygon keeps at least this distance from its ends and from each other, as a fraction of
 /// the edge (less where many meet it).
-const APART: f64 = 0.05;
+const MEETINGS_APART: f64 = 0.05;
 
 /// A vertex and the faces around it, counter-clockwise: `faces[i]` has the corners `vertex, ring[i], ring[i + 1]`.
 /// Without the vertex the polygon is a fan from `ring[0]`: `faces[i]` has the corners `ring[0], ring[i], ring[i + 1]`,
@@ -389,7 +389,7 @@ impl Strands {
                 })
                 .collect();
             part.sort_by(f64::total_cmp);
-            keep_apart(&mut part, APART);
+            keep_apart(&mut part, MEETINGS_APART);
             for (&(_, r, i), part) in here.iter().zip(part) {
                 knots[r][i] = self.knots.len() as u32;
                 let at = Spot::Edge(star.ring[m], apex.0, part);

@@ -16,13 +16,13 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Radii of the disks, in sides of a patch: fingers and limbs.
-const RADII: [f64; 2] = [0.5, 1.0];
+const TIP_RADII: [f64; 2] = [0.5, 1.0];
 
 /// Greatest area of a disk, against the flat one of its radius: that of a cone with an angle of 70 degrees.
 const SLENDER: f64 = 0.55;
 
 /// The outer part of the disk that is its boundary.
-const RIM: f64 = 0.8;
+const RIM_SHARE: f64 = 0.8;
 
 /// Candidates lie this far apart, in radii, and tips that far: a blunt end has one.
 const CANDIDATES_APART: f64 = 0.3;
@@ -60,7 +60,7 @@ fn slenderness(ground: &Ground, disc: &Disc, radius: f64) -> Option<f64> {
         return None;
     }
     let area: f64 = disc.iter().map(|&(v, _)| ground.share(v)).sum();
-    let rim: BTreeMap<u32, f64> = disc.iter().filter(|x| x.1 > RIM * radius).copied().collect();
+    let rim: BTreeMap<u32, f64> = disc.iter().filter(|x| x.1 > RIM_SHARE * radius).copied().collect();
     let (&first, _) = rim.first_key_value()?;
     let whole = super::tips::disc(ground, &[first], f64::INFINITY, Some(&rim)).len() == rim.len();
     whole.then_some(area / (std::f64::consts::PI * radius * radius))
@@ -74,7 +74,7 @@ fn climb(ground: &Ground, start: u32, radius: f64) -> Option<(f64, u32)> {
         if slenderness(ground, &around, radius)? > SLENDER {
             return None;
         }
-        let rim: Vec<u32> = around.iter().filter(|x| x.1 > RIM * radius).map(|x| x.0).collect();
+        let rim: Vec<u32> = around.iter().filter(|x| x.1 > RIM_SHARE * radius).map(|x| x.0).collect();
         let inside: BTreeMap<u32, f64> = around.into_iter().collect();
         let end = end(ground, &disc(ground, &rim, f64::INFINITY, Some(&inside)))?;
         if end == at {
@@ -100,7 +100,7 @@ fn end(ground: &Ground, found: &Disc) -> Option<u32> {
 /// Tips of limbs, the most slender first; `side` is that of a patch.
 pub(super) fn tips(ground: &Ground, side: f64) -> Vec<u32> {
     let mut tips: Vec<u32> = Vec::new();
-    for radius in RADII.map(|r| r * side) {
+    for radius in TIP_RADII.map(|r| r * side) {
         let mut covered = vec![false; ground.mesh.points.len()];
         let mut starts = Vec::new();
         for v in 0..covered.len() as u32 {

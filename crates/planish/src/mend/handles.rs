@@ -18,9 +18,9 @@ use glam::DVec3;
 /// A handle or a hole with a loop shorter than this share of the diagonal is none: less than a three-hundredth wide.
 pub const TINY_LOOP: f64 = 0.01;
 /// Balls reach so many such loops: both loops of a tangled handle lie within.
-const REACH: f64 = 1.5;
+const BALL_LOOPS: f64 = 1.5;
 /// Each round cuts loops that are apart; tangles of more handles than this are rare.
-const ROUNDS: usize = 24;
+const CUTTING_ROUNDS: usize = 24;
 /// A loop is found again from a vertex of its own, which makes it shorter, at most so often.
 const TIGHTENED: usize = 3;
 /// The triangulation is cubic in the number of vertices of a loop.
@@ -36,7 +36,7 @@ pub(super) fn close(
     let size = TINY_LOOP * Aabb::of(&mesh.points).diagonal();
     let mut closed = 0;
     let mut seeds: Option<Vec<u32>> = None;
-    for _ in 0..ROUNDS {
+    for _ in 0..CUTTING_ROUNDS {
         let adjacency = Adjacency::of(triangles, source.len());
         let mut search = Search {
             mesh,
@@ -49,7 +49,7 @@ pub(super) fn close(
         if seeds.is_none() && search.genus(&(0..triangles.len() as u32).collect::<Vec<_>>()) == 0 {
             break;
         }
-        let suspects = search.suspects(seeds.take(), REACH * size);
+        let suspects = search.suspects(seeds.take(), BALL_LOOPS * size);
         let mut busy = vec![false; source.len()];
         let mut loops = Vec::new();
         // Where a loop nearby is cut in this round, or one is found, there may be more. Where there is none that is short,
@@ -61,10 +61,10 @@ pub(super) fn close(
                 again.push(seed);
                 continue;
             }
-            let Some(found) = search.tight_loop(seed, REACH * size, size) else { continue };
+            let Some(found) = search.tight_loop(seed, BALL_LOOPS * size, size) else { continue };
             again.push(seed);
             // Two loops around one handle would cut a piece off.
-            let piece = search.piece(found[0], REACH * size);
+            let piece = search.piece(found[0], BALL_LOOPS * size);
             let vertices = || piece.iter().flat_map(|&t| triangles[t as usize]);
             if !vertices().any(|v| busy[v as usize]) {
                 vertices().for_each(|v| busy[v as usize] = true);

@@ -11,9 +11,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// A piece has at least this many times the area of a disk with the boundary of its hole.
-const PIECE: f64 = 4.0;
+const PIECE_OVER_DISK: f64 = 4.0;
 /// Area vector of a lid, along the mean of the normals around, over the area of the lid; one for a hole in a plane.
-const FACING: f64 = 0.3;
+const LID_FACING: f64 = 0.3;
 /// Holes of so few edges are cracks, whatever lies around them.
 const CRACK: usize = 6;
 /// The first triangles of a lid cost the third power of the edges around.
@@ -41,7 +41,7 @@ pub fn close_holes(
             let disk = length * length / (4.0 * std::f64::consts::PI);
             if length > longest
                 || around.len() > MOST_EDGES
-                || area[piece[around[0] as usize / 3] as usize] < PIECE * disk
+                || area[piece[around[0] as usize / 3] as usize] < PIECE_OVER_DISK * disk
             {
                 return Ok(None);
             }
@@ -103,7 +103,7 @@ fn lid_over(mesh: &TriMesh, adjacency: &Adjacency, around: &[u32], rim: &[u32]) 
         let lid: DVec3 = flat.iter().map(|t| cross(&points, t)).sum();
         let sides: DVec3 = around.iter().map(|&h| mesh.area_vector(h as usize / 3)).sum();
         let size: f64 = around.iter().map(|&h| mesh.area_vector(h as usize / 3).length()).sum();
-        if !(lid.dot(sides) > FACING * area * size) {
+        if !(lid.dot(sides) > LID_FACING * area * size) {
             return None;
         }
     }

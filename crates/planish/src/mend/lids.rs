@@ -17,11 +17,11 @@ use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// An edge this many times the usual length is split: its halves are then as far below it.
-const LONG: f64 = 1.4;
+const SPLIT_LENGTH: f64 = 1.4;
 /// Rounds of splitting; each halves the longest edges.
-const ROUNDS: usize = 16;
+const SPLIT_ROUNDS: usize = 16;
 /// Rounds of flipping after each; most lids settle in three.
-const FLIPS: usize = 8;
+const FLIP_ROUNDS: usize = 8;
 /// Angles that are a little more than two right ones, as those of a square's corners are by rounding, turn no edge.
 const SQUARE: f64 = 1e-6;
 /// Neighbours closer than this share of the usual length weigh no more.
@@ -78,9 +78,9 @@ pub(super) fn lid(rim: &[DVec3], beside: &[Vec<DVec3>], flat: &[[usize; 3]]) -> 
     let (sum, count) = around.fold((0.0, 0.0), |(sum, count), d| (sum + d, count + 1.0));
     let length = if sum > 0.0 { sum / count } else { return lid };
     let mut mesh = Changing::new(&lid.triangles, n, &[]);
-    for _ in 0..ROUNDS {
-        let split = split(&mut mesh, &mut lid.points, LONG * length);
-        for _ in 0..FLIPS {
+    for _ in 0..SPLIT_ROUNDS {
+        let split = split(&mut mesh, &mut lid.points, SPLIT_LENGTH * length);
+        for _ in 0..FLIP_ROUNDS {
             if flip(&mut mesh, &lid.points, n as u32) == 0 {
                 break;
             }

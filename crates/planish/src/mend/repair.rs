@@ -108,10 +108,10 @@ fn coincident(points: &[DVec3]) -> (Vec<u32>, usize) {
 }
 
 /// Triangles lower than this share of their edge do not tell to which side of it they lie.
-const THIN: f64 = 0.1;
+const THIN_TRIANGLE: f64 = 0.1;
 /// Open edges this nearly folded onto each other (cosine between their triangles) are the boundary of a two-sided
 /// sheet, not a crack.
-const FOLDED: f64 = 0.999;
+const FOLDED_COSINE: f64 = 0.999;
 
 /// Joins the ends of pairs of open edges that lie exactly on each other. Only such pairs are joined, so sheets
 /// that merely touch at points, and two-sided sheets, stay as they are.
@@ -163,8 +163,8 @@ fn is_folded(mesh: &TriMesh, triangles: &[[u32; 3]], g: u32, h: u32) -> bool {
         c - axis * c.dot(axis)
     };
     let [a, b] = [aside(g), aside(h)];
-    let told = a.length().min(b.length()) > THIN * edge.length();
-    told && a.dot(b) > FOLDED * a.length() * b.length()
+    let told = a.length().min(b.length()) > THIN_TRIANGLE * edge.length();
+    told && a.dot(b) > FOLDED_COSINE * a.length() * b.length()
 }
 
 fn drop_duplicates(triangles: &mut Vec<[u32; 3]>) -> usize {
@@ -185,7 +185,7 @@ fn drop_duplicates(triangles: &mut Vec<[u32; 3]>) -> usize {
 
 /// Cutting can bring half-edges of one edge together again; so many rounds settle all but contrived soups, and
 /// what is left then is detached.
-const ROUNDS: usize = 4;
+const PAIRING_ROUNDS: usize = 4;
 
 fn make_manifold(
     mesh: &TriMesh,
@@ -194,7 +194,7 @@ fn make_manifold(
     done: &mut Repairs,
     observer: &dyn Observer,
 ) -> Result<(), Cancelled> {
-    for round in 0..=ROUNDS {
+    for round in 0..=PAIRING_ROUNDS {
         observer.check()?;
         let keyed = keyed_edges(triangles);
         let over: Vec<u32> =
@@ -208,7 +208,7 @@ fn make_manifold(
         if over.is_empty() && one_sided == 0 {
             break;
         }
-        if round == ROUNDS {
+        if round == PAIRING_ROUNDS {
             detach_bad(triangles, source, done);
         }
     }

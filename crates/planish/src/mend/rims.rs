@@ -19,13 +19,13 @@ use rayon::prelude::*;
 const SMALL_HOLE: f64 = 0.1;
 /// The surface reaches so many times as far from a raw point as its eighth neighbour is: one and a half times as far as a
 /// surface between points has to.
-const REACH: f64 = 2.0;
+const POINT_REACH: f64 = 2.0;
 /// And so many cells, whatever the points: what they say of the next cell is sure.
-const CELLS: f64 = 1.5;
+const LEAST_REACH_CELLS: f64 = 1.5;
 /// Neighbours of a raw point that tell its density.
 const NEIGHBOURS: usize = 9;
 /// Rounds of warming each vertex by its neighbours: cold gets 2.8 cells far, and steps of cells are gone.
-const ROUNDS: usize = 32;
+const WARMING_ROUNDS: usize = 32;
 /// What is colder than this is cut off, the surface being at one and the boundary at zero: a cell of a straight boundary, strips
 /// narrower than five.
 const COLD: f64 = 0.3;
@@ -72,7 +72,9 @@ fn warmth(
         .map(|v| {
             observer.check()?;
             let p = mesh.points[v as usize];
-            let far = |i: u32| p.distance(points[i as usize]) > (REACH * reach[i as usize]).max(CELLS * voxel);
+            let far = |i: u32| {
+                p.distance(points[i as usize]) > (POINT_REACH * reach[i as usize]).max(LEAST_REACH_CELLS * voxel)
+            };
             Ok(adjacency.is_boundary_vertex(v) || ((v as usize) < seen && tree.closest(p).is_none_or(far)))
         })
         .collect();
@@ -85,7 +87,7 @@ fn warmth(
     let mut first = vec![0usize; mesh.points.len() + 1];
     neighbours.iter().for_each(|n| first[n[0] as usize + 1] += 1);
     (0..mesh.points.len()).for_each(|v| first[v + 1] += first[v]);
-    for _ in 0..ROUNDS {
+    for _ in 0..WARMING_ROUNDS {
         observer.check()?;
         warmth = (0..mesh.points.len())
             .into_par_iter()

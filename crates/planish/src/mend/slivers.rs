@@ -11,7 +11,7 @@ use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 
 /// Each pass can free only triangles that do not touch each other; clusters of them are short in practice.
-const PASSES: usize = 12;
+const SLIVER_PASSES: usize = 12;
 
 /// Removes triangles lower than the library's tolerance from an oriented manifold.
 pub(super) fn remove(
@@ -29,7 +29,7 @@ pub(super) fn remove(
         return Ok(());
     }
     let mut mending = Mending { mesh: Changing::new(triangles, source.len(), &[]), at, flat, done };
-    for _ in 0..PASSES {
+    for _ in 0..SLIVER_PASSES {
         observer.check()?;
         let all = 0..mending.mesh.len();
         let low: Vec<u32> = all.filter(|&t| mending.mesh.get(t).is_some_and(is_low)).collect();

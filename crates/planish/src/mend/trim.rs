@@ -4,7 +4,7 @@ use crate::mesh::{Attribute, FeatureKind, FeatureTags, NONE, TriMesh};
 use std::collections::BTreeMap;
 
 /// A cut this close to an end of an edge, as a share of it, goes through that end: triangles keep a height.
-const SNAP: f64 = 0.15;
+const SNAP_SHARE: f64 = 0.15;
 
 /// Keeps the part of a mesh where `level`, given for each vertex, is positive; triangles are cut along its zero line.
 /// Tags of features are cut, too. Where the line passes close to a vertex it goes through it.
@@ -104,10 +104,10 @@ fn snapped(mesh: &TriMesh, level: &[f64]) -> Vec<f64> {
             let (a, b) = (level[v], level[w]);
             if a * b < 0.0 {
                 let part = a / (a - b);
-                if part < SNAP {
+                if part < SNAP_SHARE {
                     snapped[v] = 0.0;
                 }
-                if 1.0 - part < SNAP {
+                if 1.0 - part < SNAP_SHARE {
                     snapped[w] = 0.0;
                 }
             }

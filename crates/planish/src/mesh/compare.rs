@@ -102,7 +102,7 @@ pub struct Sample {
 }
 
 /// Samples between two looks at the observer.
-const CHUNK: usize = 1 << 14;
+const SAMPLES_PER_CHUNK: usize = 1 << 14;
 
 /// Compares two surfaces both ways.
 /// # Errors
@@ -228,7 +228,7 @@ fn measure(
     while result.len() < params.samples {
         observer.check()?;
         observer.progress((pass as f64 + result.len() as f64 / params.samples as f64) / 2.0);
-        let range = result.len()..(result.len() + CHUNK).min(params.samples);
+        let range = result.len()..(result.len() + SAMPLES_PER_CHUNK).min(params.samples);
         result.par_extend(range.into_par_iter().map(|n| {
             let (place, m) = from.sample(seed, n as u64, params.samples);
             let hit = to.bvh.closest(place);

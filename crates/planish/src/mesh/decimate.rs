@@ -92,7 +92,7 @@ pub struct Decimated {
 }
 
 /// Rounds in which the neighbourhood of what meets is locked, and tolerances are tightened where the result is too far.
-const ROUNDS: usize = 12;
+const LOCKING_ROUNDS: usize = 12;
 /// Factor by which they are tightened.
 const TIGHTEN: f64 = 0.5;
 
@@ -131,7 +131,7 @@ pub fn decimate(
     let mut before = None;
     let mut log = Vec::new();
     let mut tolerances = vec![allowed.unwrap_or(f64::INFINITY); mesh.points.len()];
-    for round in 0..=ROUNDS {
+    for round in 0..=LOCKING_ROUNDS {
         let mut collapse = Collapse::new(mesh, tags, &locked, tolerances.clone(), &log)?;
         collapse.run(count, observer)?;
         let done = collapse.take_log();
@@ -140,7 +140,7 @@ pub fn decimate(
         if let Some(allowed) = allowed {
             let nearest = nearest(mesh, &result);
             let farthest = nearest.iter().map(|n| n.1).fold(0.0, f64::max);
-            if farthest > allowed && round < ROUNDS {
+            if farthest > allowed && round < LOCKING_ROUNDS {
                 tighten(&result, &nearest, allowed, &mut tolerances);
                 log = done;
                 continue;
@@ -148,7 +148,7 @@ pub fn decimate(
             distance = Some(farthest);
         }
         let meeting = intersections_of(&result, |_| true, observer)?;
-        if !meeting.is_empty() && round < ROUNDS {
+        if !meeting.is_empty() && round < LOCKING_ROUNDS {
             // What the input has already is not ours to mend.
             let own = *before.get_or_insert_with(|| self_intersections(mesh).len());
             if meeting.len() > own {

@@ -21,7 +21,7 @@ const CUTS_PER_SPAN: usize = 6;
 /// it then adds a thousandth to them.
 const CHORD_SHARE: f64 = 0.05;
 /// Distances below this share of the diagonal are not told apart: the precision of files with `f32` positions.
-const FINEST: f64 = 1e-7;
+const FLOAT_PRECISION: f64 = 1e-7;
 /// Smooth seams that bend by more are told to the user: half a degree is the default of a common CAD program.
 pub const SEAM_ANGLE_WARNING_DEG: f64 = 0.5;
 
@@ -127,7 +127,7 @@ fn cuts_to_measure(model: &Model, observer: &dyn Observer) -> Result<usize, Canc
     let each = each?;
     let count = each.iter().map(|e| e.1).sum::<usize>().max(1) as f64;
     let leave = (each.iter().map(|e| e.0).sum::<f64>() / count).sqrt();
-    let wanted = CHORD_SHARE * (each.iter().map(|e| e.2).sum::<f64>() / count).sqrt().max(FINEST * diagonal);
+    let wanted = CHORD_SHARE * (each.iter().map(|e| e.2).sum::<f64>() / count).sqrt().max(FLOAT_PRECISION * diagonal);
     // A number that is none asks for the finest.
     Ok((1..CUTS_PER_SPAN).find(|&cuts| leave / (cuts * cuts) as f64 <= wanted).unwrap_or(CUTS_PER_SPAN))
 }

@@ -95,19 +95,19 @@ const CELL_GAPS: f64 = 0.6;
 /// Sheets closer than this many noise levels are one that was scanned twice, the scans a little apart.
 const TWICE: f64 = 2.5;
 /// But not finer than this share of what suits the points: 16 times as many cells.
-const FINEST: f64 = 0.25;
+const FINEST_CELL: f64 = 0.25;
 /// Components below this share of the area of the largest are specks of noise.
-const SPECK: f64 = 0.005;
+const SPECK_AREA: f64 = 0.005;
 /// So are those with less than this share of the points that their area has elsewhere: what a blend leaves beside the data.
-const BARE: f64 = 0.1;
+const BARE_SPECK: f64 = 0.1;
 /// Raw points that are measured against the mesh.
-const MEASURED: usize = 50_000;
+const MEASURED_POINTS: usize = 50_000;
 
 /// The edge of a cell that suits the samples.
 pub fn voxel_for(samples: &Samples) -> f64 {
     let usual = (CELL_SPACINGS * samples.spacing).max(CELL_NOISE * samples.noise);
     let gap = if samples.gap < TWICE * samples.noise { f64::INFINITY } else { samples.gap };
-    usual.min(CELL_GAPS * gap).max(FINEST * usual)
+    usual.min(CELL_GAPS * gap).max(FINEST_CELL * usual)
 }
 
 /// Meshes a scan.
@@ -133,7 +133,7 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
     let scale = ScanScale { noise: samples.noise, spacing: samples.spacing, cell };
     sharp::fair_lines(mesh, tags, &scale, observer)?;
     observer.progress(0.98);
-    sharp::split_bent(mesh, tags, BENT * fit_tolerance(&samples) * samples.diagonal, observer)?;
+    sharp::split_bent(mesh, tags, BENT_TOLERANCE * fit_tolerance(&samples) * samples.diagonal, observer)?;
     tags.mark(mesh);
     let mut reached = reach(scan, &meshed.extracted.mesh, observer)?;
     let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags, &reached);
@@ -151,7 +151,7 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
 const FIT_NOISE: f64 = 0.5;
 const FIT_CLOSEST: f64 = 2e-4;
 /// Edges of the mesh of a scan that pass more than this share of that beside the surface are split.
-const BENT: f64 = 0.2;
+const BENT_TOLERANCE: f64 = 0.2;
 /// Smoothing at noise of a thousandth of the diagonal; it goes with the square of the noise, as in Wiener's filter. Less leaves
 /// the noise beside sharp edges, more flattens what bends there.
 const FIT_SMOOTHING: f64 = 0.05;
@@ -201,7 +201,7 @@ fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags, reached: &[(f64, u32)
     let density = reached.len() as f64 / area.iter().sum::<f64>();
     let stays = |v: u32| {
         let c = label[v as usize] as usize;
-        area[c] >= SPECK * most && points[c] >= BARE * density * area[c]
+        area[c] >= SPECK_AREA * most && points[c] >= BARE_SPECK * density * area[c]
     };
     let specks = (0..label.len()).filter(|&i| label[i] == i as u32 && area[i] > 0.0 && !stays(i as u32)).count();
     if specks == 0 {
@@ -218,7 +218,7 @@ fn reach(scan: &Cloud, mesh: &TriMesh, observer: &dyn Observer) -> Result<Vec<(f
         return Ok(Vec::new());
     }
     let bvh = Bvh::watched(mesh, observer)?;
-    let step = scan.points.len().div_ceil(MEASURED).max(1);
+    let step = scan.points.len().div_ceil(MEASURED_POINTS).max(1);
     let finite: Vec<_> = scan.points.iter().step_by(step).filter(|p| p.is_finite()).collect();
     let one = |p: &&DVec3| {
         observer.check()?;
@@ -270,7 +270,7 @@ pub fn sample_figures(samples: &Samples, quality: &mut Quality, warnings: &mut V
     quality.extend(numbers.map(|(key, x)| (key.to_owned(), Figure::Number(x))));
     quality.insert("scan.samples".into(), Figure::Count(samples.samples.len() as u64));
     quality.insert("scan.segments".into(), Figure::Count(samples.closed.len() as u64));
-    if confidence < UNSURE {
+    if confidence < UNSURE_ORIENTATION {
         let text = format!(
             "The orientation of the points is unsure: {:.1} % of the evidence agrees. Normals or scanner positions in the \
              file would decide it.",
@@ -281,4 +281,4 @@ pub fn sample_figures(samples: &Samples, quality: &mut Quality, warnings: &mut V
 }
 
 /// Below this share of evidence that agrees the orientation is told to be unsure.
-const UNSURE: f64 = 0.95;
+const UNSURE_ORIENTATION: f64 = 0.95;

@@ -20,7 +20,7 @@ const BENT_DEG: f64 = 15.0;
 /// An edge has its angle if it is met within this, degrees.
 pub const ANGLE_DEG: f64 = 3.0;
 /// Edges of the truth are asked at steps of this share of the diagonal: finer than any distance that is judged.
-const STEP: f64 = 5e-4;
+const EDGE_STEP: f64 = 5e-4;
 
 /// The zone of the sharp edges: within this share of the diagonal.
 const ZONE: f64 = 0.01;
@@ -64,7 +64,7 @@ fn edge_places(mesh: &TriMesh, angle_deg: f64, step: f64) -> Vec<(DVec3, f64, f6
 /// How the feature seams of a model meet the sharp edges of a truth.
 /// * `within` - distance at which a seam counts as that of an edge, world units
 pub fn edges_found(truth: &TriMesh, model: &Model, within: f64) -> EdgesFound {
-    let step = STEP * truth.bounds().diagonal();
+    let step = EDGE_STEP * truth.bounds().diagonal();
     let edges = edge_places(truth, SHARP_DEG, step);
     let bent: Vec<DVec3> = edge_places(truth, BENT_DEG, step).iter().map(|p| p.0).collect();
     let seams: Vec<_> = seam_angles(&model.network, &model.surfaces, step)
@@ -113,7 +113,7 @@ pub struct Zone {
 /// Of samples of a truth and a result against each other those within a hundredth of the diagonal of a true edge.
 pub fn zone(truth: &TriMesh, samples: &[Sample]) -> Zone {
     let diagonal = truth.bounds().diagonal();
-    let edges: Vec<DVec3> = edge_places(truth, SHARP_DEG, STEP * diagonal).iter().map(|p| p.0).collect();
+    let edges: Vec<DVec3> = edge_places(truth, SHARP_DEG, EDGE_STEP * diagonal).iter().map(|p| p.0).collect();
     let edges = KdTree::new(&edges);
     let mut near = Vec::new();
     let (mut squares, mut angles, mut count) = (0.0, 0.0, 0);

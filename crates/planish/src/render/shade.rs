@@ -182,13 +182,13 @@ fn corner_normals(mesh: &TriMesh, crease_deg: f64, seen: &Seen) -> CornerNormals
 /// Directions looked at per pixel to find hollows.
 const LOOKS: usize = 20;
 /// Reach of a hollow, as a share of the bounding-box diagonal.
-const REACH: f64 = 0.06;
+const HOLLOW_REACH: f64 = 0.06;
 
 /// How open each pixel lies (0 to 1), from the depths around it: a neighbour that stands above the tangent plane
 /// takes light away.
 fn openness(mesh: &TriMesh, frame: &Frame, seen: &Seen) -> Vec<f32> {
     let (width, height) = (frame.width / FINE, frame.height / FINE);
-    let reach = REACH * mesh.bounds().diagonal();
+    let reach = HOLLOW_REACH * mesh.bounds().diagonal();
     let place = |x: usize, y: usize| -> Option<(DVec3, u32)> {
         let i = y * FINE * frame.width + x * FINE;
         let ray = frame.ray((x * FINE) as f64 + 0.5, (y * FINE) as f64 + 0.5);

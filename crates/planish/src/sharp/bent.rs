@@ -16,11 +16,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// The least way over the edge's length: 4.6 degrees from end to end.
-const BENT: f64 = 0.01;
+const LEAST_BEND: f64 = 0.01;
 /// An edge that leaves a surface or line by more than this (sine of 40 degrees) has no bend but a kink.
-const KINK: f64 = 0.64;
+const KINK_COSINE: f64 = 0.64;
 /// A piece turns from the face it is a part of by less than this cosine (60 degrees).
-const TURNED: f64 = 0.5;
+const PIECE_TURN_COSINE: f64 = 0.5;
 
 /// Splits the edges that pass `least` or more beside the surface, the new vertices on it. Returns how many.
 ///
@@ -129,8 +129,8 @@ fn bends(mesh: &TriMesh, tags: &FeatureTags, least: f64) -> Vec<Split> {
             [h, next(h)].map(normal).map(|n| n * e.dot(n))
         };
         let way = (aside[1] - aside[0]) / 8.0;
-        let is_bent = way.length() >= least.max(BENT * e.length());
-        let is_kink = aside.iter().any(|x| x.length() > KINK * e.length());
+        let is_bent = way.length() >= least.max(LEAST_BEND * e.length());
+        let is_kink = aside.iter().any(|x| x.length() > KINK_COSINE * e.length());
         (is_bent && !is_kink).then(|| Split { ends: (a, b), at: (p + q) / 2.0 + way })
     };
     let mut found: Vec<Split> = (0..3 * mesh.triangles.len() as u32).into_par_iter().filter_map(bend).collect();
@@ -199,7 +199,7 @@ impl Refined {
     fn turned(&self, mesh: &TriMesh) -> Vec<u32> {
         let is_turned = |t: &usize| {
             let parent = self.parent[*t];
-            self.is_piece(mesh, *t as u32) && self.mesh.normal(*t).dot(mesh.normal(parent as usize)) < TURNED
+            self.is_piece(mesh, *t as u32) && self.mesh.normal(*t).dot(mesh.normal(parent as usize)) < PIECE_TURN_COSINE
         };
         (0..self.parent.len()).into_par_iter().filter(is_turned).map(|t| self.parent[t]).collect()
     }

@@ -12,11 +12,11 @@ use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// Greatest cost of a bridge over a gap, mean edges of the mesh: a sharp edge costs its length, a flat one twice that.
-const WIDEST: f64 = 8.0;
+const WIDEST_GAP: f64 = 8.0;
 /// Factor on the cost of a bridge to the middle of a line or to the boundary: a line may as well end in the open there.
-const BESIDE: f64 = 2.0;
+const SIDE_TARGET_FACTOR: f64 = 2.0;
 /// A line must be this many times as long as its bridge costs; nor does a bridge lead to a place on its own line nearer than that.
-const LONG: f64 = 3.0;
+const LINE_PER_GAP: f64 = 3.0;
 /// Length over which the direction of a line at its end is taken, mean edges.
 const LAST: f64 = 4.0;
 /// Cosine of the greatest angle (50 degrees) between a bridge and the direction in which its line ends; bridges shorter than
@@ -163,7 +163,7 @@ impl End {
             }
             let on = lines[&to].iter().find(|&&g| mesh.origin(next(g)) != mesh.origin(h));
             match on {
-                Some(&g) if lines[&to].len() == 2 && along < LONG * WIDEST * edge && to != v => h = g,
+                Some(&g) if lines[&to].len() == 2 && along < LINE_PER_GAP * WIDEST_GAP * edge && to != v => h = g,
                 _ => {
                     let at = |v: u32| mesh.points[v as usize];
                     return End { direction: (at(v) - at(from.unwrap_or(to))).normalize_or_zero(), tail };
@@ -193,7 +193,7 @@ fn bridge(
 ) -> Option<Bridge> {
     let end = &ends[&v];
     let at = |v: u32| mesh.points[v as usize];
-    let reach = (WIDEST * edge).min(end.length() / LONG);
+    let reach = (WIDEST_GAP * edge).min(end.length() / LINE_PER_GAP);
     let mut search = Search::sparse();
     search.reach(v, 0.0, NONE);
     let mut best: Option<(f64, u32)> = None;
@@ -202,10 +202,10 @@ fn bridge(
             break;
         }
         if w != v && (lines.contains_key(&w) || adjacency.is_boundary_vertex(w)) {
-            let near = end.tail.iter().any(|t| t.0 == w && t.1 < LONG * cost);
+            let near = end.tail.iter().any(|t| t.0 == w && t.1 < LINE_PER_GAP * cost);
             let price = match ends.get(&w) {
-                Some(other) if other.leads_to(at(v) - at(w), edge) && LONG * cost <= other.length() => cost,
-                _ => BESIDE * cost,
+                Some(other) if other.leads_to(at(v) - at(w), edge) && LINE_PER_GAP * cost <= other.length() => cost,
+                _ => SIDE_TARGET_FACTOR * cost,
             };
             if !near && price <= reach && end.leads_to(at(w) - at(v), edge) && best.is_none_or(|b| price < b.0) {
                 best = Some((price, w));

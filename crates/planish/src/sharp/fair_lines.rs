@@ -23,27 +23,27 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// The flanks are followed within so many cells of the line, fully within half of that.
-const REACH: f64 = 4.0;
+const FLANK_REACH_CELLS: f64 = 4.0;
 /// A vertex of a line moves by so many noise levels at most: farther off is not where it was seen.
-const FARTHEST: f64 = 2.0;
+const FARTHEST_MOVE_NOISE: f64 = 2.0;
 /// Others are drawn less the farther they are from the flank, beyond one noise level not at all: that is structure.
-const STRUCTURE: f64 = 1.0;
+const STRUCTURE_NOISE: f64 = 1.0;
 /// Variance of a flank's slope that counts as none: half a degree.
-const SURE: f64 = 8e-5;
+const NO_SLOPE_VARIANCE: f64 = 8e-5;
 /// A triangle may turn so far from what is expected of it (cosine) if it was no farther before.
-const TURNED: f64 = 0.7;
+const FACE_TURN_COSINE: f64 = 0.7;
 /// A triangle keeps so much of its area.
-const AREA: f64 = 0.1;
+const KEPT_AREA: f64 = 0.1;
 /// Rounds in which vertices go back half of the way, and rounds in all.
 const HALVES: usize = 6;
-const ROUNDS: usize = 24;
+const BACK_ROUNDS: usize = 24;
 /// A vertex this near to where it should be is there, in cells.
-const THERE: f64 = 1e-3;
+const THERE_CELLS: f64 = 1e-3;
 /// Vertices are merged over edges of so many cells at most, and triangles with an edge shorter than so many cells are too small.
-const MERGED: f64 = 1.0;
-const CRAMPED: f64 = 0.2;
+const LONGEST_MERGED_CELLS: f64 = 1.0;
+const CRAMPED_CELLS: f64 = 0.2;
 /// Rounds of that.
-const MERGES: usize = 24;
+const MERGE_ROUNDS: usize = 24;
 
 /// Moves the lines of `tags` to where the surfaces beside them meet, and what is within four cells of them onto these surfaces;
 /// vertices that are in the way are merged into others. Lines along rounded edges are dropped, and the mesh is smooth
@@ -115,7 +115,7 @@ impl Wishes {
         let expected = self.expected[t as usize];
         let wanted = if expected == DVec3::ZERO { normal } else { expected };
         let now = (b - a).cross(c - a).normalize_or_zero();
-        now.dot(wanted) <= TURNED.min(normal.dot(wanted) - 1e-9)
+        now.dot(wanted) <= FACE_TURN_COSINE.min(normal.dot(wanted) - 1e-9)
     }
 }
 
@@ -146,7 +146,7 @@ fn wishes(
     observer: &dyn Observer,
 ) -> Result<Wishes, Cancelled> {
     let mesh = lines.mesh;
-    let reach = REACH * scale.cell;
+    let reach = FLANK_REACH_CELLS * scale.cell;
     // What each flank says of the faces beside it.
     let beside: Result<Vec<Vec<Vec<u32>>>, Cancelled> = flanks
         .par_iter()
@@ -189,7 +189,7 @@ fn wishes(
                 if far >= 1.0 {
                     continue;
                 }
-                let w = (1.0 - far * far).powi(2) / (flank.variance + SURE);
+                let w = (1.0 - far * far).powi(2) / (flank.variance + NO_SLOPE_VARIANCE);
                 let (off, normal) = flank.beside(p);
                 if lines.on_line[v] {
                     if let Some(shared) = shared.get_mut(own[3 * t as usize + k]) {
@@ -201,7 +201,7 @@ fn wishes(
                 if std::mem::replace(&mut last[v], n) == n {
                     continue;
                 }
-                let t = off / (STRUCTURE * scale.noise);
+                let t = off / (STRUCTURE_NOISE * scale.noise);
                 // Tukey's weight.
                 let keep = (1.0 - t * t).max(0.0).powi(2);
                 sum[v] -= normal * (off * w * keep);
@@ -223,7 +223,7 @@ fn wishes(
         let side = |s: &Shared| (s.normal.normalize_or_zero(), s.off / s.weight.max(f64::MIN_POSITIVE));
         let way = meet(shared[at..at + flanks.len()].iter().map(side));
         at += flanks.len();
-        if way.length() <= FARTHEST * scale.noise {
+        if way.length() <= FARTHEST_MOVE_NOISE * scale.noise {
             moves.push((*v, from + way));
         }
     }
@@ -236,7 +236,7 @@ fn wishes(
 fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool], observer: &dyn Observer) -> Result<(), Cancelled> {
     let before = mesh.points.clone();
     let mut share = vec![0.0; mesh.points.len()];
-    let is_there = |v: u32, p: DVec3| before[v as usize].distance(p) <= THERE * wishes.cell;
+    let is_there = |v: u32, p: DVec3| before[v as usize].distance(p) <= THERE_CELLS * wishes.cell;
     wishes.moves.iter().filter(|m| !is_there(m.0, m.1)).for_each(|m| share[m.0 as usize] = 1.0);
     let moves =
         |t: u32, share: &[f64], mesh: &TriMesh| mesh.triangles[t as usize].iter().any(|&v| share[v as usize] > 0.0);
@@ -244,13 +244,14 @@ fn settle(mesh: &mut TriMesh, wishes: &Wishes, moved: &mut [bool], observer: &dy
     let was: Vec<(DVec3, f64)> = touched.iter().map(|&t| (mesh.normal(t as usize), mesh.area(t as usize))).collect();
     // Vertices whose triangles were not asked yet whether they meet others.
     let mut fresh: Vec<bool> = share.iter().map(|s| *s > 0.0).collect();
-    for round in 0..ROUNDS {
+    for round in 0..BACK_ROUNDS {
         observer.check()?;
         for &(v, p) in &wishes.moves {
             mesh.points[v as usize] = before[v as usize].lerp(p, share[v as usize]);
         }
         let is_bad = |(&t, (normal, area)): (&u32, &(DVec3, f64))| {
-            let fits = !wishes.is_turned(t, *normal, mesh.corners(t as usize)) && mesh.area(t as usize) >= AREA * area;
+            let fits =
+                !wishes.is_turned(t, *normal, mesh.corners(t as usize)) && mesh.area(t as usize) >= KEPT_AREA * area;
             moves(t, &share, mesh) && !fits
         };
         let mut bad: Vec<u32> = touched.par_iter().zip(&was).filter(|x| is_bad(*x)).map(|(&t, _)| t).collect();
@@ -292,15 +293,15 @@ fn tidy(
         match wishes.expected[t as usize] {
             DVec3::ZERO => Fault::None,
             normal if wishes.is_turned(t, normal, corners) => Fault::Turned,
-            _ if least < CRAMPED * wishes.cell => Fault::Cramped,
+            _ if least < CRAMPED_CELLS * wishes.cell => Fault::Cramped,
             _ => Fault::None,
         }
     };
     let all = 0..mesh.triangles.len() as u32;
     let mut faulty: Vec<u32> = all.filter(|&t| fault(t, mesh.corners(t as usize)) != Fault::None).collect();
-    for _ in 0..MERGES {
+    for _ in 0..MERGE_ROUNDS {
         observer.check()?;
-        faulty = merging.round(&faulty, fault, MERGED * wishes.cell, observer)?;
+        faulty = merging.round(&faulty, fault, LONGEST_MERGED_CELLS * wishes.cell, observer)?;
     }
     let merged = merging.mesh;
     let mut t = 0;

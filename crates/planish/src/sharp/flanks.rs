@@ -14,25 +14,25 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Widths of the windows, in cells.
-const RADII: [f64; 5] = [2.0, 3.0, 4.5, 6.75, 10.0];
+const WINDOW_CELLS: [f64; 5] = [2.0, 3.0, 4.5, 6.75, 10.0];
 /// Terms of the polynomials among `1, x, y, y², x², xy` with `y` along the line: a plane, one that bends along the line, and a
 /// quadric.
 const MODELS: [usize; 3] = [3, 4, 6];
 /// A window must stand for so many points of the scan: two more than a quadric has terms.
-const FEWEST: f64 = 8.0;
+const FEWEST_WINDOW_POINTS: f64 = 8.0;
 /// Squared difference at which two estimates no longer agree, over the variance of that difference, d. The wider window has
 /// less variance by d and a squared bias b; the squared difference is b + d in the mean, so the wider one is the better as
 /// long as the squared difference is below 2 d (unbiased risk, as in Mallows' C_p).
 const AGREE_SQUARED: f64 = 2.0;
 /// Least share of an estimate's own variance that counts as that of its difference to a more precise one.
 const SHARED: f64 = 0.25;
-/// Estimates from beyond a rounding need this weight in their first `CLOSE` windows: what is seen from afar alone may bend in between.
-const CLOSE: usize = 2;
-const SOME: f64 = 4.0;
+/// Estimates from beyond a rounding need this weight in their first `CLOSE_WINDOWS` windows: what is seen from afar alone may bend in between.
+const CLOSE_WINDOWS: usize = 2;
+const CLOSE_POINTS: f64 = 4.0;
 /// Radius of the first normal and of the direction of the line, cells.
-const NEAR: f64 = 3.0;
+const NEAR_CELLS: f64 = 3.0;
 /// What lies this near to a line, in cells, may be the rounding of an edge.
-const ROUNDING: f64 = 1.5;
+const ROUNDING_CELLS: f64 = 1.5;
 
 /// The scales of a mesh that was made of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +56,7 @@ pub(super) struct Flank {
     terms: [f64; 6],
     /// Variance of the slope across the line.
     pub variance: f64,
-    /// The surface beside the vertex as told by what is beyond [`ROUNDING`] of lines alone; `None` if too little is.
+    /// The surface beside the vertex as told by what is beyond [`ROUNDING_CELLS`] of lines alone; `None` if too little is.
     pub beyond: Option<Plane>,
     /// Faces around the vertex on this side.
     pub sector: Vec<u32>,
@@ -104,7 +104,7 @@ impl Lines<'_> {
         let beside = |seen: &mut Seen, &v: &u32| {
             observer.check()?;
             let at = self.mesh.points[v as usize];
-            let near = |f: u32| self.centers[f as usize].distance(at) < ROUNDING * scale.cell;
+            let near = |f: u32| self.centers[f as usize].distance(at) < ROUNDING_CELLS * scale.cell;
             Ok(self.sectors(v).iter().flat_map(|sector| self.grow(sector, seen, near)).collect())
         };
         let mut is_beside = vec![false; self.mesh.triangles.len()];
@@ -112,7 +112,7 @@ impl Lines<'_> {
         found?.into_iter().flatten().for_each(|f| is_beside[f as usize] = true);
         let found = vertices.into_par_iter().map_init(seen, |seen, v| {
             observer.check()?;
-            let Some(along) = self.direction(v, NEAR * scale.cell) else { return Ok(None) };
+            let Some(along) = self.direction(v, NEAR_CELLS * scale.cell) else { return Ok(None) };
             let one = |sector| self.flank(v, sector, along, scale, &is_beside, seen);
             let flanks: Option<Vec<Flank>> = self.sectors(v).into_iter().map(one).collect();
             Ok(flanks.filter(|f| f.len() > 1).map(|flanks| (v, flanks)))
@@ -131,17 +131,17 @@ impl Lines<'_> {
     ) -> Option<Flank> {
         let at = self.mesh.points[v as usize];
         let off = |f: u32| self.centers[f as usize].distance(at);
-        let near = self.grow(&sector, seen, |f| off(f) < NEAR * scale.cell);
+        let near = self.grow(&sector, seen, |f| off(f) < NEAR_CELLS * scale.cell);
         let outwards = near.iter().map(|&f| self.areas[f as usize]).sum::<DVec3>().try_normalize()?;
         let y = (along - outwards * outwards.dot(along)).try_normalize()?;
         let axes = [outwards.cross(y), y, outwards];
-        let widest = RADII[RADII.len() - 1] * scale.cell;
+        let widest = WINDOW_CELLS[WINDOW_CELLS.len() - 1] * scale.cell;
         // What each window has more than the one before: all, and what is beyond the rounding.
-        let mut rings: [[Moments; RADII.len()]; 2] = Default::default();
+        let mut rings: [[Moments; WINDOW_CELLS.len()]; 2] = Default::default();
         for f in self.grow(&sector, seen, |f| off(f) < widest && self.is_facing(f, outwards)) {
             let p = (self.centers[f as usize] - at) / scale.cell;
             let away = p.length();
-            let Some(ring) = RADII.iter().position(|radius| away <= *radius) else { continue };
+            let Some(ring) = WINDOW_CELLS.iter().position(|radius| away <= *radius) else { continue };
             // How many points of the scan a face stands for.
             let weight = self.areas[f as usize].length() / (scale.spacing * scale.spacing);
             for rings in &mut rings[..if is_beside[f as usize] { 1 } else { 2 }] {
@@ -151,8 +151,8 @@ impl Lines<'_> {
         let noise = scale.noise / scale.cell;
         let mut beyond = best(&rings[1], noise).map(|estimate| estimate.plane(axes, scale.cell));
         // What is seen from afar alone may bend in between.
-        let close: f64 = rings[1][..CLOSE].iter().map(|ring| ring.matrix[0][0]).sum();
-        if let Some(plane) = beyond.as_mut().filter(|_| close < SOME) {
+        let close: f64 = rings[1][..CLOSE_WINDOWS].iter().map(|ring| ring.matrix[0][0]).sum();
+        if let Some(plane) = beyond.as_mut().filter(|_| close < CLOSE_POINTS) {
             plane.variance = f64::INFINITY;
         }
         let Estimate { mut terms, variance } = best(&rings[0], noise)?;
@@ -168,7 +168,7 @@ fn best(rings: &[Moments], noise: f64) -> Option<Estimate> {
     let mut found: Vec<Estimate> = Vec::new();
     for ring in rings {
         sums.join(ring);
-        if sums.matrix[0][0] >= FEWEST {
+        if sums.matrix[0][0] >= FEWEST_WINDOW_POINTS {
             found.extend(MODELS.iter().filter_map(|&terms| sums.fit(terms, noise)));
         }
     }
@@ -272,7 +272,7 @@ mod tests {
             .min_by(|a, b| a.1[0].at.distance(center).total_cmp(&b.1[0].at.distance(center)))
             .expect("a vertex in the middle of the line");
         // Second moment of a half disc across its straight side, about its own middle.
-        let radius = RADII[RADII.len() - 1] * scale.cell;
+        let radius = WINDOW_CELLS[WINDOW_CELLS.len() - 1] * scale.cell;
         let moment = radius.powi(4) * (PI / 8.0 - 8.0 / (9.0 * PI));
         let expected = (scale.noise * scale.spacing).powi(2) / moment;
         for flank in beside {

@@ -5,7 +5,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// A face that turns away from a normal by more than 60 degrees (cosine) is on another side.
-const FACING: f64 = 0.5;
+const FACING_COSINE: f64 = 0.5;
 
 /// A mesh with its sharp lines.
 pub(super) struct Lines<'a> {
@@ -102,7 +102,7 @@ impl Lines<'_> {
     /// True if a face looks the way of `normal`.
     pub fn is_facing(&self, face: u32, normal: DVec3) -> bool {
         let area = self.areas[face as usize];
-        area.dot(normal) > FACING * area.length()
+        area.dot(normal) > FACING_COSINE * area.length()
     }
 
     /// The half-edges on lines that leave `v`.

@@ -11,7 +11,7 @@ use glam::DVec3;
 use std::collections::BTreeSet;
 
 /// Height of a triangle over its longest edge that is enough.
-const SHAPE: f64 = 0.1;
+const GOOD_SHAPE: f64 = 0.1;
 
 /// How bad a triangle is.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -152,7 +152,7 @@ impl<'a> Merging<'a> {
             }
             let then = self.places(corners.map(|x| if x == v { w } else { x }));
             let left = fault(t, then);
-            if left == Fault::Turned || shape(then) < shape(at).min(SHAPE) {
+            if left == Fault::Turned || shape(then) < shape(at).min(GOOD_SHAPE) {
                 return false;
             }
             after += left as usize;
@@ -168,7 +168,7 @@ impl<'a> Merging<'a> {
             let was = [corners, self.mesh.corners(other)].map(|c| self.places(c));
             let faults = [fault(t, own), fault(other, new)];
             let before = fault(t, was[0]) as usize + fault(other, was[1]) as usize;
-            let is_shaped = shape(own).min(shape(new)) >= shape(was[0]).min(shape(was[1])).min(SHAPE);
+            let is_shaped = shape(own).min(shape(new)) >= shape(was[0]).min(shape(was[1])).min(GOOD_SHAPE);
             let is_better = faults.iter().map(|&f| f as usize).sum::<usize>() < before;
             let keeps_four = flip.edge.iter().all(|&v| self.mesh.around(v).len() >= 4);
             keeps_four && is_better && is_shaped && !faults.contains(&Fault::Turned)

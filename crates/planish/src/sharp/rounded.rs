@@ -13,19 +13,19 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// An edge is rounded if the surface stays short of it by so many noise levels, and by such a share of a cell, ...
-const SHORT: f64 = 1.0;
-const COARSE: f64 = 0.1;
+const SHORT_NOISE: f64 = 1.0;
+const SHORT_CELLS: f64 = 0.1;
 /// ... by so many standard deviations of what its flanks say ...
-const SURE: f64 = 1.0;
+const SHORT_DEVIATIONS: f64 = 1.0;
 /// ... and goes on to be so where it stays short by this share of that.
-const WEAK: f64 = 0.5;
+const WEAK_SHARE: f64 = 0.5;
 /// Half of the vertices of a line within so many cells decide; no shorter piece is other than what is around it.
-const ALONG: f64 = 6.0;
+const DECIDING_CELLS: f64 = 6.0;
 /// Vertices are made smooth within so many cells of a rounding, as told by what is this far across it and along it.
-const BESIDE: f64 = 2.0;
-const WINDOW: [f64; 2] = [2.0, 6.0];
+const SMOOTHED_CELLS: f64 = 2.0;
+const SMOOTHING_WINDOW_CELLS: [f64; 2] = [2.0, 6.0];
 /// Damping of the place where flanks meet: two at less than two degrees have none.
-const DAMPING: f64 = 1e-3;
+const MEETING_DAMPING: f64 = 1e-3;
 
 /// Splits the edges of lines into those of edges and those of roundings.
 /// * `flanks` - of the vertices of `lines`
@@ -37,16 +37,17 @@ pub(super) fn split(
 ) -> [Vec<[u32; 2]>; 2] {
     let short: BTreeMap<u32, (f64, f64)> =
         flanks.iter().filter_map(|(v, f)| Some((*v, shortfall(lines, f)?))).collect();
-    let least = (SHORT * scale.noise).max(COARSE * scale.cell);
+    let least = (SHORT_NOISE * scale.noise).max(SHORT_CELLS * scale.cell);
     // 2 if half of the vertices around are short for certain, 1 if they may be.
     let verdict = |v: u32| {
-        let known: Vec<_> = lines.around(v, ALONG * scale.cell).iter().filter_map(|v| short.get(v)).copied().collect();
+        let known: Vec<_> =
+            lines.around(v, DECIDING_CELLS * scale.cell).iter().filter_map(|v| short.get(v)).copied().collect();
         let half =
             |is: fn(f64, f64, f64) -> bool| 2 * known.iter().filter(|k| is(k.0, k.1, least)).count() > known.len();
-        if half(|short, deviation, least| short > least && short > SURE * deviation) {
+        if half(|short, deviation, least| short > least && short > SHORT_DEVIATIONS * deviation) {
             2
         } else {
-            u8::from(half(|short, _, least| short > WEAK * least))
+            u8::from(half(|short, _, least| short > WEAK_SHARE * least))
         }
     };
     let verdicts: BTreeMap<u32, u8> = short.keys().map(|&v| (v, verdict(v))).collect();
@@ -56,8 +57,8 @@ pub(super) fn split(
     let (sure, unsure): (Vec<_>, Vec<_>) = pieces(lines.mesh, &weak).into_iter().partition(is_sure);
     let mut round = sure.concat();
     sharp.extend(unsure.concat());
-    join_short(lines.mesh, &mut round, &mut sharp, ALONG * scale.cell);
-    join_short(lines.mesh, &mut sharp, &mut round, ALONG * scale.cell);
+    join_short(lines.mesh, &mut round, &mut sharp, DECIDING_CELLS * scale.cell);
+    join_short(lines.mesh, &mut sharp, &mut round, DECIDING_CELLS * scale.cell);
     [sharp, round]
 }
 
@@ -98,7 +99,7 @@ fn shortfall(lines: &Lines, flanks: &[Flank]) -> Option<(f64, f64)> {
 
 /// Way of a vertex to where planes beside it meet: each with its unit normal, and how far outside the vertex is.
 pub(super) fn meet(planes: impl IntoIterator<Item = (DVec3, f64)>) -> DVec3 {
-    let (mut matrix, mut rhs) = (DMat3::from_diagonal(DVec3::splat(DAMPING)), DVec3::ZERO);
+    let (mut matrix, mut rhs) = (DMat3::from_diagonal(DVec3::splat(MEETING_DAMPING)), DVec3::ZERO);
     for (n, off) in planes {
         matrix += DMat3::from_cols(n * n.x, n * n.y, n * n.z);
         rhs -= n * off;
@@ -115,13 +116,13 @@ pub(super) fn smoothed(lines: &Lines, round: &[[u32; 2]], scale: &ScanScale) -> 
     let mut seen = Seen::new(mesh.triangles.len());
     for e in round {
         let [a, b] = e.map(|v| mesh.points[v as usize]);
-        let reach = BESIDE * scale.cell + a.distance(b);
+        let reach = SMOOTHED_CELLS * scale.cell + a.distance(b);
         let near = |t: u32| mesh.corners(t as usize).iter().any(|p| p.distance(a) < reach);
         for v in lines.grow(&lines.star(e[0]), &mut seen, near).into_iter().flat_map(|t| mesh.triangles[t as usize]) {
             let p = mesh.points[v as usize];
             let t = ((p - a).dot(b - a) / a.distance_squared(b)).clamp(0.0, 1.0);
             let off = p.distance(a.lerp(b, t));
-            let known = nearest.entry(v).or_insert((BESIDE * scale.cell, DVec3::ZERO));
+            let known = nearest.entry(v).or_insert((SMOOTHED_CELLS * scale.cell, DVec3::ZERO));
             if off < known.0 {
                 *known = (off, b - a);
             }
@@ -137,7 +138,7 @@ pub(super) fn smoothed(lines: &Lines, round: &[[u32; 2]], scale: &ScanScale) -> 
 fn surface(lines: &Lines, v: u32, along: DVec3, scale: &ScanScale, seen: &mut Seen) -> Option<Plane> {
     let at = lines.mesh.points[v as usize];
     let star = lines.star(v);
-    let [across, length] = WINDOW;
+    let [across, length] = SMOOTHING_WINDOW_CELLS;
     let near = lines.grow(&star, seen, |f| lines.centers[f as usize].distance(at) < across * scale.cell);
     let outwards = near.iter().map(|&f| lines.areas[f as usize]).sum::<DVec3>().try_normalize()?;
     let y = (along - outwards * outwards.dot(along)).try_normalize()?;

@@ -16,14 +16,14 @@ use glam::{DMat3, DVec3};
 
 /// Largest angle between a patch's own normal and the mean of its sector, radians: beyond it (the tip of a sharp
 /// cone) there is no tangent plane, and the corner stays as it is.
-const SPREAD: f64 = 1.3;
+const MOST_SECTOR_ANGLE: f64 = 1.3;
 /// Sine between two features of a sector above which they span its plane themselves.
-const SPAN: f64 = 0.5;
+const SPANNING_SINE: f64 = 0.5;
 /// How far a plane spanned by features may lean from the mean of the tangent planes, cosine.
-const LEAN: f64 = 0.8;
+const LEAN_COSINE: f64 = 0.8;
 /// Largest turn of the normal within the first knot span, radians: more cannot be told from noise. Seams are not
 /// made to bend by it then, and the normals turn by this much.
-const TURN: f64 = 1.0;
+const MOST_SPAN_TURN: f64 = 1.0;
 /// Angles that a patch may have between its sides at a corner within smooth seams, radians: 20 to 160 degrees. At 0 and
 /// 180 it has no normal there, beyond them the normal points inwards.
 const WEDGE: std::ops::RangeInclusive<f64> = 0.35..=2.79;
@@ -234,16 +234,16 @@ fn plane(network: &Network, sector: &[&Wedge], ends: &[(usize, usize)], curves: 
         [a, b] => {
             let across = a.cross(b);
             let spanned = across.normalize_or_zero() * across.dot(mean).signum();
-            if across.length() > SPAN && spanned.dot(mean) > LEAN {
+            if across.length() > SPANNING_SINE && spanned.dot(mean) > LEAN_COSINE {
                 spanned
             } else {
                 let along = (a - b).normalize_or_zero();
-                (mean - along * along.dot(mean)).try_normalize().filter(|n| n.dot(mean) > LEAN).unwrap_or(mean)
+                (mean - along * along.dot(mean)).try_normalize().filter(|n| n.dot(mean) > LEAN_COSINE).unwrap_or(mean)
             }
         }
         _ => mean,
     };
-    if sector.iter().any(|w| w.normal != DVec3::ZERO && w.normal.dot(normal) < SPREAD.cos()) {
+    if sector.iter().any(|w| w.normal != DVec3::ZERO && w.normal.dot(normal) < MOST_SECTOR_ANGLE.cos()) {
         return None;
     }
     let (x, y) = normal.any_orthonormal_pair();
@@ -274,7 +274,7 @@ fn plane(network: &Network, sector: &[&Wedge], ends: &[(usize, usize)], curves: 
         .iter()
         .map(|&(c, e)| plane.turn(end_derivatives(&curves[c], e).0).length() / (curves[c].len() - 3) as f64)
         .fold(0.0, f64::max);
-    plane.credible = steepest <= TURN;
-    plane.form *= (TURN / steepest).min(1.0);
+    plane.credible = steepest <= MOST_SPAN_TURN;
+    plane.form *= (MOST_SPAN_TURN / steepest).min(1.0);
     plane.form.is_finite().then_some(plane)
 }

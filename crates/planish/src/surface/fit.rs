@@ -20,7 +20,7 @@ pub const FEWEST_CONTROL: usize = 4;
 
 /// Points per block of a row that are summed up together: four rows of data and four of sums stay in the
 /// first-level cache.
-const BLOCK: usize = 128;
+const POINTS_PER_BLOCK: usize = 128;
 
 /// Fits a clamped uniform bicubic B-spline to a grid of points.
 ///
@@ -179,8 +179,8 @@ pub(crate) fn project_rows(points: &[DVec3], width: usize, basis: &BasisRows, co
         let (r0, rest) = out[first * width..(first + 4) * width].split_at_mut(width);
         let (r1, rest) = rest.split_at_mut(width);
         let (r2, r3) = rest.split_at_mut(width);
-        for start in (0..width).step_by(BLOCK) {
-            let block = start..(start + BLOCK).min(width);
+        for start in (0..width).step_by(POINTS_PER_BLOCK) {
+            let block = start..(start + POINTS_PER_BLOCK).min(width);
             let sums = [&mut r0[block.clone()], &mut r1[block.clone()], &mut r2[block.clone()], &mut r3[block.clone()]];
             sum_block(sums, &points[j * width..(j + span) * width], width, block, &basis.weights[j..j + span]);
         }

@@ -13,10 +13,10 @@ use glam::DVec3;
 /// Samples per knot span: the normal of a cubic span turns over at most a few times.
 const SPAN_SAMPLES: usize = 4;
 /// Knot spans to each side over which the grid's normal is averaged: what a surface can follow.
-const REACH: f64 = 1.0;
+const NORMAL_SPANS: f64 = 1.0;
 /// Cosine between the two normals below which a place counts as folded: the mean normal leads and lags the surface
 /// on tight bends, but never by a right angle.
-const TURNED: f64 = 0.0;
+const FOLD_COSINE: f64 = 0.0;
 /// Cosine below which a surface's normal is not believed when its seams are to follow it.
 const CREDIBLE: f64 = 0.5;
 /// Relative length of `S_u x S_v` below which there is no normal: corners with an angle of 0 or 180 degrees.
@@ -48,7 +48,7 @@ pub fn folds(surface: &Surface, grid: &Grid) -> usize {
             if area.length() <= FLAT * du.length() * dv.length() {
                 continue;
             }
-            if area.dot(means.at(u, v)) < TURNED * area.length() {
+            if area.dot(means.at(u, v)) < FOLD_COSINE * area.length() {
                 count += 1;
             }
         }
@@ -77,7 +77,8 @@ impl MeanNormals {
                 sums[j * cols + i] = sums[(j - 1) * cols + i] + row;
             }
         }
-        let reach = |count: usize, control: usize| (REACH * (count - 1) as f64 / (control - 3) as f64).ceil() as usize;
+        let reach =
+            |count: usize, control: usize| (NORMAL_SPANS * (count - 1) as f64 / (control - 3) as f64).ceil() as usize;
         MeanNormals { cols, rows, reach: [reach(cols, control[0]), reach(rows, control[1])], sums }
     }
 

@@ -21,7 +21,7 @@ use glam::DVec3;
 
 /// Corners and middles of sides nearer to the mirror image of others than this share of the diagonal are their images:
 /// far above what a scan lacks of symmetry, far below the size of a patch.
-const SAME: f64 = 5e-3;
+const SAME_PLACE: f64 = 5e-3;
 /// A control point next to the plane keeps at least this share of its distance from the boundary: where a patch runs
 /// into the plane at a flat angle its surface would turn over there.
 const LEAST_AWAY: f64 = 0.2;
@@ -76,7 +76,7 @@ struct Matched {
 
 impl Matched {
     fn new(mesh: &TriMesh, network: &Network, plane: &Plane) -> Option<Matched> {
-        let same = SAME * mesh.bounds().diagonal();
+        let same = SAME_PLACE * mesh.bounds().diagonal();
         let corners: Vec<DVec3> = network.corners.iter().map(|c| c.place.position(mesh)).collect();
         let images: Vec<usize> =
             corners.iter().map(|p| nearest(&corners, plane.mirror(*p), same)).collect::<Option<_>>()?;

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Rounds that may raise the counts after the first choice: the fixed boundaries cost little, so that two do.
-const ROUNDS: usize = 3;
+const COUNT_ROUNDS: usize = 3;
 
 /// Weights of the smoothing that folded patches get, one after the other until they are open: from a tenth of what
 /// the nodes weigh to a surface that is all but the blend of its boundary curves, which stay.
@@ -83,7 +83,7 @@ pub fn fit_network(
     };
     let mut surfaces = fit(&counts, &smoothing)?;
     if let &Resolution::Tolerance(fraction) = &params.resolution {
-        for _ in 0..ROUNDS {
+        for _ in 0..COUNT_ROUNDS {
             let over: Vec<bool> =
                 surfaces.par_iter().zip(grids).map(|(s, g)| deviation_of(s, g).rms > fraction * size).collect();
             let mut raised = counts.clone();

@@ -16,7 +16,7 @@ use glam::DVec3;
 
 /// Cosine above which the two planes beside a feature count as one: their own line of intersection would be no
 /// direction for the curve any more.
-const ALIKE: f64 = 0.94;
+const ONE_PLANE_COSINE: f64 = 0.94;
 /// Fewest control points of a curve that is asked to bend as its planes say: each end takes two besides the corner,
 /// and a shorter curve would have nothing left to follow its nodes with.
 const FEWEST_BENT: usize = 6;
@@ -26,7 +26,7 @@ const DAMPING: f64 = 1e-7;
 /// bent more than that turn their patches over.
 const LEEWAY: f64 = 0.6;
 /// Conditions depend on the direction that they change a little; the second pass sees to that.
-const PASSES: usize = 2;
+const DIRECTION_PASSES: usize = 2;
 /// Samples per knot span of a field of normals, enough for its cubic and the products with cubics.
 pub(crate) const SPAN_SAMPLES: usize = 6;
 
@@ -57,7 +57,7 @@ pub(crate) fn constrain(
     }
     // Without the bends if those distort the curve, as it was if its tangents would.
     for bent in [bends, false] {
-        for _ in 0..PASSES {
+        for _ in 0..DIRECTION_PASSES {
             moved = meet(curve, &conditions(index, &moved, &planes, bent), direction);
         }
         if keeps_shape(curve, &moved) {
@@ -89,7 +89,7 @@ fn conditions(at: usize, curve: &[DVec3], planes: &[Vec<Plane>; 2], bent: bool) 
             });
         };
         if let [a, b] = &planes[..]
-            && a.normal.dot(b.normal) > ALIKE
+            && a.normal.dot(b.normal) > ONE_PLANE_COSINE
         {
             tangency((a.normal + b.normal).normalize());
             continue;

@@ -82,11 +82,11 @@ pub(super) fn steps(length: f64, step: f64) -> usize {
 pub(super) const ROW: f64 = 0.866;
 
 /// Fewest points of a ring: fewer would give needles at poles.
-pub(super) const FEWEST: usize = 6;
+pub(super) const FEWEST_RING_POINTS: usize = 6;
 
 /// Number of points of a ring of the given girth for edges of about `step`.
 pub(super) fn girth_count(girth: f64, step: f64) -> usize {
-    steps(girth, step).max(FEWEST)
+    steps(girth, step).max(FEWEST_RING_POINTS)
 }
 
 /// Grows a strip of rings over a surface of revolution-like `at(s, angle)`, `s` from 0 to 1, starting from

@@ -69,14 +69,14 @@ pub struct VirtualScan {
 /// Distance of a station from the middle, in diagonals: the whole shape is in the picture, and perspective shows.
 const AWAY: f64 = 2.5;
 /// Places where a station may stand, and spots of the surface that tell what it sees there.
-const PLACES: usize = 160;
+const STATION_PLACES: usize = 160;
 const SPOTS: usize = 5_000;
 /// What a station adds to the spots that it sees, of the chance that their hits are kept.
 const MEETINGS: f32 = 1.0;
 /// Pixels along a side of the first look, which tells how many are needed for the points wanted.
 const TRIAL: usize = 64;
 /// Pixels along a side at most.
-const MOST: usize = 16_384;
+const MOST_PIXELS: usize = 16_384;
 /// Hits flatter than the first angle begin to get lost, beyond the second all are, degrees from the normal.
 const GRAZE_DEG: [f64; 2] = [70.0, 85.0];
 /// Spots looked at for one whose normal is like that of a hit, and the cosine between those.
@@ -84,7 +84,7 @@ const AROUND: usize = 12;
 const ALIKE: f64 = 0.8;
 /// Places are thinned to this many times the density of those that are seen least, this part of the surface: a bore keeps
 /// far fewer points than the face around it even so.
-const EVEN: f64 = 2.0;
+const EVEN_DENSITY: f64 = 2.0;
 const LEAST_SEEN: f64 = 0.05;
 /// Random numbers per pixel.
 const DRAWS: u64 = 8;
@@ -97,7 +97,7 @@ pub fn virtual_scan(
     params: &ScannerParams,
     observer: &dyn Observer,
 ) -> Result<VirtualScan, CloudError> {
-    let nothing = CloudError::TooFew { given: 0, distinct: 0, needed: crate::cloud::FEWEST };
+    let nothing = CloudError::TooFew { given: 0, distinct: 0, needed: crate::cloud::FEWEST_POINTS };
     if truth.triangles.is_empty() || params.stations == 0 {
         return Err(nothing);
     }
@@ -116,7 +116,7 @@ pub fn virtual_scan(
         return Err(nothing);
     }
     let wanted = (params.points.max(1) as f64 / seen).sqrt() * TRIAL as f64;
-    let pixels = (wanted.round() as usize).clamp(8, MOST);
+    let pixels = (wanted.round() as usize).clamp(8, MOST_PIXELS);
     let mut scan = VirtualScan::default();
     for (k, station) in stations.iter().enumerate() {
         observer.check()?;
@@ -152,9 +152,9 @@ fn chosen(
     let bounds = truth.bounds();
     let (center, size) = (bounds.center(), bounds.diagonal());
     let start = TAU * random::unit(params.seed, u64::MAX);
-    let places: Vec<DVec3> = (0..PLACES)
+    let places: Vec<DVec3> = (0..STATION_PLACES)
         .map(|k| {
-            let height = 1.0 - (2 * k + 1) as f64 / PLACES as f64;
+            let height = 1.0 - (2 * k + 1) as f64 / STATION_PLACES as f64;
             let (sin, cos) = (PI * (1.0 + 5f64.sqrt()) * k as f64 + start).sin_cos();
             let flat = (1.0 - height * height).sqrt();
             DVec3::new(flat * cos, flat * sin, height)
@@ -199,7 +199,7 @@ fn chosen(
             let gain = |k: usize| chances[k].iter().zip(&seen).map(|(c, s)| (c - s).max(0.0) as f64).sum::<f64>();
             // Where nothing new is to be seen the stations fall back to an even spread.
             let even = |k: usize| 1e-9 * random::unit(params.seed ^ 2, k as u64);
-            let best = (0..PLACES)
+            let best = (0..STATION_PLACES)
                 .map(|k| (gain(k) + even(k), k))
                 .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))
                 .map_or(0, |b| b.1);
@@ -227,7 +227,7 @@ impl Thinning {
     fn new(spots: Vec<(DVec3, DVec3)>, density: Vec<f64>) -> Thinning {
         let mut sorted: Vec<f64> = density.iter().copied().filter(|&d| d > 0.0).collect();
         sorted.sort_unstable_by(f64::total_cmp);
-        let even = sorted.get((LEAST_SEEN * sorted.len() as f64) as usize).map_or(1.0, |d| EVEN * d);
+        let even = sorted.get((LEAST_SEEN * sorted.len() as f64) as usize).map_or(1.0, |d| EVEN_DENSITY * d);
         let keep = density.into_iter().map(|d| if d > even { even / d } else { 1.0 }).collect();
         let (points, normals): (Vec<DVec3>, Vec<DVec3>) = spots.into_iter().unzip();
         Thinning { tree: KdTree::new(&points), normals, keep }

@@ -6,12 +6,12 @@
 //! lie high to the other, and the faces, each fitted to what is left, meet at too sharp an angle. See
 //! `docs/methods/samples.md`, section 6.
 
-use crate::cloud::local::joints::LIMIT;
-use crate::cloud::local::nest::{self, MOST};
+use crate::cloud::local::joints::RESIDUAL_LIMIT;
+use crate::cloud::local::nest::{self, MOST_NESTED};
 use glam::DVec3;
 
 /// Sheets whose angle has a lesser sine than this do not meet.
-const PARALLEL: f64 = 1e-3;
+const PARALLEL_SINE: f64 = 1e-3;
 
 /// A sheet that a point may be of.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,8 +28,8 @@ pub(crate) struct Chances<'a> {
     /// Signed distance of every point to each sheet, in noise levels.
     rows: Vec<&'a [f64]>,
     /// Cosines between the normals of the sheets, and what a distance to one sheet counts along another.
-    turn: [[f64; MOST]; MOST],
-    stretch: [[f64; MOST]; MOST],
+    turn: [[f64; MOST_NESTED]; MOST_NESTED],
+    stretch: [[f64; MOST_NESTED]; MOST_NESTED],
     concave: u8,
 }
 
@@ -38,16 +38,16 @@ impl<'a> Chances<'a> {
     /// * `concave` - bit k: sheet k is joined by the minimum, else by the maximum
     pub fn new(sheets: impl Iterator<Item = (&'a [f64], DVec3)>, concave: u8) -> Chances<'a> {
         let (rows, normals): (Vec<&[f64]>, Vec<DVec3>) = sheets.unzip();
-        let mut turn = [[0.0; MOST]; MOST];
+        let mut turn = [[0.0; MOST_NESTED]; MOST_NESTED];
         for (row, a) in turn.iter_mut().zip(&normals) {
             row.iter_mut().zip(&normals).for_each(|(turn, b)| *turn = a.dot(*b));
         }
-        let stretch = turn.map(|row| row.map(|c| 1.0 / (1.0 - c * c).max(PARALLEL * PARALLEL).sqrt()));
+        let stretch = turn.map(|row| row.map(|c| 1.0 / (1.0 - c * c).max(PARALLEL_SINE * PARALLEL_SINE).sqrt()));
         Chances { rows, turn, stretch, concave }
     }
 
     /// How far inside of sheet `k` the foot on it lies of a point with these distances.
-    fn inside(&self, k: usize, at: &[f64; MOST]) -> f64 {
+    fn inside(&self, k: usize, at: &[f64; MOST_NESTED]) -> f64 {
         let is_least = |j: usize| self.concave >> j & 1 == 1;
         let foot = |j: usize| at[j] - at[k] * self.turn[j][k];
         let mut inside = f64::INFINITY;
@@ -62,21 +62,21 @@ impl<'a> Chances<'a> {
     }
 
     /// The sheets that point `q` may be of.
-    fn of(&self, q: usize) -> ([Chance; MOST], usize) {
-        let mut at = [0.0; MOST];
+    fn of(&self, q: usize) -> ([Chance; MOST_NESTED], usize) {
+        let mut at = [0.0; MOST_NESTED];
         at.iter_mut().zip(&self.rows).for_each(|(a, row)| *a = row[q]);
-        let (mut found, mut count) = ([Chance::default(); MOST], 0);
-        let near = |k: &usize| at[*k].abs() < LIMIT;
+        let (mut found, mut count) = ([Chance::default(); MOST_NESTED], 0);
+        let near = |k: &usize| at[*k].abs() < RESIDUAL_LIMIT;
         if (0..self.rows.len()).filter(near).count() < 2 {
             // Far from edges the sheet that decides has the point.
             let (k, d) = nest::joined(at[..self.rows.len()].iter().copied(), self.concave);
             found[0] = Chance { sheet: k, square: d * d, inside: 1.0 };
-            return (found, usize::from(d.abs() < LIMIT));
+            return (found, usize::from(d.abs() < RESIDUAL_LIMIT));
         }
         for k in (0..self.rows.len()).filter(near) {
             let inside = self.inside(k, &at);
-            if inside > -LIMIT {
-                let inside = if inside < LIMIT { below(inside) } else { 1.0 };
+            if inside > -RESIDUAL_LIMIT {
+                let inside = if inside < RESIDUAL_LIMIT { below(inside) } else { 1.0 };
                 found[count] = Chance { sheet: k, square: at[k] * at[k], inside };
                 count += 1;
             }
@@ -158,7 +158,7 @@ mod tests {
             };
             let [first, second] = &rows;
             let by_share = near(Chances::new(sheets(), u8::from(concave) << 1).shares().swap_remove(0));
-            let decides = |(a, b): (&f64, &f64)| ((*a < *b) == concave && a.abs() < LIMIT) as u8 as f64;
+            let decides = |(a, b): (&f64, &f64)| ((*a < *b) == concave && a.abs() < RESIDUAL_LIMIT) as u8 as f64;
             let by_side = near(first.iter().zip(second).map(decides).collect());
             let tilts = [by_share, by_side].map(|w| slope(&w, &along, first).abs());
             assert!(tilts[0] < 0.1 && tilts[1] > 0.5, "{angle} {concave}: {tilts:?}");

@@ -15,13 +15,13 @@ mod rim;
 mod step;
 
 use super::blend::Reach;
-use super::cells::refine::{Nested, WIDEST, explained};
+use super::cells::refine::{Nested, WIDEST_BALL, explained};
 use super::cells::rim::rim;
 use super::cells::step::{is_alike, step};
-use super::local::joints::{LIMIT, capped, nearest_cost};
+use super::local::joints::{RESIDUAL_LIMIT, capped, nearest_cost};
 use super::local::nest::{self, Seen, cost, nest};
 use super::local::points::Points;
-use super::sites::front::{PRICE, VARIATION_PRICE};
+use super::sites::front::{SHEET_PRICE, VARIATION_PRICE};
 use super::sites::{Sites, in_pieces};
 use super::{Blend, Quadric, Sample};
 use crate::geom::{Aabb, KdTree};
@@ -35,26 +35,26 @@ const HEARD: f64 = 1.3;
 /// And it takes part in the blend within so many: nearly as far as its points.
 const BLENDED: f64 = 1.2;
 /// Most sheets of a cell.
-const MOST: usize = nest::MOST;
+const MOST_SHEETS: usize = nest::MOST_NESTED;
 /// Samples within this many supports are candidates.
-const ASIDE: f64 = 2.0;
+const CANDIDATE_SUPPORTS: f64 = 2.0;
 /// Passes over all cells: the second chooses among what the first has found, but for cells whose points cost less than this
 /// each, in squared noise levels. They hardly ever find better ones.
-const PASSES: usize = 2;
+const CELL_PASSES: usize = 2;
 const KEPT: f64 = 1.2;
 /// The middle of the points of a cell is at most this many supports from its surface: at a corner of 90 degrees a tenth.
-const AWAY: f64 = 0.25;
+const MIDDLE_OFF_SUPPORTS: f64 = 0.25;
 /// Squared bias of a cell in the blend for the cost of its points beyond one.
 const BIAS: f64 = 0.5;
 /// Points of a cell at most: these many tell the sheets apart.
-const ENOUGH: usize = 200;
+const MOST_CELL_POINTS: usize = 200;
 /// And at most of the widest ball that sheets are fitted again to: they leave a tenth of the noise to chance.
-const PLENTY: usize = 1000;
+const MOST_BALL_POINTS: usize = 1000;
 /// Candidates at most.
-const ASKED: usize = 16;
+const MOST_CANDIDATES: usize = 16;
 /// A cell with one sheet is taken as it is if its points cost at most this much each, in squared noise levels, and what
 /// chance adds.
-const PLAIN: f64 = 1.05;
+const ONE_SHEET_COST: f64 = 1.05;
 /// Steps are looked for where points cost more than this each, in squared noise levels.
 const UNEXPLAINED: f64 = 1.3;
 /// A higher sheet, the wall joined by the maximum, the lower one by the minimum.
@@ -73,7 +73,7 @@ pub struct Cell {
     /// Weight in the blend.
     pub trust: f64,
     /// The sheets, positive outside; the first `count` hold.
-    pub sheets: [Quadric; MOST],
+    pub sheets: [Quadric; MOST_SHEETS],
     /// Number of sheets.
     pub count: u8,
     /// Bit k: sheet k is joined to those before it by the minimum (a concave edge), else by the maximum (a convex one).
@@ -135,9 +135,9 @@ pub(crate) fn cells(
         |(s, &site): (&Sample, &u32)| Candidate { quadric: s.quadric, at: s.center, error: s.error, owner: site };
     let mut candidates: Vec<Candidate> = samples.iter().zip(of_site).map(candidate).collect();
     let mut made: Vec<Option<Found>> = vec![None; places.len()];
-    for pass in 0..PASSES {
+    for pass in 0..CELL_PASSES {
         let around = KdTree::new(&candidates.iter().map(|c| c.at).collect::<Vec<_>>());
-        let span = [pass, pass + 1].map(|k| k as f64 / PASSES as f64);
+        let span = [pass, pass + 1].map(|k| k as f64 / CELL_PASSES as f64);
         let before = &made;
         let fresh = in_pieces(places.len(), (span[0], span[1]), observer, |s, site| {
             let old = &before[site];
@@ -169,8 +169,8 @@ pub(crate) fn cells(
 }
 
 /// How far beside a cell its neighbours are asked, in noise levels, and how sure they must be of the other side.
-const BESIDE: f64 = 3.0;
-const SURE: f64 = 1.0;
+const VOTE_REACH_NOISE: f64 = 3.0;
+const VOTE_MARGIN_NOISE: f64 = 1.0;
 /// What is left of the trust of a cell that they contradict, and rounds.
 const OUTVOTED: f64 = 1e-3;
 const VOTES: usize = 3;
@@ -190,13 +190,13 @@ fn outvoted(cells: Vec<Cell>, noise: &[f64]) -> Vec<Cell> {
                 let mut cell = cells[i];
                 let (d, n) = cell.evaluate(cell.center);
                 let foot = cell.center - d * n;
-                let contradicted = [-BESIDE, BESIDE].into_iter().any(|side| {
+                let contradicted = [-VOTE_REACH_NOISE, VOTE_REACH_NOISE].into_iter().any(|side| {
                     let p = foot + side * noise[i] * n;
                     let own = cell.evaluate(p).0;
                     let weight = if cell.count > 1 { now[i].weight(p) } else { 0.0 };
                     blend.at(p).is_some_and(|all| {
                         let others = (all.mean * all.weight - own * weight) / (all.weight - weight);
-                        others * own < 0.0 && others.abs() > SURE * noise[i]
+                        others * own < 0.0 && others.abs() > VOTE_MARGIN_NOISE * noise[i]
                     })
                 });
                 cell.trust *= if contradicted { OUTVOTED } else { 1.0 };
@@ -246,12 +246,12 @@ impl Found {
     /// Is the surface where the points of the site are? Those of a stray are not.
     fn at_home(&self, place: &Place) -> bool {
         let off = joined(&self.sheets, self.concave, place.center).1.abs();
-        off < (LIMIT * place.noise).max(AWAY * place.support)
+        off < (RESIDUAL_LIMIT * place.noise).max(MIDDLE_OFF_SUPPORTS * place.support)
     }
 
     fn cell(&self, place: &Place) -> Cell {
         let support = BLENDED * place.support;
-        let mut sheets = [self.sheets[0].0; MOST];
+        let mut sheets = [self.sheets[0].0; MOST_SHEETS];
         sheets.iter_mut().zip(&self.sheets).for_each(|(s, f)| *s = f.0.sharpened(f.1, place.noise));
         let error = self.sheets.iter().map(|s| s.2 * s.2).sum::<f64>() / self.sheets.len() as f64;
         // What the points show beyond noise is bias of the cell.
@@ -278,12 +278,12 @@ fn find(
     scratch: &mut Vec<DVec3>,
 ) -> Option<Found> {
     let &Place { center, support, noise } = place;
-    let ball = around_place(center, HEARD * support, ENOUGH, tree, scratch);
+    let ball = around_place(center, HEARD * support, MOST_CELL_POINTS, tree, scratch);
     let count = ball.len().max(1) as f64;
     let residuals = |q: &Quadric| ball.levels(q, noise);
     // Candidates, those of the site first, then by distance.
-    let mut near: Vec<(f64, u32)> = Vec::with_capacity(4 * ASKED);
-    around.within(center, ASIDE * support, |i, _, d2| {
+    let mut near: Vec<(f64, u32)> = Vec::with_capacity(4 * MOST_CANDIDATES);
+    around.within(center, CANDIDATE_SUPPORTS * support, |i, _, d2| {
         near.push((if candidates[i as usize].owner == site { 0.0 } else { d2 }, i));
     });
     near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -292,7 +292,7 @@ fn find(
     {
         let c = &candidates[first.1 as usize];
         let total = cost(&residuals(&c.quadric));
-        if c.owner == site && total < PLAIN * count + count.sqrt() {
+        if c.owner == site && total < ONE_SHEET_COST * count + count.sqrt() {
             let sheets = vec![(c.quadric, c.at, c.error)];
             return Some(Found { sheets, concave: 0, total, cost: total / count });
         }
@@ -306,7 +306,7 @@ fn find(
         if !known && d.abs() < support {
             asked.push(c);
             seen.push((d, n));
-            if asked.len() == ASKED {
+            if asked.len() == MOST_CANDIDATES {
                 break;
             }
         }
@@ -318,11 +318,11 @@ fn find(
         .iter()
         .zip(&seen)
         .map(|(c, s)| {
-            let price = PRICE + VARIATION_PRICE * c.quadric.variation(c.at, HEARD * support);
+            let price = SHEET_PRICE + VARIATION_PRICE * c.quadric.variation(c.at, HEARD * support);
             Seen { residuals: residuals(&c.quadric), normal: s.1, price }
         })
         .collect();
-    let found = nest(&all, false, MOST)?;
+    let found = nest(&all, false, MOST_SHEETS)?;
     let mut nested = Nested {
         sheets: found.order.iter().map(|&k| asked[k].sheet()).collect(),
         prices: found.order.iter().map(|&k| all[k].price).collect(),
@@ -332,13 +332,13 @@ fn find(
     // What the site has found before is refined already.
     let known = again && found.order.iter().all(|&k| asked[k].owner == site);
     if nested.sheets.len() > 1 && !known {
-        let wide = around_place(center, WIDEST * HEARD * support, PLENTY, tree, scratch);
+        let wide = around_place(center, WIDEST_BALL * HEARD * support, MOST_BALL_POINTS, tree, scratch);
         nested.refine(place, HEARD * support, &ball, wide);
     }
     let Nested { mut sheets, prices, mut concave, cost: mut spent } = nested;
     // A plate ends where its points do: no sheet says so, if it is as thin as the noise.
     let found = sheets.len();
-    while found > 1 && sheets.len() < MOST {
+    while found > 1 && sheets.len() < MOST_SHEETS {
         let bare: Vec<Quadric> = sheets.iter().map(|s| s.0).collect();
         let Some(end) = rim(&bare, concave, center, HEARD * support, &ball, noise) else { break };
         concave |= u8::from(end.groove) << sheets.len();
@@ -369,7 +369,7 @@ fn stepped(
         if !is_alike([i, j].map(|k| seen[k].normal)) {
             continue;
         }
-        let price = seen[i].price + seen[j].price + PRICE;
+        let price = seen[i].price + seen[j].price + SHEET_PRICE;
         // Hardly a point is explained by the wall alone.
         if nearest_cost(&[&squares[i], &squares[j]], least - price) + price >= least {
             continue;

@@ -15,13 +15,13 @@ use crate::cloud::local::points::Points;
 use glam::DVec3;
 
 /// A sheet is fitted again to at least this many points of its own: twice the parameters of a height field.
-const FEWEST: f64 = 12.0;
+const FEWEST_OWN_POINTS: f64 = 12.0;
 /// A point of which a sheet has a lesser share is none of its own.
-const FELT: f64 = 0.01;
+const LEAST_SHARE: f64 = 0.01;
 /// Rounds, and the balls that are tried in the first, over that whose points are asked.
-const ROUNDS: usize = 3;
-const WIDTHS: [f64; 3] = [1.0, 1.5, WIDEST];
-pub(crate) const WIDEST: f64 = 2.2;
+const REFIT_ROUNDS: usize = 3;
+const BALL_WIDTHS: [f64; 3] = [1.0, 1.5, WIDEST_BALL];
+pub(crate) const WIDEST_BALL: f64 = 2.2;
 
 /// Sheets that are joined.
 pub(crate) struct Nested {
@@ -38,12 +38,12 @@ pub(crate) struct Nested {
 impl Nested {
     /// Fits the sheets again, and drops those that then explain less than their prices.
     /// * `radius`, `ball` - the ball whose points are asked, and these
-    /// * `wide` - points within [`WIDEST`] radii
+    /// * `wide` - points within [`WIDEST_BALL`] radii
     pub fn refine(&mut self, place: &Place, radius: f64, ball: &Points, mut wide: Points) {
         let mut seen = look(&self.sheets, place, ball);
         let mut least = worth(&seen, self.concave);
-        let mut widths = WIDTHS.to_vec();
-        for _ in 0..ROUNDS {
+        let mut widths = BALL_WIDTHS.to_vec();
+        for _ in 0..REFIT_ROUNDS {
             let own = own(&self.sheets, self.concave, place, &wide);
             let tried = widths.iter().map(|&width| {
                 let better = refined(&self.sheets, place, width * radius, &own);
@@ -133,7 +133,7 @@ fn own(sheets: &[Sheet], concave: u8, place: &Place, points: &Points) -> Vec<Vec
     let seen = look(sheets, place, points);
     let shares = Chances::new(seen.iter().map(|s| (&s.residuals[..], s.normal)), concave).shares();
     let of = |row: &Vec<f64>| {
-        let felt = points.iter().zip(row).filter(|x| *x.1 > FELT);
+        let felt = points.iter().zip(row).filter(|x| *x.1 > LEAST_SHARE);
         felt.map(|(p, &share)| (p - place.center, share)).collect()
     };
     shares.iter().map(of).collect()
@@ -159,7 +159,7 @@ fn refined(sheets: &[Sheet], place: &Place, radius: f64, own: &[Vec<(DVec3, f64)
                     count += share;
                 }
             }
-            if count < FEWEST {
+            if count < FEWEST_OWN_POINTS {
                 return *old;
             }
             let noise = place.noise / radius;

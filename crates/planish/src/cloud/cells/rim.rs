@@ -11,19 +11,19 @@ use crate::cloud::local::points::Points;
 use glam::DVec3;
 
 /// Two sheets are the sides of a plate if the angle between their normals is above 135 degrees.
-const FACING: f64 = -0.7;
+const PLATE_COSINE: f64 = -0.7;
 /// Places on each sheet.
-const PLACES: usize = 96;
+const PLACES_PER_SHEET: usize = 96;
 /// Directions that are tried, and rounds that halve the angle between them.
-const DIRECTIONS: usize = 24;
-const ROUNDS: usize = 4;
+const RIM_DIRECTIONS: usize = 24;
+const ANGLE_HALVINGS: usize = 4;
 /// Points that must be missing, and share of the places without: chance leaves no such gap.
-const MISSING: f64 = 20.0;
-const BARE: f64 = 0.12;
+const FEWEST_MISSING: f64 = 20.0;
+const BARE_SHARE: f64 = 0.12;
 /// A place lies on the surface if the nesting is this close to zero, in noise levels.
-const ON: f64 = 0.25;
+const ON_SURFACE_NOISE: f64 = 0.25;
 /// The density is that of what lies deeper than this many noise levels below the last point.
-const DEEP: f64 = 5.0;
+const DEEP_NOISE: f64 = 5.0;
 
 /// Where two sheets end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +52,7 @@ pub(crate) fn rim(
     let normals: Vec<DVec3> = sheets.iter().map(|s| s.distance(center).1).collect();
     let facing = (1..sheets.len()).flat_map(|k| (0..k).map(move |j| (j, k)));
     let (a, b) = facing.min_by(|p, q| normals[p.0].dot(normals[p.1]).total_cmp(&normals[q.0].dot(normals[q.1])))?;
-    if normals[a].dot(normals[b]) > FACING {
+    if normals[a].dot(normals[b]) > PLATE_COSINE {
         return None;
     }
     let across = (normals[a] - normals[b]).normalize();
@@ -61,13 +61,13 @@ pub(crate) fn rim(
     let surface: Vec<DVec3> = [a, b]
         .into_iter()
         .flat_map(|k| {
-            (0..PLACES).filter_map(move |i| {
+            (0..PLACES_PER_SHEET).filter_map(move |i| {
                 // Vogel's spiral: equal areas.
-                let r = radius * ((i as f64 + 0.5) / PLACES as f64).sqrt();
+                let r = radius * ((i as f64 + 0.5) / PLACES_PER_SHEET as f64).sqrt();
                 let (s, c) = (i as f64 * 2.399_963_229_728_653).sin_cos();
                 let foot = sheets[k].project(center + r * (c * u + s * v)).0;
                 let (own, value) = nest::joined(sheets.iter().map(|q| q.distance(foot).0), concave);
-                let on = own == k || value.abs() < ON * noise;
+                let on = own == k || value.abs() < ON_SURFACE_NOISE * noise;
                 (on && foot.distance(center) < radius).then_some(foot)
             })
         })
@@ -78,26 +78,26 @@ pub(crate) fn rim(
         let end = points.iter().map(|p| w.dot(p)).fold(f64::NEG_INFINITY, f64::max);
         (surface.iter().filter(|s| w.dot(**s) > end).count(), w, end)
     };
-    let turn = std::f64::consts::TAU / DIRECTIONS as f64;
+    let turn = std::f64::consts::TAU / RIM_DIRECTIONS as f64;
     let most = |angles: &mut dyn Iterator<Item = f64>| {
         angles.map(|t| (t, bare(t))).max_by(|p, q| p.1.0.cmp(&q.1.0).then(q.0.total_cmp(&p.0)))
     };
-    let mut best = most(&mut (0..DIRECTIONS).map(|i| i as f64 * turn))?;
-    for round in 1..=ROUNDS {
+    let mut best = most(&mut (0..RIM_DIRECTIONS).map(|i| i as f64 * turn))?;
+    for round in 1..=ANGLE_HALVINGS {
         let step = turn / f64::from(1 << round);
         best = most(&mut [-step, 0.0, step].into_iter().map(|d| best.0 + d))?;
     }
     let (missing, w, end) = best.1;
     let share = missing as f64 / count;
-    if share < BARE || points.len() as f64 * share / (1.0 - share) < MISSING {
+    if share < BARE_SHARE || points.len() as f64 * share / (1.0 - share) < FEWEST_MISSING {
         return None;
     }
-    let deep = end - DEEP * noise;
+    let deep = end - DEEP_NOISE * noise;
     let mut beyond: Vec<f64> = surface.iter().map(|s| w.dot(*s)).filter(|d| *d > deep).collect();
     beyond.sort_unstable_by(f64::total_cmp);
     let last = points.iter().filter(|p| w.dot(*p) > deep).count() as f64;
     let (inside, area) = (points.len() as f64 - last, count - beyond.len() as f64);
-    if inside < MISSING || area < 1.0 {
+    if inside < FEWEST_MISSING || area < 1.0 {
         return None;
     }
     let needed = (last * area / inside).round() as usize;

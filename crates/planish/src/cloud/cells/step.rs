@@ -4,25 +4,25 @@
 //! a point lies on it: the plane through that line upright on both. See `docs/methods/samples.md`, section 6.
 
 use crate::cloud::Quadric;
-use crate::cloud::local::joints::LIMIT;
+use crate::cloud::local::joints::RESIDUAL_LIMIT;
 use crate::cloud::local::nest::Seen;
 use crate::cloud::local::points::Points;
 use glam::DVec3;
 
 /// Sheets of a step face the same way within this cosine (60 degrees).
-const ALIKE: f64 = 0.5;
+const SAME_WAY_COSINE: f64 = 0.5;
 /// Points that each of them must have for its own.
-const OWN: usize = 12;
+const FEWEST_OWN_POINTS: usize = 12;
 /// The wall is so many noise levels high: less is no step.
-const HIGH: f64 = 4.0;
+const LEAST_WALL_NOISE: f64 = 4.0;
 /// Middles of the points of the two are this far from each other, as a share of the ball: .85 for the halves of a disk.
-const ASIDE: f64 = 0.4;
+const LEAST_APART_RADII: f64 = 0.4;
 /// Share of the points that lie on the wrong side of the wall at most, and of each side that does not say where it is.
 const ASTRAY: f64 = 0.04;
 /// Directions of the wall that are tried, each this much from the last, and rounds that halve that.
-const TURNS: i32 = 4;
-const TURN: f64 = 0.25;
-const ROUNDS: usize = 3;
+const WALL_TURNS: i32 = 4;
+const WALL_TURN: f64 = 0.25;
+const TURN_HALVINGS: usize = 3;
 
 /// A step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +37,7 @@ pub(crate) struct Step {
 
 /// True if two sheets may be those of a step.
 pub(crate) fn is_alike([a, b]: [DVec3; 2]) -> bool {
-    a.dot(b) >= ALIKE
+    a.dot(b) >= SAME_WAY_COSINE
 }
 
 /// The step between two sheets in a ball of `radius` around `center`, if their points lie on two sides of a line.
@@ -58,18 +58,18 @@ pub(crate) fn step(
     let [a, b] = sheets.map(|s| &s.1.residuals);
     let mut own: [Vec<DVec3>; 2] = Default::default();
     for ((p, x), y) in points.iter().zip(a).zip(b) {
-        match [x.abs() < LIMIT, y.abs() < LIMIT] {
+        match [x.abs() < RESIDUAL_LIMIT, y.abs() < RESIDUAL_LIMIT] {
             [true, false] => own[0].push(p - center),
             [false, true] => own[1].push(p - center),
             _ => {}
         }
     }
-    if own.iter().any(|o| o.len() < OWN) {
+    if own.iter().any(|o| o.len() < FEWEST_OWN_POINTS) {
         return None;
     }
     let [m, n] = [0, 1].map(|k| own[k].iter().sum::<DVec3>() / own[k].len() as f64);
     let between = (n - m).reject_from(up);
-    if between.length() < ASIDE * radius {
+    if between.length() < LEAST_APART_RADII * radius {
         return None;
     }
     let u = between.normalize();
@@ -92,9 +92,9 @@ pub(crate) fn step(
     let mut best_of = |angles: &mut dyn Iterator<Item = f64>| {
         angles.map(|t| (t, wall(t))).min_by(|p, q| p.1.0.cmp(&q.1.0).then(p.0.abs().total_cmp(&q.0.abs())))
     };
-    let mut best = best_of(&mut (-TURNS..=TURNS).map(|i| f64::from(i) * TURN))?;
-    for round in 1..=ROUNDS {
-        let turn = TURN / f64::from(1 << round);
+    let mut best = best_of(&mut (-WALL_TURNS..=WALL_TURNS).map(|i| f64::from(i) * WALL_TURN))?;
+    for round in 1..=TURN_HALVINGS {
+        let turn = WALL_TURN / f64::from(1 << round);
         best = best_of(&mut [-turn, 0.0, turn].into_iter().map(|d| best.0 + d))?;
     }
     let (beyond, at, w) = best.1;
@@ -104,7 +104,7 @@ pub(crate) fn step(
     let at = center + at * w;
     // A place is farther outside of what is lower.
     let [x, y] = sheets.map(|s| s.0.distance(at).0);
-    if (x - y).abs() < HIGH * noise {
+    if (x - y).abs() < LEAST_WALL_NOISE * noise {
         return None;
     }
     let higher = usize::from(y < x);

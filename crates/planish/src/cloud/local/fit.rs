@@ -28,7 +28,7 @@ const ORDER_FOUR_SHARE: f64 = 0.2;
 /// hyperbola that takes both faces of an edge.
 const ONE_SHEET: f64 = 1.0;
 /// Fewest points of effective weight: two more than the six parameters of a height field.
-pub(crate) const FEWEST: f64 = 8.0;
+pub(crate) const FEWEST_FIT_WEIGHT: f64 = 8.0;
 
 /// The plane of least squared offsets along the normal of a frame.
 fn plane(m: &Moments, frame: Frame) -> [f64; 10] {
@@ -106,7 +106,7 @@ pub(crate) fn sheet(ball: &Ball, start: &Quadric, rounds: usize) -> Option<Sheet
             *w = own * tukey(d / noise);
         }
         let m = points.moments(&weights);
-        if m.weight() < FEWEST {
+        if m.weight() < FEWEST_FIT_WEIGHT {
             return None;
         }
         let felt = Ball { weights: &weights, guides: &guides::heeded(ball.guides, &model, noise), ..*ball };

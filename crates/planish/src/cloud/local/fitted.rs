@@ -4,7 +4,7 @@ use crate::cloud::Quadric;
 use glam::DVec3;
 
 /// Fits that guide others have an expected error below this share of the noise.
-pub(crate) const SURE: f64 = 0.35;
+pub(crate) const GUIDE_ERROR_NOISE: f64 = 0.35;
 
 /// A fitted sample of the surface: not oriented yet.
 #[derive(Clone, Copy, Debug)]

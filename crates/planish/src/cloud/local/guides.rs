@@ -6,7 +6,7 @@
 //! Only what a gradient has across the normal is penalised and not its length: the length of the gradient of a general quadric
 //! differs from place to place, and with it exact points would no longer give exact quadrics. It stays with Taubin's constraint.
 
-use super::fitted::{Fit, SURE};
+use super::fitted::{Fit, GUIDE_ERROR_NOISE};
 use super::height::Frame;
 use super::weights::{kernel, tukey};
 use crate::cloud::Quadric;
@@ -16,7 +16,7 @@ use glam::DVec3;
 /// Points that a fitted neighbour in the middle of a ball counts as.
 const CLOSED_WEIGHT: f64 = 4.0;
 /// Neighbours of another sheet are not heeded: those that turn by more than this cosine (30 degrees).
-const ALONG: f64 = 0.866;
+const SAME_SHEET_COSINE: f64 = 0.866;
 
 /// A fitted neighbour in the local coordinates of a fit.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +35,7 @@ pub(crate) fn guides(closed: &[Fit], tree: &KdTree, p: DVec3, radius: f64, noise
     let mut found = Vec::new();
     tree.within(p, radius, |i, at, d2| {
         let f = &closed[i as usize];
-        if f.error < SURE * noise {
+        if f.error < GUIDE_ERROR_NOISE * noise {
             let weight = CLOSED_WEIGHT * kernel(d2 / (radius * radius));
             found.push(Guide { at: (at - p) / radius, normal: f.normal, weight, reach2: (f.radius / radius).powi(2) });
         }
@@ -47,7 +47,10 @@ pub(crate) fn guides(closed: &[Fit], tree: &KdTree, p: DVec3, radius: f64, noise
 pub(crate) fn heeded(guides: &[Guide], model: &Quadric, noise: f64) -> Vec<Guide> {
     let felt = |g: &Guide| {
         let (d, n) = model.distance(g.at);
-        Guide { weight: if n.dot(g.normal).abs() > ALONG { g.weight * tukey(d / noise) } else { 0.0 }, ..*g }
+        Guide {
+            weight: if n.dot(g.normal).abs() > SAME_SHEET_COSINE { g.weight * tukey(d / noise) } else { 0.0 },
+            ..*g
+        }
     };
     guides.iter().map(felt).filter(|g| g.weight > 0.0).collect()
 }

@@ -7,16 +7,16 @@ use super::points::{BLOCK, LANES, lanes};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Residuals count up to this many noise levels.
-pub(crate) const LIMIT: f64 = 3.0;
+pub(crate) const RESIDUAL_LIMIT: f64 = 3.0;
 
-/// Squares of distances in noise levels, each at most the square of [`LIMIT`].
+/// Squares of distances in noise levels, each at most the square of [`RESIDUAL_LIMIT`].
 pub(crate) fn capped(residuals: &[f64]) -> Vec<f64> {
     residuals.iter().map(|r| cap(r * r)).collect()
 }
 
 #[inline(always)]
 fn cap(square: f64) -> f64 {
-    if square < LIMIT * LIMIT { square } else { LIMIT * LIMIT }
+    if square < RESIDUAL_LIMIT * RESIDUAL_LIMIT { square } else { RESIDUAL_LIMIT * RESIDUAL_LIMIT }
 }
 
 /// Sum over all points of the least of their [`capped`] squares; or something above `limit`, if it is.
@@ -33,14 +33,14 @@ pub(crate) enum Join {
     Greatest(f64),
 }
 
-/// Sum over all points of the squares of joined distances, each at most the square of [`LIMIT`]; or something above
+/// Sum over all points of the squares of joined distances, each at most the square of [`RESIDUAL_LIMIT`]; or something above
 /// `limit`, if it is.
 /// * `rows` - distances to each sheet in noise levels; how the first is joined is of no meaning
 pub(crate) fn joined_cost(rows: &[(&[f64], Join)], limit: f64) -> f64 {
     Arch::new().dispatch(Joined { rows, limit })
 }
 
-/// Sum over all points of the squares of joined distances, each at most the square of [`LIMIT`], and of what belongs
+/// Sum over all points of the squares of joined distances, each at most the square of [`RESIDUAL_LIMIT`], and of what belongs
 /// to the sheets that decide at them.
 /// * `rows` - distances to each sheet in noise levels, and what belongs to it
 /// * `concave` - bit k: sheet k is joined by the minimum, else by the maximum
@@ -197,7 +197,7 @@ mod tests {
         let row = |seed: u64| (0..45).map(|i| 9.0 * unit(seed, i)).collect::<Vec<f64>>();
         let rows = [row(5), row(6), row(7)];
         let [a, b, c] = [0, 1, 2].map(|k| &rows[k][..]);
-        let cost = |v: f64| (v * v).min(LIMIT * LIMIT);
+        let cost = |v: f64| (v * v).min(RESIDUAL_LIMIT * RESIDUAL_LIMIT);
         let nested: f64 = (0..45).map(|i| cost(a[i].max(-b[i]).min(c[i]))).sum();
         let rows = [(a, Join::Greatest(1.0)), (b, Join::Greatest(-1.0)), (c, Join::Least(1.0))];
         assert!((joined_cost(&rows, f64::INFINITY) - nested).abs() < 1e-12);

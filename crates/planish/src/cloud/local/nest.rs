@@ -12,10 +12,10 @@ use super::joints::{Join, capped, folded, joined_cost, nearest_cost};
 use glam::DVec3;
 
 /// Most sheets that are nested: a corner of four faces.
-pub(crate) const MOST: usize = 4;
+pub(crate) const MOST_NESTED: usize = 4;
 
 /// A place belongs to the surface if the nesting is this close to zero there, in noise levels.
-const ON: f64 = 0.25;
+const ON_SURFACE_NOISE: f64 = 0.25;
 
 /// One sheet as the points see it.
 #[derive(Clone, Debug)]
@@ -57,9 +57,9 @@ pub(crate) struct Nesting {
 }
 
 /// Sheets that are tried in each step: those whose union with the chosen ones explains most.
-const TRIED: usize = 6;
+const STRUCTURES_TRIED: usize = 6;
 /// Structures are compared on about this many points; the best of each step is then asked of all.
-const ENOUGH: usize = 60;
+const COMPARED_POINTS: usize = 60;
 
 /// Sum of squared residuals (in noise levels), each at most the square of [`LIMIT`].
 pub(crate) fn cost(residuals: &[f64]) -> f64 {
@@ -69,13 +69,13 @@ pub(crate) fn cost(residuals: &[f64]) -> f64 {
 /// A few of the sheets that are asked, ascending but for the last; places past `count` are zero.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Set {
-    items: [usize; MOST],
+    items: [usize; MOST_NESTED],
     count: usize,
 }
 
 impl Set {
     fn of(items: &[usize]) -> Set {
-        let mut set = Set { items: [0; MOST], count: items.len() };
+        let mut set = Set { items: [0; MOST_NESTED], count: items.len() };
         set.items[..items.len()].copy_from_slice(items);
         set
     }
@@ -108,19 +108,19 @@ pub(crate) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
         folds: 0.0,
         total: first.0,
     };
-    let step = asked[0].residuals.len().div_ceil(ENOUGH).max(1);
+    let step = asked[0].residuals.len().div_ceil(COMPARED_POINTS).max(1);
     let all: Vec<&[f64]> = asked.iter().map(|a| &a.residuals[..]).collect();
     let mut thinned: Vec<Vec<f64>> = vec![Vec::new(); asked.len()];
     // One sheet after the other, each the best that can be joined to those chosen, in all nestings of the set. The second
     // may come with another first: between the two sides of a plate one sheet alone does best in the middle.
-    while best.order.len() < most.min(MOST) {
+    while best.order.len() < most.min(MOST_NESTED) {
         let chosen = Set::of(&best.order);
         // No nesting explains more than the union. The sets whose unions explain most, rising:
-        let mut bound: Vec<(f64, Set)> = Vec::with_capacity(TRIED + 1);
+        let mut bound: Vec<(f64, Set)> = Vec::with_capacity(STRUCTURES_TRIED + 1);
         let mut hear = |set: Set| {
             let priced = price(set.items());
-            let least = if bound.len() == TRIED { bound[TRIED - 1].0 } else { best.total };
-            let mut rows = [[].as_slice(); MOST];
+            let least = if bound.len() == STRUCTURES_TRIED { bound[STRUCTURES_TRIED - 1].0 } else { best.total };
+            let mut rows = [[].as_slice(); MOST_NESTED];
             rows.iter_mut().zip(set.items()).for_each(|(row, &i)| *row = &squares[i]);
             let union = nearest_cost(&rows[..set.count], least - priced) + priced;
             if union > least || union >= best.total {
@@ -128,7 +128,7 @@ pub(crate) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
             }
             let at = bound.partition_point(|b| b.0.total_cmp(&union).then_with(|| b.1.cmp(&set)).is_lt());
             bound.insert(at, (union, set));
-            bound.truncate(TRIED);
+            bound.truncate(STRUCTURES_TRIED);
         };
         if chosen.count == 1 {
             (0..asked.len()).for_each(|i| (0..i).for_each(|j| hear(Set::of(&[j, i]))));
@@ -208,7 +208,7 @@ fn repeats(items: &[usize], order: &[usize], concave: u8) -> bool {
 
 /// Cost of a nesting of these sheets, or something above `limit`, if it is.
 fn nesting_cost<'a>(row: impl Fn(usize) -> &'a [f64], order: &[usize], flipped: u8, concave: u8, limit: f64) -> f64 {
-    let mut signed = [([].as_slice(), Join::Greatest(1.0)); MOST];
+    let mut signed = [([].as_slice(), Join::Greatest(1.0)); MOST_NESTED];
     for (k, (s, &i)) in signed.iter_mut().zip(order).enumerate() {
         let sign = sign(flipped, k);
         *s = (row(i), if concave >> k & 1 == 1 { Join::Least(sign) } else { Join::Greatest(sign) });
@@ -232,20 +232,21 @@ pub(crate) fn folds(sheets: &[Face], concave: u8) -> f64 {
     let m = sheets.len();
     if let [a, b] = sheets {
         let turn = (a.sign * a.normal).dot(b.sign * b.normal);
-        let above = folded([(a.residuals, a.sign), (b.residuals, b.sign)], turn, concave >> 1 & 1 == 1, ON);
+        let above =
+            folded([(a.residuals, a.sign), (b.residuals, b.sign)], turn, concave >> 1 & 1 == 1, ON_SURFACE_NOISE);
         return above as f64 * 2.0 * turn.abs().ln_1p();
     }
-    let mut turn = [[0.0; MOST]; MOST];
+    let mut turn = [[0.0; MOST_NESTED]; MOST_NESTED];
     for j in 0..m {
         for k in 0..m {
             turn[j][k] = (sheets[j].sign * sheets[j].normal).dot(sheets[k].sign * sheets[k].normal);
         }
     }
     // Logarithms by the sheet of the point and the set of those above it.
-    let mut known = [[f64::NAN; 1 << MOST]; MOST];
+    let mut known = [[f64::NAN; 1 << MOST_NESTED]; MOST_NESTED];
     let mut price = 0.0;
     for q in 0..sheets[0].residuals.len() {
-        let mut at = [0.0; MOST];
+        let mut at = [0.0; MOST_NESTED];
         (0..m).for_each(|k| at[k] = sheets[k].sign * sheets[k].residuals[q]);
         // The foot of the point on sheet k is part of the surface if the nesting vanishes there. Sheets at right angles
         // do not lie above each other; a foot on the edge itself would count as if they did.
@@ -257,7 +258,7 @@ pub(crate) fn folds(sheets: &[Face], concave: u8) -> f64 {
             for j in 1..m {
                 f = if concave >> j & 1 == 1 { f.min(foot(j)) } else { f.max(foot(j)) };
             }
-            if f.abs() < ON {
+            if f.abs() < ON_SURFACE_NOISE {
                 layers += turn[k][own].abs();
                 above |= 1 << k;
             }

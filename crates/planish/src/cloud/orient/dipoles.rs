@@ -9,11 +9,11 @@ use std::f64::consts::PI;
 
 /// A group counts as one from this many of its radii on: off by .03 at most, .01 in the mean of squares, for thin plates
 /// (one term: .3 and .15).
-const FAR: f64 = 2.0;
+const FAR_RADII: f64 = 2.0;
 /// And so much is left between a side that is sure and one half.
 const ROUGH: f64 = 0.02;
 /// Samples in a leaf at most.
-const LEAF: usize = 8;
+const SAMPLES_PER_LEAF: usize = 8;
 
 /// A tree of dipoles.
 #[derive(Clone, Debug, Default)]
@@ -63,7 +63,7 @@ impl Dipoles {
             let at = stack[top] as usize;
             let node = &self.nodes[at];
             let d = node.center.distance(p);
-            if d > FAR * node.radius && d > node.radius + skip {
+            if d > FAR_RADII * node.radius && d > node.radius + skip {
                 sum += node.number(node.center - p, d);
             } else if node.right == 0 {
                 for i in node.first as usize..(node.first + node.count) as usize {
@@ -99,7 +99,7 @@ impl Dipoles {
             let node = &self.nodes[at];
             let away = node.center - p;
             let d = away.length();
-            if d > FAR * node.radius + radius {
+            if d > FAR_RADII * node.radius + radius {
                 if !add(node.number(away, d), node.slope(d - radius)) {
                     return None;
                 }
@@ -218,7 +218,7 @@ fn build(items: &mut [(DVec3, DVec3)], first: usize, nodes: &mut Vec<Node>) {
     }
     let (first, count) = (first as u32, items.len() as u32);
     nodes.push(Node { center, radius, moment, second, third, first, count, right: 0 });
-    if items.len() <= LEAF {
+    if items.len() <= SAMPLES_PER_LEAF {
         return;
     }
     let bounds = crate::geom::Aabb::of(items.iter().map(|i| &i.0));
@@ -290,7 +290,8 @@ mod tests {
         for seed in 0..200 {
             let of = |k: u64| 2.0 * random::unit(seed, k) - 1.0;
             let place = |k: u64| DVec3::new(of(3 * k), of(3 * k + 1), of(3 * k + 2));
-            let items: Vec<(DVec3, DVec3)> = (0..LEAF as u64).map(|k| (place(2 * k), place(2 * k + 1))).collect();
+            let items: Vec<(DVec3, DVec3)> =
+                (0..SAMPLES_PER_LEAF as u64).map(|k| (place(2 * k), place(2 * k + 1))).collect();
             let tree = Dipoles::new(&items);
             let node = &tree.nodes[0];
             let (p, step) = (node.center + 2.5 * node.radius * place(100).normalize(), 1e-4 * place(101));

@@ -10,17 +10,17 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Neighbours of a sample that are asked.
-const ASKED: usize = 14;
+const VOTING_NEIGHBOURS: usize = 14;
 /// Cosine above which two sheets may be one.
-const SMOOTH: f64 = 0.8;
+const ONE_SHEET_COSINE: f64 = 0.8;
 /// Offset of one sheet at the other's centre, over their distance, up to which they may be one.
-const LEVEL: f64 = 0.05;
+const ONE_SHEET_OFFSET: f64 = 0.05;
 
 /// Cosine between a normal and the reflection of the other from which they are opposite points ([X03] §7: sqrt(3) / 2).
 const OPPOSITE: f64 = 0.866;
 
 /// Weight of the vote of two sheets of one plate or gap: more than any other has.
-const LAYERS: f64 = 4.0;
+const PLATE_VOTE: f64 = 4.0;
 /// A sheet goes on at most this share of the gap aside.
 const SIDE: f64 = 0.4;
 
@@ -46,7 +46,7 @@ pub(crate) fn votes(fits: &[Fit], tree: &KdTree) -> Vec<Vote> {
         .into_par_iter()
         .map_init(Vec::new, |near, i| {
             let f = &fits[i];
-            tree.nearest(f.center, ASKED + 1, near);
+            tree.nearest(f.center, VOTING_NEIGHBOURS + 1, near);
             near.iter().filter(|n| n.1 as usize != i).filter_map(|n| vote(fits, i, n.1 as usize)).collect()
         })
         .collect();
@@ -74,16 +74,16 @@ fn vote(fits: &[Fit], i: usize, j: usize) -> Option<Vote> {
     // The two sides of a plate or a gap that were found as such look away from each other, and nothing speaks louder.
     if f.site == g.site && f.gap.is_finite() && g.gap.is_finite() {
         let sign = -turn.signum();
-        return Some(Vote { a: i as u32, b: j as u32, sign, weight: LAYERS, smooth: false });
+        return Some(Vote { a: i as u32, b: j as u32, sign, weight: PLATE_VOTE, smooth: false });
     }
-    let slack = LEVEL * apart + 3.0 * (f.error + g.error);
-    if turn.abs() > 2.0 * SMOOTH && d.abs() < slack && e.abs() < slack {
+    let slack = ONE_SHEET_OFFSET * apart + 3.0 * (f.error + g.error);
+    if turn.abs() > 2.0 * ONE_SHEET_COSINE && d.abs() < slack && e.abs() < slack {
         // No sheet of a plate goes on as the other one.
         if d.abs().max(e.abs()) > SIDE * f.gap.min(g.gap) {
             return None;
         }
         let level = 1.0 - d.abs().max(e.abs()) / slack;
-        let straight = (turn.abs() / 2.0 - SMOOTH) / (1.0 - SMOOTH);
+        let straight = (turn.abs() / 2.0 - ONE_SHEET_COSINE) / (1.0 - ONE_SHEET_COSINE);
         return Some(Vote {
             a: i as u32,
             b: j as u32,

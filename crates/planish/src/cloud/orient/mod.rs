@@ -49,11 +49,11 @@ pub(crate) struct Oriented {
 }
 
 /// Samples whose votes may turn in one sweep, at most this often.
-pub(crate) const SWEEPS: usize = 12;
+pub(crate) const FLIP_SWEEPS: usize = 12;
 /// Scanner positions and normals of the file decide a part if their sum is above this share of its area.
-pub(crate) const DECIDED: f64 = 0.05;
+pub(crate) const DECIDED_WINDING: f64 = 0.05;
 /// An open part is in a hole of the others if their winding number differs this much between its sides.
-const STEP: f64 = 0.1;
+const HOLE_WINDING_STEP: f64 = 0.1;
 
 /// Orients the samples.
 pub(crate) fn orient(fits: &[Fit], votes: &[Vote], hints: &Hints) -> Oriented {
@@ -155,7 +155,7 @@ fn improve(sign: &mut [f64], votes: &[Vote]) {
         around[v.a as usize].push(k as u32);
         around[v.b as usize].push(k as u32);
     }
-    for _ in 0..SWEEPS {
+    for _ in 0..FLIP_SWEEPS {
         let mut turned = 0;
         for i in 0..sign.len() {
             let balance: f64 = around[i]
@@ -213,7 +213,7 @@ fn decide(own: &[u32], fits: &[Fit], sign: &mut [f64], hints: &Hints, settled: &
     let mut verdict = 0.0;
     for known in [hints.normals, hints.toward].into_iter().flatten() {
         let s = outward(known);
-        if verdict == 0.0 && s.abs() > DECIDED * area {
+        if verdict == 0.0 && s.abs() > DECIDED_WINDING * area {
             verdict = s;
         }
     }
@@ -230,7 +230,7 @@ fn decide(own: &[u32], fits: &[Fit], sign: &mut [f64], hints: &Hints, settled: &
             let aside = sign[i] * fits[i].radius * fits[i].normal;
             around.number(fits[i].center - aside, 0.0) - around.number(fits[i].center + aside, 0.0)
         });
-        if step.abs() > STEP * area {
+        if step.abs() > HOLE_WINDING_STEP * area {
             verdict = step;
         }
     }

@@ -14,9 +14,9 @@ const CANCELS: f64 = 0.15;
 const HOLLOW: f64 = 0.05;
 /// Cosine of the turn between normals (105 degrees) from which two samples that see each other face a gap: what is less
 /// steep may be a groove of one body.
-const FACING: f64 = 0.25;
+const GAP_COSINE: f64 = 0.25;
 /// Votes of less weight join no pieces.
-const FAINT: f64 = 0.001;
+const LEAST_VOTE: f64 = 0.001;
 /// Fewer samples are no body.
 const BODY: usize = 8;
 
@@ -29,13 +29,13 @@ pub(crate) fn segments(sign: &[f64], fits: &[Fit], votes: &[Vote], areas: &[f64]
     let faces = |i: usize, j: usize| {
         let (f, g) = (&fits[i], &fits[j]);
         let turn = sign[i] * sign[j] * f.normal.dot(g.normal);
-        turn < -FACING
+        turn < -GAP_COSINE
             && sign[i] * f.quadric.distance(g.center).0 > 0.0
             && sign[j] * g.quadric.distance(f.center).0 > 0.0
     };
     let joins = votes.iter().filter(|v| {
         let (i, j) = (v.a as usize, v.b as usize);
-        v.weight > FAINT && v.sign * sign[i] * sign[j] > 0.0 && !faces(i, j)
+        v.weight > LEAST_VOTE && v.sign * sign[i] * sign[j] > 0.0 && !faces(i, j)
     });
     let (piece, members) = by_area(&components(fits.len(), joins.map(|v| (v.a, v.b))), areas);
     let is_body = |own: &Vec<u32>| own.len() >= BODY && Shape::of(own, fits, sign, areas).closed;

@@ -14,16 +14,16 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Distances from the sheets at which the two sides are looked at, in radii of the fits.
-const ASIDE: [f64; 2] = [1.0, 3.0];
+const LOOK_RADII: [f64; 2] = [1.0, 3.0];
 /// Pairs of sheets within this many of these distances are the surface in the hole.
-const HOLE: f64 = 8.0;
+const HOLE_REACH: f64 = 8.0;
 /// Least step of the winding number, and its share of what a hole of this shape has.
-const STEP: f64 = 0.15;
-const SHARE: f64 = 0.5;
+const LEAST_WINDING_STEP: f64 = 0.15;
+const LEAST_WINDING_SHARE: f64 = 0.5;
 /// A scanner sees one side of a sheet for sure if the cosine of its ray and the normal is above this.
 const GRAZING: f64 = 0.2;
 /// Times that pairs are asked.
-const ROUNDS: usize = 8;
+const PAIR_ROUNDS: usize = 8;
 
 /// Sites whose two sheets are one surface, seen twice, and the distance of the sheets there.
 ///
@@ -47,16 +47,16 @@ pub(crate) fn aside(fits: &[Fit], sign: &[f64], hints: &Hints) -> Vec<(u32, f64)
     let mut way: Vec<f64> = told.iter().map(|t| t.unwrap_or(0.0)).collect();
     let mut fresh: Vec<usize> = (0..pairs.len()).filter(|&k| way[k] != 0.0).collect();
     // What is one surface helps to tell what is around it.
-    for _ in 0..ROUNDS {
+    for _ in 0..PAIR_ROUNDS {
         rest.extend(fresh.iter().map(|&k| (middles[k], way[k] * area(k) * fits[pairs[k]].normal)));
         let dipoles = Dipoles::new(&rest);
         let looks = |k: usize| -> Option<f64> {
             let (f, n) = (&fits[pairs[k]], fits[pairs[k]].normal);
-            ASIDE.into_iter().find_map(|away| {
+            LOOK_RADII.into_iter().find_map(|away| {
                 let h = away * f.radius;
                 let sides = [middles[k] - h * n, middles[k] + h * n];
                 let mut own = 0.0;
-                tree.within(middles[k], HOLE * h, |j, c, _| {
+                tree.within(middles[k], HOLE_REACH * h, |j, c, _| {
                     let j = j as usize;
                     let m = fits[pairs[j]].normal;
                     if way[j] == 0.0 {
@@ -65,7 +65,7 @@ pub(crate) fn aside(fits: &[Fit], sign: &[f64], hints: &Hints) -> Vec<(u32, f64)
                     }
                 });
                 let step = dipoles.number(sides[0], 0.0) - dipoles.number(sides[1], 0.0);
-                (step.abs() > f64::max(STEP, SHARE * (1.0 - own))).then_some(step.signum())
+                (step.abs() > f64::max(LEAST_WINDING_STEP, LEAST_WINDING_SHARE * (1.0 - own))).then_some(step.signum())
             })
         };
         let asked = (0..pairs.len()).into_par_iter().filter(|&k| told[k].is_none() && way[k] == 0.0);
@@ -93,14 +93,14 @@ mod tests {
     use super::*;
     use crate::cloud::Quadric;
 
-    const STEP: f64 = 0.05;
+    const LEAST_WINDING_STEP: f64 = 0.05;
 
     fn fit(center: DVec3, normal: DVec3, site: usize, gap: f64) -> Fit {
         Fit {
             quadric: Quadric::plane(center, 1.0, normal),
             center,
             normal,
-            radius: 2.0 * STEP,
+            radius: 2.0 * LEAST_WINDING_STEP,
             noise: 0.003,
             thickness: 1.0,
             error: 1e-4,
@@ -116,9 +116,9 @@ mod tests {
     /// Samples on a square, with two sheets within `hole` of its middle and one elsewhere up to `size`; signs as for a plate.
     fn square(hole: f64, size: f64) -> (Vec<Fit>, Vec<f64>) {
         let (mut fits, mut sign) = (Vec::new(), Vec::new());
-        let count = (2.0 * size / STEP).round() as usize;
+        let count = (2.0 * size / LEAST_WINDING_STEP).round() as usize;
         for k in 0..count * count {
-            let p = STEP * DVec3::new((k % count) as f64 + 0.5, (k / count) as f64 + 0.5, 0.0)
+            let p = LEAST_WINDING_STEP * DVec3::new((k % count) as f64 + 0.5, (k / count) as f64 + 0.5, 0.0)
                 - DVec3::new(size, size, 0.0);
             if p.abs().max_element() < hole {
                 fits.extend([-1.0, 1.0].map(|s| fit(p + 0.006 * s * DVec3::Z, DVec3::Z, k, 0.012)));
@@ -133,7 +133,7 @@ mod tests {
 
     fn found(hole: f64, size: f64, toward: Option<[DVec3; 2]>) -> usize {
         let (fits, sign) = square(hole, size);
-        let areas: Vec<f64> = fits.iter().map(|_| STEP * STEP).collect();
+        let areas: Vec<f64> = fits.iter().map(|_| LEAST_WINDING_STEP * LEAST_WINDING_STEP).collect();
         let toward: Option<Vec<DVec3>> =
             toward.map(|t| fits.iter().map(|f| t[usize::from(f.center.z > 0.0)]).collect());
         let hints = Hints { toward: toward.as_deref(), normals: None, areas: &areas };

@@ -5,7 +5,7 @@
 //! half, and a patch adds its share to that of the rest, which with the other sign it would take away (Barill et al. 2018).
 
 use super::link::Vote;
-use super::{DECIDED, Hints, SWEEPS, patches};
+use super::{DECIDED_WINDING, FLIP_SWEEPS, Hints, patches};
 use crate::cloud::Dipoles;
 use crate::cloud::local::fitted::Fit;
 use crate::geom::tolerance::divisor;
@@ -13,8 +13,8 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Least number of samples of a patch that is asked, and how many of them at most.
-const FEWEST: usize = 30;
-const ASKED: usize = 1000;
+const FEWEST_PATCH_SAMPLES: usize = 30;
+const MOST_PATCH_SAMPLES: usize = 1000;
 /// Samples within this share of the width that a sample stands for say nothing of its winding number: that is itself. Others
 /// count, though their planes may go through it: the rims of a short bore are not much farther away.
 const SKIP: f64 = 0.5;
@@ -33,7 +33,7 @@ pub(crate) fn wind(
     hints: &Hints,
     is_closed: impl Fn(usize) -> bool + Sync,
 ) {
-    for _ in 0..SWEEPS {
+    for _ in 0..FLIP_SWEEPS {
         let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         patches(sign, votes).iter().enumerate().for_each(|(i, &p)| members.entry(p).or_default().push(i));
         let dipole = |i: usize| (fits[i].center, sign[i] * hints.areas[i] * fits[i].normal);
@@ -42,7 +42,7 @@ pub(crate) fn wind(
             let area: f64 = own.iter().map(|&i| hints.areas[i]).sum();
             for known in [hints.toward, hints.normals].into_iter().flatten() {
                 let outward: f64 = own.iter().map(|&i| dipole(i).1.dot(known[i])).sum();
-                if outward.abs() > DECIDED * area {
+                if outward.abs() > DECIDED_WINDING * area {
                     return -outward / area;
                 }
             }
@@ -51,7 +51,7 @@ pub(crate) fn wind(
             }
             let alone = Dipoles::new(&own.iter().map(|&i| dipole(i)).collect::<Vec<_>>());
             let (mut gain, mut asked) = (0.0, 0.0);
-            for &i in own.iter().step_by(own.len().div_ceil(ASKED)) {
+            for &i in own.iter().step_by(own.len().div_ceil(MOST_PATCH_SAMPLES)) {
                 asked += hints.areas[i];
                 // Between two sheets side by side the number of samples says nothing.
                 if fits[i].gap.is_finite() {
@@ -63,7 +63,7 @@ pub(crate) fn wind(
             gain / divisor(asked)
         };
         let gains: Vec<(f64, &Vec<usize>)> =
-            members.par_iter().filter(|m| m.1.len() >= FEWEST).map(|(_, own)| (gain(own), own)).collect();
+            members.par_iter().filter(|m| m.1.len() >= FEWEST_PATCH_SAMPLES).map(|(_, own)| (gain(own), own)).collect();
         let best = gains.into_iter().max_by(|a, b| a.0.total_cmp(&b.0).then(b.1[0].cmp(&a.1[0])));
         let Some((_, own)) = best.filter(|b| b.0 > GAIN) else { break };
         own.iter().for_each(|&i| sign[i] = -sign[i]);

@@ -13,14 +13,14 @@
 //! threads. Where nothing fitted is near, a site stands on its own fit, which is the seed of [X03] (lines 14 to 16).
 //! Supports follow from the data and not from factors c_i (§6.1).
 
-use super::survey::{PLENTY, WIDE_ENOUGH};
-use super::{APART, Sites, in_pieces, layers};
+use super::survey::{PLENTY_OF_POINTS, WIDEST_NOISE};
+use super::{SITE_DISTANCE, Sites, in_pieces, layers};
 use crate::cloud::Quadric;
 use crate::cloud::local::fit::{Ball, Sheet, localized, sheet};
-use crate::cloud::local::fitted::{Fit, SURE};
+use crate::cloud::local::fitted::{Fit, GUIDE_ERROR_NOISE};
 use crate::cloud::local::guides::guides;
 use crate::cloud::local::height::Frame;
-use crate::cloud::local::joints::LIMIT;
+use crate::cloud::local::joints::RESIDUAL_LIMIT;
 use crate::cloud::local::nest::{Seen, cost, nest};
 use crate::cloud::local::points::Points;
 use crate::geom::KdTree;
@@ -36,42 +36,42 @@ const VARIATION: f64 = 0.25;
 /// Weight of noise over radius (a_2).
 const ROUGHNESS: f64 = 1.0;
 /// What a carried-on sheet must explain, in squared noise levels: the freedom of its choice.
-pub(crate) const PRICE: f64 = 14.0;
+pub(crate) const SHEET_PRICE: f64 = 14.0;
 /// And for every change of its direction by one within the ball: what is flat is likelier than what is round.
 pub(crate) const VARIATION_PRICE: f64 = 10.0;
 /// Most sheets at one site whose signs are not known yet.
-const MOST: usize = 2;
+const MOST_SITE_SHEETS: usize = 2;
 /// What a fit of its own must explain: six parameters, each worth two.
 const OWN_PRICE: f64 = 12.0;
 /// A fit of its own is not questioned if its points cost at most this much each, in squared noise levels.
-const PLAIN: f64 = 1.05;
+const UNQUESTIONED_COST: f64 = 1.05;
 /// Sheets explain points that cost at most this much each, in squared noise levels, and what chance adds.
-const EXPLAINED: f64 = 1.15;
+const EXPLAINED_COST: f64 = 1.15;
 /// The points of a crease are looked at this many times as far as one sheet holds, at most.
-const WIDE: f64 = 2.0;
+const CREASE_REACH: f64 = 2.0;
 /// Cosine of 20 degrees: sheets that meet flatter are one, with a bend.
-const TURNED: f64 = 0.94;
+const CREASE_COSINE: f64 = 0.94;
 /// Points that must be nearest to a sheet.
-const NEEDED: u32 = 3;
+const FEWEST_NEAREST: u32 = 3;
 /// Fits near a point that are asked which of them explains it.
-const RIVALS: usize = 10;
+const RIVAL_FITS: usize = 10;
 /// Neighbours asked whether they carry a sheet on, how many must, and how far off they may be over their distance.
-const AROUND: usize = 16;
-const COMPANY: usize = 4;
-const OFFSET: f64 = 0.12;
+const COMPANY_ASKED: usize = 16;
+const COMPANY_NEEDED: usize = 4;
+const COMPANY_OFFSET: f64 = 0.12;
 /// Sheets of fitted neighbours that are asked.
-const ASKED: usize = 16;
+const MOST_CARRIED: usize = 16;
 /// Fitted neighbours are sought within this many radii.
-const FARTHEST: f64 = 3.0;
+const CARRIED_REACH: f64 = 3.0;
 /// A carried-on sheet begins with the ball that it has, at most this many times that of the site.
-const CARRIED: f64 = 3.0;
+const CARRIED_BALL: f64 = 3.0;
 /// Points of less weight are left out.
-const FELT: f64 = 1e-3;
+const LEAST_POINT_WEIGHT: f64 = 1e-3;
 /// Density of points that belong to no sheet, as that of a sheet three noise levels away.
 const STRAY: f64 = 0.011;
 /// Ratio of one ball to the next when a sheet grows, and how often it grows at most.
-const WIDEN: f64 = 1.35;
-const STEPS: usize = 3;
+const GROWTH_RATIO: f64 = 1.35;
+const GROWTH_STEPS: usize = 3;
 
 /// Fits sites, leaning on what is fitted already, and adds what it found.
 /// * `open` - the sites, ascending
@@ -129,7 +129,7 @@ pub(crate) fn other_sheet(fits: &[Fit], i: usize) -> Option<usize> {
 pub(crate) fn supported(points: &[DVec3], mut fits: Vec<Fit>) -> Vec<Fit> {
     let mut owner = vec![u32::MAX; points.len()];
     own(points, &mut fits, &mut owner);
-    let kept = |fits: &[Fit]| (0..fits.len()).filter(|&i| fits[i].owned >= NEEDED).collect();
+    let kept = |fits: &[Fit]| (0..fits.len()).filter(|&i| fits[i].owned >= FEWEST_NEAREST).collect();
     keep(kept(&fits), &mut fits, &mut owner);
     keep(accompanied(&fits), &mut fits, &mut owner);
     // The points of those that are dropped are still there: without them a surface has less area beside its edges.
@@ -157,7 +157,7 @@ fn own(points: &[DVec3], fits: &mut [Fit], owner: &mut [u32]) {
     let all: &[Fit] = fits;
     let homeless = points.par_iter().zip(&mut *owner).filter(|o| *o.1 == u32::MAX);
     homeless.for_each_init(Default::default, |(near, last), (&p, own)| {
-        tree.nearest_after(p, RIVALS, last, near);
+        tree.nearest_after(p, RIVAL_FITS, last, near);
         let off = |n: &(f64, u32)| {
             let f = &all[n.1 as usize];
             (f.quadric.distance(p).0 / divisor(f.noise)).powi(2) + 9.0 * n.0 / (f.radius * f.radius)
@@ -177,22 +177,22 @@ fn accompanied(fits: &[Fit]) -> Vec<usize> {
         .into_par_iter()
         .map_init(Vec::new, |near, i| {
             let f = &fits[i];
-            tree.nearest(f.center, AROUND + 1, near);
+            tree.nearest(f.center, COMPANY_ASKED + 1, near);
             near.iter()
                 .filter(|n| n.1 as usize != i)
                 .filter(|n| {
                     let g = &fits[n.1 as usize];
                     let ((d, m), (e, k)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
-                    let slack = OFFSET * n.0.sqrt() + 2.0 * (f.error + g.error);
-                    m.dot(g.normal).abs() > TURNED
-                        && k.dot(f.normal).abs() > TURNED
+                    let slack = COMPANY_OFFSET * n.0.sqrt() + 2.0 * (f.error + g.error);
+                    m.dot(g.normal).abs() > CREASE_COSINE
+                        && k.dot(f.normal).abs() > CREASE_COSINE
                         && d.abs() < slack
                         && e.abs() < slack
                 })
                 .count()
         })
         .collect();
-    (0..fits.len()).filter(|&i| company[i] >= COMPANY).collect()
+    (0..fits.len()).filter(|&i| company[i] >= COMPANY_NEEDED).collect()
 }
 
 fn fit_site(
@@ -212,7 +212,7 @@ fn fit_site(
     } else if class == 0 {
         vec![Start { sheet: survey.quadric, at: p, radius: survey.radius }]
     } else {
-        choose(tree, survey.radius, sites.gap[site] / APART, survey.quadric, noise, closed, near)
+        choose(tree, survey.radius, sites.gap[site] / SITE_DISTANCE, survey.quadric, noise, closed, near)
     };
     let sheets = starts.len() as u8;
     let all: Vec<Quadric> = starts.iter().map(|s| s.sheet).collect();
@@ -245,7 +245,7 @@ fn fit_site(
         let ((d, n), (e, m)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
         let turns = [n.dot(g.normal), m.dot(f.normal)];
         let alike = turns.iter().all(|t| t.abs() > SIDE_BY_SIDE && d * e * t < 0.0);
-        if alike && d.abs().min(e.abs()) > layers::APART * noise {
+        if alike && d.abs().min(e.abs()) > layers::LEAST_LAYER_GAP * noise {
             (f.gap, g.gap) = (d.abs(), e.abs());
         }
     }
@@ -272,25 +272,25 @@ fn choose(
     let p = own.center;
     let alone = vec![Start { sheet: own, at: p, radius }];
     // A crease has a narrow ball because one sheet is no model there; with the right sheets a usual ball will do.
-    let wide = usual.clamp(radius, WIDE * radius);
+    let wide = usual.clamp(radius, CREASE_REACH * radius);
     around.clear();
     tree.within(p, wide, |_, q, _| around.push(q));
     let mut ball = Points::default();
     ball.refill(around);
     let residuals = |q: &Quadric| ball.levels(q, noise);
     let count = ball.len() as f64;
-    let good = count * (EXPLAINED + 2.0 * (2.0 / count).sqrt());
+    let good = count * (EXPLAINED_COST + 2.0 * (2.0 / count).sqrt());
     let own_cost = cost(&residuals(&own));
-    if own_cost < PLAIN * count {
+    if own_cost < UNQUESTIONED_COST * count {
         return alone;
     }
-    let mut near = Vec::with_capacity(4 * ASKED);
-    closed.tree.within(p, FARTHEST * wide, |i, _, d2| near.push((d2, i)));
+    let mut near = Vec::with_capacity(4 * MOST_CARRIED);
+    closed.tree.within(p, CARRIED_REACH * wide, |i, _, d2| near.push((d2, i)));
     near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut asked: Vec<(Quadric, f64)> = Vec::new();
     for &(_, i) in &near {
         let f = &closed.fits[i as usize];
-        if f.error > SURE * noise {
+        if f.error > GUIDE_ERROR_NOISE * noise {
             continue;
         }
         let (d, n) = f.quadric.distance(p);
@@ -302,14 +302,16 @@ fn choose(
         });
         if !known && d.abs() < wide {
             asked.push((f.quadric, f.radius));
-            if asked.len() == ASKED {
+            if asked.len() == MOST_CARRIED {
                 break;
             }
         }
     }
-    let all: Vec<Seen> =
-        asked.iter().map(|a| Seen { residuals: residuals(&a.0), normal: a.0.distance(p).1, price: PRICE }).collect();
-    let Some(found) = nest(&all, true, MOST) else { return alone };
+    let all: Vec<Seen> = asked
+        .iter()
+        .map(|a| Seen { residuals: residuals(&a.0), normal: a.0.distance(p).1, price: SHEET_PRICE })
+        .collect();
+    let Some(found) = nest(&all, true, MOST_SITE_SHEETS) else { return alone };
     // The points nearest to each sheet tell where it begins to grow.
     let mut middle = vec![(0usize, DVec3::ZERO); found.order.len()];
     for (i, q) in ball.iter().enumerate() {
@@ -317,7 +319,7 @@ fn choose(
             .map(|k| (all[found.order[k]].residuals[i].abs(), k))
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .expect("a nesting has a sheet");
-        if d < LIMIT {
+        if d < RESIDUAL_LIMIT {
             middle[k].0 += 1;
             middle[k].1 += q;
         }
@@ -329,7 +331,7 @@ fn choose(
         _ => false,
     };
     let misfit = found.cost - if fold { found.folds } else { 0.0 };
-    if misfit > good || found.cost + PRICE * (found.order.len() - 1) as f64 > own_cost + OWN_PRICE {
+    if misfit > good || found.cost + SHEET_PRICE * (found.order.len() - 1) as f64 > own_cost + OWN_PRICE {
         return alone;
     }
     found
@@ -337,7 +339,7 @@ fn choose(
         .iter()
         .zip(&middle)
         .filter(|(_, m)| m.0 > 0)
-        .map(|(&k, m)| Start { sheet: asked[k].0, at: m.1, radius: asked[k].1.min(CARRIED * radius).max(radius) })
+        .map(|(&k, m)| Start { sheet: asked[k].0, at: m.1, radius: asked[k].1.min(CARRIED_BALL * radius).max(radius) })
         .collect()
 }
 
@@ -363,12 +365,12 @@ fn widen(
     let mut guess = start.sheet;
     let (mut ball, mut weights) = (Points::default(), Vec::new());
     let (mut own, mut other, mut all) = (Vec::new(), Vec::new(), Vec::new());
-    for step in 0..=STEPS {
-        let r = start.radius * WIDEN.powi(step as i32);
+    for step in 0..=GROWTH_STEPS {
+        let r = start.radius * GROWTH_RATIO.powi(step as i32);
         // The second ball is asked in nearly every case, and it holds the first.
         if step != 1 {
             near.clear();
-            let reach = if step == 0 { start.radius * WIDEN } else { r };
+            let reach = if step == 0 { start.radius * GROWTH_RATIO } else { r };
             tree.within(p, reach, |_, q, _| near.push(q));
         }
         if step == 0 {
@@ -396,15 +398,15 @@ fn widen(
             all.iter_mut().zip(&own).for_each(|(a, c)| *a += c);
             weights.iter_mut().zip(own.iter().zip(&all)).for_each(|(w, (own, all))| *w *= own / all);
         }
-        ball.keep_above(FELT, &mut weights);
+        ball.keep_above(LEAST_POINT_WEIGHT, &mut weights);
         // Enough points: more of them cost more than they tell.
-        if step > 0 && ball.len() > PLENTY && r > WIDE_ENOUGH * noise {
+        if step > 0 && ball.len() > PLENTY_OF_POINTS && r > WIDEST_NOISE * noise {
             break;
         }
         let guides = guides(closed.fits, closed.tree, p, r, noise);
         let part = Ball { center: p, scale: r, points: &ball, weights: &weights, guides: &guides, noise: noise / r };
         let Some(found) = sheet(&part, &guess, if step == 0 { 2 } else { 1 }) else {
-            if best.is_none() && step < STEPS {
+            if best.is_none() && step < GROWTH_STEPS {
                 continue;
             }
             break;
@@ -431,7 +433,7 @@ fn expected(s: &Sheet, p: DVec3, radius: f64, ball: &Points, noise: f64) -> f64 
     ball.distances(&q, &mut distances);
     for (y, d) in ball.iter().zip(&distances) {
         let r = d / sigma;
-        if r.abs() < LIMIT {
+        if r.abs() < RESIDUAL_LIMIT {
             let (u, v) = (frame.u.dot(y), frame.v.dot(y));
             let mut at = usize::from(u > 0.0) | usize::from(v > 0.0) << 1 | usize::from(u.abs() > v.abs()) << 2;
             if ball.len() >= 80 && u * u + v * v > 0.5 {

@@ -12,24 +12,24 @@ use crate::cloud::local::points::Points;
 use glam::DVec3;
 
 /// Fewest points: a dip in fewer is chance.
-const FEWEST: usize = 48;
+const FEWEST_LAYER_POINTS: usize = 48;
 /// Kurtosis above which there is no dip to look for: noise has 3, two sheets three levels apart 2.
 pub(crate) const PEAKED: f64 = 2.4;
 /// Half width of the windows in the dip and on the sheets, of half the distance of the sheets.
-const WINDOW: f64 = 0.35;
+const DIP_WINDOW: f64 = 0.35;
 /// Points in the dip over those on a sheet, at most: noise has 1.3, an even spread 1, sheets three levels apart two
 /// thirds.
-const DIP: f64 = 0.7;
+const DIP_RATIO: f64 = 0.7;
 /// And the difference in standard deviations of its counts: a scan asks a hundred thousand times.
-const SURE: f64 = 3.0;
+const DIP_DEVIATIONS: f64 = 3.0;
 /// Sectors around, how many must have both sheets, and the least share of the rarer one there.
-const SECTORS: usize = 8;
-const BOTH: usize = 6;
-const SHARE: f64 = 0.2;
+const LAYER_SECTORS: usize = 8;
+const SECTORS_WITH_BOTH: usize = 6;
+const RARER_SHARE: f64 = 0.2;
 /// Least distance of the two sheets at any point, in noise levels.
-pub(crate) const APART: f64 = 1.2;
+pub(crate) const LEAST_LAYER_GAP: f64 = 1.2;
 /// Times that points choose the nearer sheet.
-const ROUNDS: usize = 2;
+const CHOICE_ROUNDS: usize = 2;
 
 /// Two sheets in one ball.
 pub(crate) struct Layers {
@@ -43,7 +43,7 @@ pub(crate) struct Layers {
 /// * `points` - local coordinates
 /// * `r` - residuals of the points
 pub(crate) fn split(height: &Height, points: &Points, r: &[f64]) -> Option<Layers> {
-    if points.len() < FEWEST {
+    if points.len() < FEWEST_LAYER_POINTS {
         return None;
     }
     let n = r.len() as f64;
@@ -67,23 +67,23 @@ pub(crate) fn split(height: &Height, points: &Points, r: &[f64]) -> Option<Layer
         middle = (low + high) / 2.0;
     }
     let half = (high - low) / 2.0;
-    let within = |at: f64| r.iter().filter(|x| (*x - at).abs() < WINDOW * half).count() as f64;
+    let within = |at: f64| r.iter().filter(|x| (*x - at).abs() < DIP_WINDOW * half).count() as f64;
     let (dip, beside) = (within(middle), (within(low) + within(high)) / 2.0);
-    if dip > DIP * beside || beside - dip < SURE * (dip + beside / 2.0).sqrt() {
+    if dip > DIP_RATIO * beside || beside - dip < DIP_DEVIATIONS * (dip + beside / 2.0).sqrt() {
         return None;
     }
-    let mut sectors = [[0.0f64; 2]; SECTORS];
+    let mut sectors = [[0.0f64; 2]; LAYER_SECTORS];
     for (y, &x) in points.iter().zip(r) {
         let (u, v) = (height.frame.u.dot(y), height.frame.v.dot(y));
         let at = usize::from(u > 0.0) | usize::from(v > 0.0) << 1 | usize::from(u.abs() > v.abs()) << 2;
         sectors[at][usize::from(x > middle)] += 1.0;
     }
-    if sectors.iter().filter(|s| s[0].min(s[1]) > SHARE * (s[0] + s[1])).count() < BOTH {
+    if sectors.iter().filter(|s| s[0].min(s[1]) > RARER_SHARE * (s[0] + s[1])).count() < SECTORS_WITH_BOTH {
         return None;
     }
     let mut side: Vec<bool> = r.iter().map(|&x| x > middle).collect();
     let mut sheets = [*height; 2];
-    for round in 0..=ROUNDS {
+    for round in 0..=CHOICE_ROUNDS {
         let mut sums = [Moments::ZERO; 2];
         for (y, &s) in points.iter().zip(&side) {
             sums[usize::from(s)].add(y, 1.0);
@@ -91,7 +91,7 @@ pub(crate) fn split(height: &Height, points: &Points, r: &[f64]) -> Option<Layer
         for (sheet, sum) in sheets.iter_mut().zip(&sums) {
             *sheet = framed_height(&sum.matrix(), Frame::of(height.frame.n))?;
         }
-        if round < ROUNDS {
+        if round < CHOICE_ROUNDS {
             for (y, s) in points.iter().zip(&mut side) {
                 *s = sheets[1].residual(y).abs() < sheets[0].residual(y).abs();
             }
@@ -102,7 +102,7 @@ pub(crate) fn split(height: &Height, points: &Points, r: &[f64]) -> Option<Layer
     // Side by side everywhere: sheets that cross are the faces of an edge.
     let apart = |y: DVec3| sheets[0].residual(y) - sheets[1].residual(y);
     let way = apart(DVec3::ZERO).signum();
-    if points.iter().any(|y| way * apart(y) < APART * noise) {
+    if points.iter().any(|y| way * apart(y) < LEAST_LAYER_GAP * noise) {
         return None;
     }
     if sheets[1].residual(DVec3::ZERO).abs() < sheets[0].residual(DVec3::ZERO).abs() {

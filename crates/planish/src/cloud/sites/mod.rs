@@ -17,13 +17,13 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Distance between sites over the radius of the fits: the blend then meets about eight fits everywhere.
-pub(crate) const APART: f64 = 0.5;
+pub(crate) const SITE_DISTANCE: f64 = 0.5;
 /// Sites stand no closer than for this share of the usual radius: creases have narrow balls, not finer shapes.
 const USUAL: f64 = 0.8;
 /// One point in this many is surveyed to learn the radii.
 const SCOUT: usize = 24;
 /// A fit may be this much wider than the scouts around saw.
-const REACH: f64 = 1.7;
+const WIDEST_BY_SCOUTS: f64 = 1.7;
 /// Scouts that tell the radii of a region.
 const SCOUTS: usize = 15;
 /// Scouts that are sure of their noise and tell that of a region, and the share of them that says less: what shape there
@@ -34,9 +34,9 @@ const BELOW: f64 = 0.2;
 const NEAREST: usize = 8;
 const ANOTHER: f64 = 1.35;
 /// Noise is known if at least this share of all scouts are sure.
-const ENOUGH: f64 = 0.05;
+const SURE_SCOUT_SHARE: f64 = 0.05;
 /// Points per piece of parallel work between two looks at the observer.
-pub(crate) const CHUNK: usize = 512;
+pub(crate) const POINTS_PER_CHUNK: usize = 512;
 
 /// Sites and the points they own.
 #[derive(Clone, Debug, Default)]
@@ -62,7 +62,7 @@ pub(crate) fn in_pieces<T: Send>(
 ) -> Result<Vec<T>, Cancelled> {
     let mut all = Vec::with_capacity(count);
     // Large pieces keep the threads busy, small ones keep the observer informed.
-    let piece = CHUNK * rayon::current_num_threads().max(1) * 2;
+    let piece = POINTS_PER_CHUNK * rayon::current_num_threads().max(1) * 2;
     while all.len() < count {
         observer.check()?;
         let range = all.len()..(all.len() + piece).min(count);
@@ -101,7 +101,7 @@ pub(crate) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
     let chosen = cover(points, tree, |i| {
         let region = regions.at(points[i]);
         there.push(region);
-        APART * region.least
+        SITE_DISTANCE * region.least
     });
     let surveys = in_pieces(chosen.len(), (0.4, 1.0), observer, |s, i| {
         let Region { reach, prior, .. } = there[i];
@@ -113,7 +113,7 @@ pub(crate) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
         sites.point.push(point);
         sites.survey.push(survey);
         sites.prior.push(region.prior);
-        sites.gap.push(APART * region.least);
+        sites.gap.push(SITE_DISTANCE * region.least);
     }
     let places: Vec<DVec3> = sites.point.iter().map(|&i| points[i as usize]).collect();
     let site_tree = KdTree::new(&places);
@@ -168,7 +168,7 @@ impl Regions<'_> {
         };
         // A scout in a crease sees next to nothing; sites there stand as for half of the usual radius.
         let least = least.max(USUAL * radii[radii.len() / 2]);
-        Region { least, reach: REACH * radii[radii.len() - 1], prior }
+        Region { least, reach: WIDEST_BY_SCOUTS * radii[radii.len() - 1], prior }
     }
 }
 
@@ -176,7 +176,7 @@ impl Regions<'_> {
 fn certain_noise(places: &[DVec3], known: &[Survey]) -> Option<Vec<f64>> {
     let (certain, at): (Vec<f64>, Vec<DVec3>) =
         known.iter().zip(places).filter(|k| k.0.sure).map(|k| (k.0.noise, *k.1)).unzip();
-    if certain.len() < SURE_SCOUTS || (certain.len() as f64) < ENOUGH * known.len() as f64 {
+    if certain.len() < SURE_SCOUTS || (certain.len() as f64) < SURE_SCOUT_SHARE * known.len() as f64 {
         return None;
     }
     let tree = KdTree::new(&at);

@@ -6,24 +6,24 @@
 //! enough to outnumber them. A wall that the scanner grazed is as thin as that, too; its points stay, for their neighbours
 //! lie around them in a plane.
 
-use crate::cloud::FEWEST;
+use crate::cloud::FEWEST_POINTS;
 use crate::geom::KdTree;
 use crate::linalg::eigen3;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 /// The neighbour whose distance tells.
-const RANK: usize = 8;
+const STRAY_RANK: usize = 8;
 /// Neighbours whose distances are the measure.
-const AROUND: usize = 128;
+const MEASURE_NEIGHBOURS: usize = 128;
 /// A stray is this many times as far from its neighbours as they are from theirs. Points of the tail of the noise, four
 /// levels out, reach 3 where the noise is of the size of the spacing.
-const ALONE: f64 = 4.0;
+const STRAY_RATIO: f64 = 4.0;
 
 /// Neighbours that tell whether a point is part of a thin surface.
-const BESIDE: usize = 16;
+const SURFACE_NEIGHBOURS: usize = 16;
 /// Mean squared sine of the angles between the ways to them and a plane: 8 degrees.
-const FLAT: f64 = 0.02;
+const SURFACE_SINE_SQUARED: f64 = 0.02;
 /// Length of the mean way to them: they are on all sides and not over there.
 const AMID: f64 = 0.6;
 
@@ -31,8 +31,8 @@ const AMID: f64 = 0.6;
 const SPARSE: f64 = 7.0;
 /// Neighbours that tell a sparse surface from a volume, and the mean squared sine there: a volume has a sixth at least,
 /// a surface with noise of half its spacing a twentieth.
-const CROWD: usize = 48;
-const LEVEL: f64 = 0.12;
+const VOLUME_NEIGHBOURS: usize = 48;
+const VOLUME_SINE_SQUARED: f64 = 0.12;
 
 /// Do the neighbours lie in a plane through a point, and around it?
 /// * `level` - mean squared sine of the angles between the ways to them and the plane, at most
@@ -53,7 +53,7 @@ pub(crate) fn without(points: Vec<DVec3>, ids: Vec<u32>) -> (Vec<DVec3>, Vec<u32
     let far: Vec<f64> = points
         .par_iter()
         .map_init(Default::default, |(near, last), &p| {
-            tree.nearest_after(p, RANK + 1, last, near);
+            tree.nearest_after(p, STRAY_RANK + 1, last, near);
             near.last().map_or(0.0, |n| n.0.sqrt())
         })
         .collect();
@@ -66,24 +66,24 @@ pub(crate) fn without(points: Vec<DVec3>, ids: Vec<u32>) -> (Vec<DVec3>, Vec<u32
             || (Vec::new(), Vec::new()),
             |(near, around), i| {
                 // Most points are closer to their neighbours than any stray could be.
-                if far[i] <= ALONE * low {
+                if far[i] <= STRAY_RATIO * low {
                     return true;
                 }
-                tree.nearest(points[i], AROUND + 1, near);
+                tree.nearest(points[i], MEASURE_NEIGHBOURS + 1, near);
                 around.clear();
                 around.extend(near.iter().filter(|n| n.1 as usize != i).map(|n| far[n.1 as usize]));
                 around.sort_unstable_by(f64::total_cmp);
                 let within = |count: usize| near.iter().take(count + 1).map(|n| points[n.1 as usize]);
                 let p = points[i];
                 // Where strays have only strays around they fill a volume.
-                let alike = around.get(around.len() / 2).is_none_or(|&usual| far[i] <= ALONE * usual);
-                let crowd = far[i] <= SPARSE * middle || flat(p, within(CROWD), LEVEL, 1.0);
-                (alike && crowd) || flat(p, within(BESIDE), FLAT, AMID)
+                let alike = around.get(around.len() / 2).is_none_or(|&usual| far[i] <= STRAY_RATIO * usual);
+                let crowd = far[i] <= SPARSE * middle || flat(p, within(VOLUME_NEIGHBOURS), VOLUME_SINE_SQUARED, 1.0);
+                (alike && crowd) || flat(p, within(SURFACE_NEIGHBOURS), SURFACE_SINE_SQUARED, AMID)
             },
         )
         .collect();
     let count = stays.iter().filter(|&&s| s).count();
-    if count == points.len() || count < FEWEST.max(points.len() / 2) {
+    if count == points.len() || count < FEWEST_POINTS.max(points.len() / 2) {
         return (points, ids, tree);
     }
     let keep = |i: &usize| stays[*i];

@@ -20,12 +20,12 @@ use crate::geom::KdTree;
 use glam::DVec3;
 
 /// A ball of so many points leaves a tenth of the noise; if it is this many noise levels wide it grows no further.
-pub(crate) const PLENTY: usize = 700;
-pub(crate) const WIDE_ENOUGH: f64 = 10.0;
+pub(crate) const PLENTY_OF_POINTS: usize = 700;
+pub(crate) const WIDEST_NOISE: f64 = 10.0;
 /// Points in the smallest ball.
 const SMALLEST: usize = 18;
 /// Ratio of the radii of two balls, one after the other.
-const GROWTH: f64 = 1.3;
+const BALL_GROWTH: f64 = 1.3;
 /// Largest number of balls: 18 points become 1.69^11 = 320 times as many.
 const BALLS: usize = 12;
 /// Balls per query of neighbours.
@@ -116,7 +116,7 @@ pub(crate) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
         r0 = start;
         p = onto_plane(tree, p, r0, scratch);
     }
-    let radius = |j: usize| r0 * GROWTH.powi(j as i32);
+    let radius = |j: usize| r0 * BALL_GROWTH.powi(j as i32);
     let quadric = |h: &Height| Quadric { center: p, scale: r0, a: h.implicit() };
     let mut sums = Moments::ZERO;
     let (mut best, mut least): (Option<Survey>, f64) = (None, f64::INFINITY);
@@ -127,7 +127,7 @@ pub(crate) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
     let mut usual = if prior.noise > 0.0 { prior.noise / r0 } else { f64::INFINITY };
     'rounds: for first in (0..BALLS).step_by(STRIDE) {
         let last = first + STRIDE - 1;
-        let limits: [f64; STRIDE] = std::array::from_fn(|k| GROWTH.powi(2 * (first + k) as i32));
+        let limits: [f64; STRIDE] = std::array::from_fn(|k| BALL_GROWTH.powi(2 * (first + k) as i32));
         fresh.iter_mut().for_each(Points::clear);
         around.clear();
         tree.within(p, radius(last) * (1.0 + 1e-12), |_, q, _| around.push(q));
@@ -146,10 +146,13 @@ pub(crate) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
             sums.join(&points.moments(ones));
             inner.append(points);
             let j = first + k;
-            if j > 0 && (radius(j) > reach || (inner.len() > PLENTY && GROWTH.powi(j as i32) > WIDE_ENOUGH * usual)) {
+            if j > 0
+                && (radius(j) > reach
+                    || (inner.len() > PLENTY_OF_POINTS && BALL_GROWTH.powi(j as i32) > WIDEST_NOISE * usual))
+            {
                 break 'rounds;
             }
-            let Some(ball) = Ball::fit(&sums, inner, GROWTH.powi(j as i32), prior, r0, rows) else { continue };
+            let Some(ball) = Ball::fit(&sums, inner, BALL_GROWTH.powi(j as i32), prior, r0, rows) else { continue };
             usual = usual.min(ball.noise);
             let error = ball.error(usual);
             if error < least {
@@ -273,11 +276,11 @@ struct Scatter {
 /// Noise inside the sectors and what the averages of the sectors hold beyond it.
 /// * `rows` - takes coordinates and residuals ([`Points::heights`])
 fn bias(height: &Height, points: &Points, ball: f64, rows: &mut [Vec<f64>; 3]) -> Scatter {
-    const SECTORS: usize = 16;
+    const SURVEY_SECTORS: usize = 16;
     // Two rings of equal area want five points in each part.
-    let rings = points.len() >= 5 * SECTORS;
+    let rings = points.len() >= 5 * SURVEY_SECTORS;
     let half = ball * ball / 2.0;
-    let mut sums = [(0.0, 0.0); SECTORS];
+    let mut sums = [(0.0, 0.0); SURVEY_SECTORS];
     let (mut squares, mut fourths) = (0.0, 0.0);
     points.heights(height, rows);
     let [us, vs, rs] = &*rows;

@@ -47,11 +47,11 @@ pub struct Part {
 }
 
 /// Face points keep this distance from the sides of their face, as a fraction of it.
-const CLEAR: f64 = 0.004;
+const FACE_MARGIN: f64 = 0.004;
 /// The tangents must cross at an angle with at least this sine.
 const CROSSING: f64 = 0.02;
 /// A meeting farther outside the face than this, in cells, is no feature of it.
-const FAR: f64 = 0.75;
+const FARTHEST_MEETING: f64 = 0.75;
 
 /// Face points of the three faces at the least node of each cell.
 pub fn face_points<'a>(
@@ -125,7 +125,7 @@ fn faint(
     let (mut p, tagged) = refine?.faint_point(axis, low, high, a, b)?;
     p[axis] = low[axis];
     let clear = (0..3).filter(|&u| u != axis).all(|u| {
-        let margin = CLEAR * (high[u] - low[u]);
+        let margin = FACE_MARGIN * (high[u] - low[u]);
         p[u] > low[u] + margin && p[u] < high[u] - margin
     });
     clear.then_some((p, tagged))
@@ -170,11 +170,11 @@ fn place(
         }
     }
     let q = meeting.filter(|q| q.is_finite())?;
-    let far = size * FAR;
+    let far = size * FARTHEST_MEETING;
     if q.cmplt(low - far).any() || q.cmpgt(high + far).any() {
         return None;
     }
-    let margin = size * CLEAR;
+    let margin = size * FACE_MARGIN;
     let near = margin * 1e-3;
     if q.cmpgt(low + near).all() && q.cmplt(high - near).all() {
         return Some((lift(q), None));

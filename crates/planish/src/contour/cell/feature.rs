@@ -15,9 +15,9 @@ pub enum Shape {
 }
 
 /// Normals closer than this (cosine) are one sample: how often a plane is hit must not weigh in the solution.
-const SAME: f64 = 0.9999;
+const SAME_NORMAL_COSINE: f64 = 0.9999;
 /// Singular values below this fraction of the greatest do not count.
-const RANK: f64 = 1e-3;
+const SINGULAR_RATIO: f64 = 1e-3;
 
 /// Classifies a loop by the opening angle of its normals ([K01] §4.2).
 /// * `sharp` - cosine below which two normals make a feature (theta_sharp)
@@ -53,7 +53,7 @@ pub fn solve(planes: &[(DVec3, DVec3)], near: DVec3, shape: Shape) -> DVec3 {
     let mut groups: Vec<(DVec3, DVec3, f64)> = Vec::with_capacity(planes.len());
     for &(p, n) in planes {
         let d = n.dot(p - near);
-        match groups.iter_mut().find(|g| g.1.dot(n) > SAME) {
+        match groups.iter_mut().find(|g| g.1.dot(n) > SAME_NORMAL_COSINE) {
             Some(g) => {
                 g.0.x += d;
                 g.2 += 1.0;
@@ -73,7 +73,7 @@ pub fn solve(planes: &[(DVec3, DVec3)], near: DVec3, shape: Shape) -> DVec3 {
     let (values, vectors) = eigen3(a);
     let rank = if shape == Shape::Edge { 2 } else { 3 };
     // Squares of the singular values.
-    let limit = RANK * RANK * values[2];
+    let limit = SINGULAR_RATIO * SINGULAR_RATIO * values[2];
     let mut x = DVec3::ZERO;
     for k in (3 - rank..3).rev() {
         if values[k] > limit {
@@ -89,7 +89,7 @@ fn in_closed_form(groups: &[(DVec3, DVec3, f64)]) -> Option<DVec3> {
     let (d, e, c) = (d.x / k, e.x / l, m.dot(*n));
     // Squares of the singular values are 1 + c and 1 - c.
     let apart = 1.0 - c * c;
-    (apart > RANK).then(|| (*m * (d - c * e) + *n * (e - c * d)) / apart)
+    (apart > SINGULAR_RATIO).then(|| (*m * (d - c * e) + *n * (e - c * d)) / apart)
 }
 
 #[cfg(test)]

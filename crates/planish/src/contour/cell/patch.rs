@@ -32,12 +32,12 @@ pub struct Inner {
 }
 
 /// Inner vertices are named from here until their number in the mesh is known.
-pub const INNER: u32 = 1 << 31;
+pub const FIRST_INNER: u32 = 1 << 31;
 
 /// What the cells of a few layers give.
 #[derive(Default)]
 pub struct Sheet {
-    /// Triangles; names of inner vertices begin at [`INNER`].
+    /// Triangles; names of inner vertices begin at [`FIRST_INNER`].
     pub triangles: Vec<[u32; 3]>,
     /// Inner vertices.
     pub inner: Vec<Inner>,
@@ -81,9 +81,9 @@ pub struct Scratch {
 }
 
 /// Inner vertices keep this distance from the faces of their cell, as a fraction of its size.
-const CLEAR: f64 = 0.004;
+const CELL_MARGIN: f64 = 0.004;
 /// Vertices farther from their cell than this are no feature of it, in cells.
-const FAR: f64 = 1.0;
+const FARTHEST_FEATURE: f64 = 1.0;
 
 impl Patcher<'_> {
     /// Appends the patches of `cell` to `sheet`.
@@ -144,7 +144,7 @@ impl Patcher<'_> {
         let (inner, triangles) = (&mut sheet.inner, &mut sheet.triangles);
         let mut vertex = |p: DVec3| {
             inner.push(Inner { p, kind: FeatureKind::None });
-            INNER + inner.len() as u32 - 1
+            FIRST_INNER + inner.len() as u32 - 1
         };
         caps::caps(&positions, cell.config, &loops, tunnel, &mut vertex, &mut |t| triangles.push(t));
         sheet.pushed += 1;
@@ -261,7 +261,7 @@ impl Patcher<'_> {
         let mut apex = clamped;
         let along = |r: &dyn Creases| r.nearest(clamped, (high - low).max_element(), &scratch.planes);
         let mut wish = moved.then(|| self.refine.filter(|_| shape == Shape::Edge).and_then(along).unwrap_or(p));
-        let mut given_up = !features || !p.is_finite() || !within(p, low, high, FAR);
+        let mut given_up = !features || !p.is_finite() || !within(p, low, high, FARTHEST_FEATURE);
         if !given_up && turned(l, apex) {
             // A clamped apex may see its fan from the wrong side, the free one not.
             apex = inside(middle, low, high).0;
@@ -302,13 +302,13 @@ impl Patcher<'_> {
 
     fn inner(&self, sheet: &mut Sheet, p: DVec3, kind: FeatureKind) -> u32 {
         sheet.inner.push(Inner { p, kind });
-        INNER + sheet.inner.len() as u32 - 1
+        FIRST_INNER + sheet.inner.len() as u32 - 1
     }
 
     /// Position of a vertex by its name.
     fn position(&self, id: u32, all: &[Corner], sheet: &Sheet) -> DVec3 {
-        if id >= INNER {
-            return sheet.inner[(id - INNER) as usize].p;
+        if id >= FIRST_INNER {
+            return sheet.inner[(id - FIRST_INNER) as usize].p;
         }
         match all.iter().find(|c| c.id == id) {
             Some(c) => c.p,
@@ -379,17 +379,21 @@ pub fn cell_corners(low: DVec3, high: DVec3) -> [DVec3; 8] {
 
 /// `p` kept clear of the faces of the cell, and whether it had to be moved.
 pub fn inside(p: DVec3, low: DVec3, high: DVec3) -> (DVec3, bool) {
-    let margin = (high - low) * CLEAR;
+    let margin = (high - low) * CELL_MARGIN;
     if p.is_nan() {
         return ((low + high) / 2.0, true);
     }
     let q = p.clamp(low + margin, high - margin);
     // A vertex that is inside already stays where it is, however near to a face.
-    if p.cmpgt(low + margin * NEAR).all() && p.cmplt(high - margin * NEAR).all() { (p, false) } else { (q, q != p) }
+    if p.cmpgt(low + margin * UNMOVED_SHARE).all() && p.cmplt(high - margin * UNMOVED_SHARE).all() {
+        (p, false)
+    } else {
+        (q, q != p)
+    }
 }
 
-/// Fraction of [`CLEAR`] from which on a vertex is left alone.
-const NEAR: f64 = 1e-3;
+/// Fraction of [`CELL_MARGIN`] from which on a vertex is left alone.
+const UNMOVED_SHARE: f64 = 1e-3;
 
 fn within(p: DVec3, low: DVec3, high: DVec3, reach: f64) -> bool {
     let slack = (high - low) * reach;

@@ -103,7 +103,7 @@ impl Trilinear {
         let [_, cx, cy, cz, cxy, cyz, czx, cxyz] = self.c;
         let scale = self.f.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         let mut found = Vec::new();
-        if cxyz.abs() > FLAT * scale {
+        if cxyz.abs() > NO_CUBIC_TERM * scale {
             // With X = cxyz x + cyz and so on, grad f = 0 reads Y Z = A, Z X = B, X Y = C.
             let (a, b, c) = (cxy * czx - cx * cxyz, cxy * cyz - cy * cxyz, cyz * czx - cz * cxyz);
             let product = a * b * c;
@@ -119,7 +119,7 @@ impl Trilinear {
             let m =
                 glam::DMat3::from_cols(DVec3::new(0.0, cxy, czx), DVec3::new(cxy, 0.0, cyz), DVec3::new(czx, cyz, 0.0));
             let det = m.determinant();
-            if det.abs() > (FLAT * scale).powi(3) {
+            if det.abs() > (NO_CUBIC_TERM * scale).powi(3) {
                 found.push(m.inverse() * -DVec3::new(cx, cy, cz));
             }
         }
@@ -140,7 +140,7 @@ impl Trilinear {
             // Directions in which the value goes away from the level: one for a saddle that joins.
             let away: Vec<usize> = (0..3).filter(|&k| values[k] * sign > 0.0).collect();
             let [one] = away[..] else { continue };
-            let ends = [1.0, -1.0].map(|way| self.climb(saddle + vectors[one] * way * START, sign));
+            let ends = [1.0, -1.0].map(|way| self.climb(saddle + vectors[one] * way * SADDLE_START, sign));
             if region[ends[0]] != region[ends[1]] {
                 return Some(ends);
             }
@@ -150,7 +150,7 @@ impl Trilinear {
 
     /// The corner of the cell that is reached by following the value away from the level.
     fn climb(&self, mut p: DVec3, sign: f64) -> usize {
-        for _ in 0..STEPS {
+        for _ in 0..MOST_SADDLE_STEPS {
             let mut g = self.gradient(p) * sign;
             // On the boundary only along it.
             for k in 0..3 {
@@ -162,19 +162,19 @@ impl Trilinear {
             if g == DVec3::ZERO {
                 break;
             }
-            p = (p + g * STEP).clamp(DVec3::ZERO, DVec3::ONE);
+            p = (p + g * SADDLE_STEP).clamp(DVec3::ZERO, DVec3::ONE);
         }
         (p.x > 0.5) as usize | ((p.y > 0.5) as usize) << 1 | ((p.z > 0.5) as usize) << 2
     }
 }
 
 /// The cubic term counts as none below this fraction of the values.
-const FLAT: f64 = 1e-12;
+const NO_CUBIC_TERM: f64 = 1e-12;
 /// Length of the first step from a saddle and of the others, of the cell.
-const START: f64 = 1e-3;
-const STEP: f64 = 0.01;
+const SADDLE_START: f64 = 1e-3;
+const SADDLE_STEP: f64 = 0.01;
 /// Steps until a corner is reached for sure: a path across the cell is a few edges long.
-const STEPS: usize = 600;
+const MOST_SADDLE_STEPS: usize = 600;
 
 #[cfg(test)]
 mod tests {

@@ -11,13 +11,13 @@ use glam::DVec3;
 /// A vertex that is this near to a corner of the source is there, in cells.
 pub const TAKEN: f64 = 1e-6;
 /// An edge follows a line of the source if it is nowhere farther from one, in cells.
-const ALONG: f64 = 0.1;
+const ALONG_LINE_CELLS: f64 = 0.1;
 /// A line of the source is missed where the mesh is farther from it than this, in cells, and is looked for as far as
 /// that.
 const MISSED: f64 = 0.02;
 const ALONG_SIDE: f64 = 0.75;
 /// Places on an edge at which that is asked.
-const PLACES: [f64; 3] = [0.25, 0.5, 0.75];
+const PLACES_ON_EDGE: [f64; 3] = [0.25, 0.5, 0.75];
 
 /// Where lines run: for each feature vertex those beside it on its lines.
 pub struct Lines {
@@ -101,7 +101,9 @@ pub fn follow(
         tree.within(p, TAKEN * size, |_, _, _| found = true);
         found
     };
-    let along = |a: DVec3, b: DVec3| PLACES.iter().all(|&s| creases.nearest(a.lerp(b, s), ALONG * size, &[]).is_some());
+    let along = |a: DVec3, b: DVec3| {
+        PLACES_ON_EDGE.iter().all(|&s| creases.nearest(a.lerp(b, s), ALONG_LINE_CELLS * size, &[]).is_some())
+    };
     let mut nodes: Vec<u32> = lines
         .vertices()
         .filter(|(v, beside)| beside.len() == 1 || kinds[*v as usize] == FeatureKind::Corner)
@@ -115,7 +117,7 @@ pub fn follow(
             let between = |x: &u32| {
                 let p = local.position(*x);
                 let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
-                lines.beside(w).contains(x) && p.distance(a.lerp(b, t)) < ALONG * size
+                lines.beside(w).contains(x) && p.distance(a.lerp(b, t)) < ALONG_LINE_CELLS * size
             };
             if lines.beside(v).iter().any(between) || !(along(a, b) || is_corner(a) && is_corner(b)) {
                 lines.part(v, w);

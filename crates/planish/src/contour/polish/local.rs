@@ -21,13 +21,13 @@ pub const GONE: [u32; 3] = [u32::MAX; 3];
 /// Name of no star.
 const NONE: u32 = u32::MAX;
 /// A triangle leans if its normal has a cosine below this with those of all hits among its corners.
-const LEAN: f64 = 0.5;
+const LEANING_COSINE: f64 = 0.5;
 /// Changed triangles within so many cells are compared with the same others.
-const CLOSE: f64 = 5.0;
+const COMPARED_CELLS: f64 = 5.0;
 /// Rounding may put a place into the next cell if it is this near, in cells.
-const SLACK: f64 = 1e-6;
+const CELL_SLACK: f64 = 1e-6;
 /// A vertex reaches over so many triangles at most.
-const FLIPS: usize = 4;
+const MOST_FLIPS: usize = 4;
 
 /// Whether a move may make triangles lean.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -365,7 +365,7 @@ impl<'a> Local<'a> {
         let mut flips: Vec<Flip> = Vec::new();
         let mut star = self.star(v).to_vec();
         let mut clear = false;
-        while flips.len() < FLIPS {
+        while flips.len() < MOST_FLIPS {
             self.mesh.points[v as usize] = to;
             let bars = self.in_the_way(&star);
             self.mesh.points[v as usize] = from;
@@ -538,7 +538,8 @@ impl<'a> Local<'a> {
                 let n = self.mesh.area_vector(t as usize);
                 let best = names.iter().filter_map(|&v| self.normal(v)).map(|m| m.dot(n)).fold(f64::NAN, f64::max);
                 let against = best <= 0.0;
-                (against || best * best <= LEAN * LEAN * n.length_squared()) as usize + against as usize
+                (against || best * best <= LEANING_COSINE * LEANING_COSINE * n.length_squared()) as usize
+                    + against as usize
             })
             .sum()
     }
@@ -566,7 +567,7 @@ impl<'a> Local<'a> {
         let embedded = own.iter().enumerate().all(|(n, s)| apart(n, s)) && {
             // One look at the cells around all of them, unless they reach far.
             let [low, high] = bounds(&own);
-            if (high - low).cmple(self.field.lattice.step * CLOSE).all() {
+            if (high - low).cmple(self.field.lattice.step * COMPARED_CELLS).all() {
                 self.is_free(&own, low, high)
             } else {
                 own.iter().all(|t| {
@@ -603,7 +604,7 @@ impl<'a> Local<'a> {
     /// First and last cells of the lattice that a box reaches into; a vertex may lie on the very face of its cell.
     fn reach(&self, low: DVec3, high: DVec3) -> [[i64; 2]; 3] {
         let l = &self.field.lattice;
-        let (low, high) = (self.cell(low - l.step * SLACK), self.cell(high + l.step * SLACK));
+        let (low, high) = (self.cell(low - l.step * CELL_SLACK), self.cell(high + l.step * CELL_SLACK));
         [0, 1, 2].map(|a| [low[a].max(0), high[a].min(self.size[a] as i64 - 1)])
     }
 

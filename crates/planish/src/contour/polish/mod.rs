@@ -29,7 +29,7 @@ use std::collections::{BTreeSet, HashMap};
 /// Parts of the way that are tried in the end.
 const WAYS: [f64; 3] = [1.0, 0.6, 0.3];
 /// Rounds: a neighbour that moved may make room.
-const ROUNDS: usize = 8;
+const MOVE_ROUNDS: usize = 8;
 /// So many vertices move together at most.
 const TOGETHER: usize = 24;
 /// A corner calls vertices of lines from this distance, in cells, and so many of them at most.
@@ -117,7 +117,7 @@ pub fn polish(
         }
     }
     let mut tried = [(); 3].map(|()| Tried { names: open.clone(), at: vec![None; open.len()] });
-    for _ in 0..ROUNDS {
+    for _ in 0..MOVE_ROUNDS {
         let before = open.len();
         together(&mut local, &lines, &targets, &mut open);
         let [single, merged, flipped] = &mut tried;
@@ -322,7 +322,7 @@ fn merge_along(
 /// A part of the way, also where triangles lean for a while; where they stay turned the vertex goes back.
 fn approach(local: &mut Local, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32>) {
     let starts: Vec<(u32, DVec3)> = open.iter().map(|&v| (v, local.position(v))).collect();
-    for _ in 0..ROUNDS {
+    for _ in 0..MOVE_ROUNDS {
         let before = open.len();
         open.retain(|&v| {
             let (start, target) = (local.position(v), targets[&v]);
@@ -335,7 +335,7 @@ fn approach(local: &mut Local, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32
             break;
         }
     }
-    for _ in 0..ROUNDS {
+    for _ in 0..MOVE_ROUNDS {
         let mut back = false;
         for &(v, start) in &starts {
             let here = local.position(v);
@@ -458,7 +458,7 @@ fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corne
 }
 
 /// Triangles that a task looks at.
-const CHUNK: usize = 1 << 14;
+const TRIANGLES_PER_CHUNK: usize = 1 << 14;
 
 /// Triangles of next to no area.
 fn thin(mesh: &TriMesh) -> Vec<u32> {
@@ -471,9 +471,11 @@ fn thin(mesh: &TriMesh) -> Vec<u32> {
     };
     let parts: Vec<Vec<u32>> = mesh
         .triangles
-        .par_chunks(CHUNK)
+        .par_chunks(TRIANGLES_PER_CHUNK)
         .enumerate()
-        .map(|(n, part)| (0..part.len()).filter(|&t| thin(&part[t])).map(|t| (n * CHUNK + t) as u32).collect())
+        .map(|(n, part)| {
+            (0..part.len()).filter(|&t| thin(&part[t])).map(|t| (n * TRIANGLES_PER_CHUNK + t) as u32).collect()
+        })
         .collect();
     parts.concat()
 }

@@ -19,13 +19,13 @@ pub struct FieldCreases<'a> {
 }
 
 /// Fractions of the way from the feature to the hits at which the surfaces are asked again.
-const ROUNDS: [f64; 3] = [0.3, 0.03, 0.002];
+const HIT_FRACTIONS: [f64; 3] = [0.3, 0.03, 0.002];
 /// The surface is sought on both sides of the tangent, within this fraction of the distance.
-const SPAN: f64 = 0.7;
+const SEARCH_SPAN: f64 = 0.7;
 /// All surfaces pass a corner within this fraction of the search's reach.
 const OFF_CORNER: f64 = 1e-6;
 /// Normals that still belong to the same surface (cosine).
-const SAME: f64 = 0.8;
+const SAME_SURFACE_COSINE: f64 = 0.8;
 
 impl<'a> FieldCreases<'a> {
     /// Asks `field`; `sharp` and `corner` are the thresholds of the extraction.
@@ -43,7 +43,7 @@ impl<'a> FieldCreases<'a> {
         }
         let across = across.try_normalize()?;
         let q = p + way * share;
-        let span = SPAN * share * way.length();
+        let span = SEARCH_SPAN * share * way.length();
         let at = |t: f64| q + across * (span * (2.0 * t - 1.0));
         let ends = [at(0.0), at(1.0)];
         let near = self.field.within(&Aabb { min: ends[0].min(ends[1]), max: ends[0].max(ends[1]) });
@@ -55,7 +55,7 @@ impl<'a> FieldCreases<'a> {
         }
         let found = at(root(|t| field.value(at(t)), f0, f1));
         let normal = field.gradient(found);
-        (normal.dot(n) > SAME).then_some((found, normal))
+        (normal.dot(n) > SAME_SURFACE_COSINE).then_some((found, normal))
     }
 }
 
@@ -63,7 +63,7 @@ impl Creases for FieldCreases<'_> {
     fn face_point(&self, axis: usize, guess: DVec3, a: (DVec3, DVec3), b: (DVec3, DVec3), size: f64) -> Option<DVec3> {
         let mut p = guess;
         let mut found = None;
-        for share in ROUNDS {
+        for share in HIT_FRACTIONS {
             let (Some(s), Some(t)) = (self.again(p, a, share, Some(axis)), self.again(p, b, share, Some(axis))) else {
                 break;
             };
@@ -96,7 +96,7 @@ impl Creases for FieldCreases<'_> {
         let size = (high - low).max_element();
         let mut p = guess;
         let mut found = None;
-        for share in ROUNDS {
+        for share in HIT_FRACTIONS {
             let planes: Vec<_> = hits.iter().filter_map(|&hit| self.again(p, hit, share, None)).collect();
             let normals: Vec<DVec3> = planes.iter().map(|p| p.1).collect();
             let shape = classify(&normals, self.sharp, self.corner);
@@ -119,7 +119,7 @@ impl Creases for FieldCreases<'_> {
 
     fn nearest(&self, p: DVec3, reach: f64, hits: &[(DVec3, DVec3)]) -> Option<DVec3> {
         let mut found = solve(hits, p, Shape::Edge);
-        for share in ROUNDS {
+        for share in HIT_FRACTIONS {
             let planes: Vec<_> = hits.iter().filter_map(|&hit| self.again(found, hit, share, None)).collect();
             let normals: Vec<DVec3> = planes.iter().map(|p| p.1).collect();
             if classify(&normals, self.sharp, self.corner) == Shape::Smooth {
@@ -135,7 +135,7 @@ impl Creases for FieldCreases<'_> {
             return None;
         }
         let mut p = solve(hits, guess, Shape::Corner);
-        for share in ROUNDS {
+        for share in HIT_FRACTIONS {
             if !(p.distance(guess) < reach) {
                 return None;
             }
@@ -148,7 +148,7 @@ impl Creases for FieldCreases<'_> {
         }
         // Where three surfaces do not meet in a point there is none.
         let off = |&(s, n): &(DVec3, DVec3)| n.dot(p - s).abs() > OFF_CORNER * reach;
-        let last: Vec<_> = hits.iter().filter_map(|&hit| self.again(p, hit, ROUNDS[2], None)).collect();
+        let last: Vec<_> = hits.iter().filter_map(|&hit| self.again(p, hit, HIT_FRACTIONS[2], None)).collect();
         (p.distance(guess) < reach && !last.iter().any(off)).then_some(p)
     }
 }

@@ -17,7 +17,7 @@ use crate::observe::Observer;
 /// Points whose distances along the surface differ from even by more than this are moved.
 const UNEVEN: f64 = 0.02;
 /// Rounds of putting at equal arc length; a few are the rule.
-const ROUNDS: usize = 24;
+const EVEN_ROUNDS: usize = 24;
 /// Halvings of the bracket of a step, and of the way to the next point.
 const HALVINGS: usize = 24;
 
@@ -86,7 +86,7 @@ impl Snake<'_> {
         let count = places.len();
         let mut best = (f64::INFINITY, places.clone(), Vec::new());
         let mut places = places;
-        for _ in 0..ROUNDS {
+        for _ in 0..EVEN_ROUNDS {
             let (chain, lengths) = self.joined(&places)?;
             let off = uneven(&lengths);
             if off < best.0 {

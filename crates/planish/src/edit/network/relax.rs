@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Places beside a section that tell it how the rest of its curve runs.
-const BESIDE: usize = 2;
+const PLACES_BESIDE_SECTION: usize = 2;
 
 /// A closed curve shorter than this many mean edges is none.
 const SHORTEST_LOOP: f64 = 3.0;
@@ -251,7 +251,8 @@ impl<'m> Editor<'m> {
             let share = (s - sums[k]) / (sums[k + 1] - sums[k]).max(f64::MIN_POSITIVE);
             between(self.mesh, self.adjacency, &old.points[k], &old.points[k + 1], share.clamp(0.0, 1.0))
         };
-        let steps = |room: f64| (1..=BESIDE).map(move |k| k as f64 * spacing).take_while(move |s| *s <= room);
+        let steps =
+            |room: f64| (1..=PLACES_BESIDE_SECTION).map(move |k| k as f64 * spacing).take_while(move |s| *s <= room);
         let mut points: Vec<FacePoint> = steps(sums[first]).map(|s| place(sums[first] - s)).collect();
         let before = points.len();
         points.reverse();

@@ -14,7 +14,7 @@ use glam::{DMat2, DVec2, DVec3};
 /// Distortion of a triangle above which its corners move.
 const SQUEEZED: f64 = 6.0;
 /// Sweeps over such corners, and the part of their energy that a sweep has to win.
-const SWEEPS: usize = 60;
+const LOOSEN_SWEEPS: usize = 60;
 const LEAST_GAIN: f64 = 1e-3;
 /// Halvings of a step.
 const HALVINGS: usize = 12;
@@ -62,7 +62,7 @@ pub fn loosen(chart: &mut Chart, boundary: &[bool], lengths: DVec2) {
     let energy = |wings: &[Wing], p: DVec2| -> Option<f64> {
         wings.iter().map(|w| w.distortion(p).map(|d| w.area * d.0 * d.0)).sum()
     };
-    for _ in 0..SWEEPS {
+    for _ in 0..LOOSEN_SWEEPS {
         let (mut before, mut after) = (0.0, 0.0);
         for v in (0..chart.points.len() as u32).filter(|&v| !boundary[v as usize]) {
             let wings = wings(chart, v);

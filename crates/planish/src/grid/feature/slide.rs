@@ -19,13 +19,13 @@ use crate::observe::{Observer, Part};
 use glam::DVec3;
 
 /// Cells of the sub-patches in both directions from which slides are read.
-const CELLS: usize = 16;
+const SUB_PATCH_CELLS: usize = 16;
 /// A point is to lie on the straight way between the nodes this many cells off on both sides.
-const REACH: usize = 4;
+const STRAIGHT_CELLS: usize = 4;
 /// Rounds of relaxing and sliding: the nodes off the curve follow its points.
-const ROUNDS: usize = 2;
+const SLIDE_ROUNDS: usize = 2;
 /// Weight of even spacing against fairness.
-const EVEN: f64 = 0.5;
+const EVEN_WEIGHT: f64 = 0.5;
 /// Neighbours on a curve keep at least this share of their even distance.
 const LEAST_GAP: f64 = 0.4;
 
@@ -66,7 +66,7 @@ pub(crate) fn read(
 ) -> Result<Vec<[Option<Slide>; 4]>, GridError> {
     // Detail counts nothing here.
     let params = GridParams { miss: f64::INFINITY, ..params.clone() };
-    let sizes = vec![(CELLS + 1, CELLS + 1); sub.len()];
+    let sizes = vec![(SUB_PATCH_CELLS + 1, SUB_PATCH_CELLS + 1); sub.len()];
     let sides = |p: usize| {
         // Side 1 runs with the v curve and side 3 beyond against it; side 0 above the u curve with it, side 2 below against.
         let across = (!(p + 1).is_multiple_of(nu)).then_some([(p, 1), (p + 1, 3)]);
@@ -76,14 +76,16 @@ pub(crate) fn read(
     let pairs: Vec<[(usize, usize); 2]> = (0..sub.len()).flat_map(sides).collect();
     let mut out: Vec<[Option<Slide>; 4]> = vec![[None, None, None, None]; sub.len()];
     for &[(p, with), (q, against)] in &pairs {
-        let at: Vec<f64> = (0..=CELLS).map(|k| k as f64 / CELLS as f64).collect();
+        let at: Vec<f64> = (0..=SUB_PATCH_CELLS).map(|k| k as f64 / SUB_PATCH_CELLS as f64).collect();
         out[p][with] = Some(Slide { at: at.clone(), against: false });
         out[q][against] = Some(Slide { at, against: true });
     }
-    for round in 0..ROUNDS {
-        let stops: Vec<SideStops> =
-            out.iter().map(|s| s.each_ref().map(|s| s.as_ref().map_or_else(Stops::new, |s| s.stops(CELLS)))).collect();
-        let part = Part::new(observer, round as f64 / ROUNDS as f64, 1.0 / ROUNDS as f64);
+    for round in 0..SLIDE_ROUNDS {
+        let stops: Vec<SideStops> = out
+            .iter()
+            .map(|s| s.each_ref().map(|s| s.as_ref().map_or_else(Stops::new, |s| s.stops(SUB_PATCH_CELLS))))
+            .collect();
+        let part = Part::new(observer, round as f64 / SLIDE_ROUNDS as f64, 1.0 / SLIDE_ROUNDS as f64);
         let grids = relax_at(ground, sub, &sizes, &stops, &params, &part)?;
         for &[(p, with), (q, against)] in &pairs {
             let before = out[p][with].take().map_or_else(Vec::new, |s| s.at);
@@ -101,12 +103,12 @@ fn slid(before: &[f64], (patch, k, grid): (&PatchMesh, usize, &Grid), other: (us
     let length = polyline::length(patch.sides[k].iter().map(|&v| patch.mesh.points[v as usize]));
     let point = |n: usize| grid.points[rim_node(k, n, grid.cols, grid.rows)];
     let mut wanted = before.to_vec();
-    for n in 1..CELLS {
+    for n in 1..SUB_PATCH_CELLS {
         if !(length > 0.0) {
             break;
         }
         let (a, p) = (inward(grid, k, n), point(n));
-        let b = inward(other.1, other.0, CELLS - n);
+        let b = inward(other.1, other.0, SUB_PATCH_CELLS - n);
         let (near, far) = (a.distance(p), b.distance(p));
         if near + far > 0.0 {
             let between = a.lerp(b, near / (near + far));
@@ -117,7 +119,7 @@ fn slid(before: &[f64], (patch, k, grid): (&PatchMesh, usize, &Grid), other: (us
     balanced(&wanted)
 }
 
-/// The node [`REACH`] cells in from the `n`-th point of side `k`.
+/// The node [`STRAIGHT_CELLS`] cells in from the `n`-th point of side `k`.
 fn inward(grid: &Grid, k: usize, n: usize) -> DVec3 {
     let step: isize = match k {
         0 => grid.cols as isize,
@@ -126,22 +128,22 @@ fn inward(grid: &Grid, k: usize, n: usize) -> DVec3 {
         _ => 1,
     };
     let rim = rim_node(k, n, grid.cols, grid.rows) as isize;
-    grid.points[(rim + step * REACH as isize) as usize]
+    grid.points[(rim + step * STRAIGHT_CELLS as isize) as usize]
 }
 
-/// Shares near the wanted ones and evenly spaced: the least of `sum (t - wanted)² + EVEN sum (gap - even gap)²`, drawn
+/// Shares near the wanted ones and evenly spaced: the least of `sum (t - wanted)² + EVEN_WEIGHT sum (gap - even gap)²`, drawn
 /// back to even where gaps would get too small.
 fn balanced(wanted: &[f64]) -> Vec<f64> {
     let cells = wanted.len() - 1;
     let even = 1.0 / cells as f64;
-    // A tridiagonal system with 1 + 2 EVEN on the diagonal and -EVEN beside it.
-    let diagonal = 1.0 + 2.0 * EVEN;
+    // A tridiagonal system with 1 + 2 EVEN_WEIGHT on the diagonal and -EVEN_WEIGHT beside it.
+    let diagonal = 1.0 + 2.0 * EVEN_WEIGHT;
     let (mut upper, mut rhs) = (vec![0.0; cells + 1], vec![0.0; cells + 1]);
     for k in 1..cells {
-        let before = if k > 1 { -EVEN } else { 0.0 };
-        let own = wanted[k] + if k + 1 == cells { EVEN } else { 0.0 };
+        let before = if k > 1 { -EVEN_WEIGHT } else { 0.0 };
+        let own = wanted[k] + if k + 1 == cells { EVEN_WEIGHT } else { 0.0 };
         let pivot = diagonal - before * upper[k - 1];
-        upper[k] = -EVEN / pivot;
+        upper[k] = -EVEN_WEIGHT / pivot;
         rhs[k] = (own - before * rhs[k - 1]) / pivot;
     }
     let mut at = vec![0.0; cells + 1];
@@ -160,25 +162,26 @@ mod tests {
 
     #[test]
     fn shares_that_are_wanted_evenly_stay_to_1e_12_and_gaps_keep_two_fifths() {
-        let even: Vec<f64> = (0..=CELLS).map(|k| k as f64 / CELLS as f64).collect();
+        let even: Vec<f64> = (0..=SUB_PATCH_CELLS).map(|k| k as f64 / SUB_PATCH_CELLS as f64).collect();
         for (a, b) in balanced(&even).iter().zip(&even) {
             assert!((a - b).abs() < 1e-12);
         }
         let crowded: Vec<f64> = even.iter().map(|s| s.powi(6)).collect();
         let at = balanced(&crowded);
         let gaps: Vec<f64> = at.windows(2).map(|w| w[1] - w[0]).collect();
-        assert!(gaps.iter().all(|g| *g > 0.399 / CELLS as f64), "{gaps:?}");
-        assert!((at[0], at[CELLS]) == (0.0, 1.0) && at[CELLS / 2] < 0.45);
+        assert!(gaps.iter().all(|g| *g > 0.399 / SUB_PATCH_CELLS as f64), "{gaps:?}");
+        assert!((at[0], at[SUB_PATCH_CELLS]) == (0.0, 1.0) && at[SUB_PATCH_CELLS / 2] < 0.45);
     }
 
     #[test]
     fn the_balance_solves_its_equations_within_1e_12() {
-        let wanted: Vec<f64> = (0..=CELLS).map(|k| k as f64 / CELLS as f64 + 0.01 * (k as f64).sin()).collect();
+        let wanted: Vec<f64> =
+            (0..=SUB_PATCH_CELLS).map(|k| k as f64 / SUB_PATCH_CELLS as f64 + 0.01 * (k as f64).sin()).collect();
         let mut wanted = wanted;
-        (wanted[0], wanted[CELLS]) = (0.0, 1.0);
+        (wanted[0], wanted[SUB_PATCH_CELLS]) = (0.0, 1.0);
         let at = balanced(&wanted);
-        for k in 1..CELLS {
-            let residual = at[k] - wanted[k] + EVEN * (2.0 * at[k] - at[k - 1] - at[k + 1]);
+        for k in 1..SUB_PATCH_CELLS {
+            let residual = at[k] - wanted[k] + EVEN_WEIGHT * (2.0 * at[k] - at[k - 1] - at[k + 1]);
             assert!(residual.abs() < 1e-12, "{k} {residual}");
         }
     }

@@ -15,7 +15,7 @@ use crate::observe::Observer;
 use rayon::prelude::*;
 
 /// Sweeps over the missed vertices; each sees the points that the one before moved.
-const SWEEPS: usize = 3;
+const CATCH_SWEEPS: usize = 3;
 
 /// Rings of cells around a node in which the surface is looked for before all of it is.
 const RINGS: [usize; 3] = [1, 3, 8];
@@ -30,7 +30,7 @@ const LEAST_SINE: f64 = 0.15;
 pub fn catch(net: &mut Net, allowed: f64, observer: &dyn Observer) -> Result<(), Fault> {
     let spots = vertex_spots(net.chart);
     let mut moved = vec![false; net.points.len()];
-    for _ in 0..SWEEPS {
+    for _ in 0..CATCH_SWEEPS {
         observer.check()?;
         let suspects = suspects(net, allowed);
         if suspects.is_empty() {

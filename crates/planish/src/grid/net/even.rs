@@ -9,7 +9,7 @@ use crate::observe::Observer;
 use glam::DVec2;
 
 /// Part of the way that a round goes.
-const SHARE: f64 = 0.6;
+const EVEN_STEP: f64 = 0.6;
 
 /// Evens the spacing of `net` in `rounds` rounds over lines and columns.
 pub fn even<'a>(mut net: Net<'a>, rounds: usize, observer: &dyn Observer) -> Result<Net<'a>, Fault> {
@@ -80,7 +80,7 @@ fn even_curve(net: &Net, count: usize, node: &dyn Fn(usize) -> usize, target: &m
     let total = arc[arc.len() - 1];
     for k in 1..count - 1 {
         let goal = total * k as f64 / (count - 1) as f64;
-        let s = at_node[k] + SHARE * (goal - at_node[k]);
+        let s = at_node[k] + EVEN_STEP * (goal - at_node[k]);
         let i = arc.partition_point(|x| *x <= s).clamp(1, arc.len() - 1);
         let span = arc[i] - arc[i - 1];
         let t = if span > 0.0 { ((s - arc[i - 1]) / span).clamp(0.0, 1.0) } else { 0.0 };

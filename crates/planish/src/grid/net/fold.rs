@@ -15,18 +15,18 @@ use crate::observe::Observer;
 use glam::DVec3;
 
 /// Cells to each side over which the normal is averaged.
-const REACH: usize = 2;
+const NORMAL_CELLS: usize = 2;
 /// Folded cells, per point of the net, up to which they are opened one by one, and the part of those of a round
 /// that may be left for another, which a handful is worth in any case.
-const FEW: f64 = 0.2;
-const WORTH: f64 = 0.75;
+const FEW_FOLDS: f64 = 0.2;
+const WORTHWHILE_LEFT: f64 = 0.75;
 const HANDFUL: usize = 8;
 /// Rounds of opening folds, each with a ring of cells more than the one before, and sweeps over the points in each.
-const ROUNDS: usize = 8;
+const OPENING_ROUNDS: usize = 8;
 const RINGS: usize = 2;
-const SWEEPS: usize = 24;
+const OPENING_SWEEPS: usize = 24;
 /// Moves that are tried, in cells; if all points moved by less than the last but one, they rest.
-const STEPS: [f64; 6] = [0.5, 0.25, 0.12, 0.06, 0.03, 0.01];
+const TRIED_MOVES: [f64; 6] = [0.5, 0.25, 0.12, 0.06, 0.03, 0.01];
 const STILL: f64 = 0.03;
 /// Least area, in cells, that a corner is taken to have, and the part of the worst folded one's that it has besides.
 const LEAST_AREA: f64 = 1e-3;
@@ -54,9 +54,9 @@ impl Sheet<'_> {
     fn around(&self, c: usize) -> impl Iterator<Item = [DVec3; 4]> {
         let (m, n) = (self.cols - 1, self.rows - 1);
         let (i, j) = (c % m, c / m);
-        let lines = j.saturating_sub(REACH)..(j + REACH + 1).min(n);
+        let lines = j.saturating_sub(NORMAL_CELLS)..(j + NORMAL_CELLS + 1).min(n);
         lines.flat_map(move |y| {
-            let places = i.saturating_sub(REACH)..(i + REACH + 1).min(m);
+            let places = i.saturating_sub(NORMAL_CELLS)..(i + NORMAL_CELLS + 1).min(m);
             places.map(move |x| cell_corners(self.cols, y * m + x).map(|k| self.points[k]))
         })
     }
@@ -109,8 +109,8 @@ fn cells_around(cols: usize, k: usize) -> [usize; 4] {
 /// Source: Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov 2021: the squares of the edges over twice the
 /// area, where an area that is not positive is taken for a small one; the smaller, the less is folded.
 pub fn open_folds(net: &mut Net, strictly: bool, observer: &dyn Observer) -> Result<bool, Fault> {
-    let mut before = (net.points.len() as f64 * FEW) as usize;
-    for round in 0..ROUNDS {
+    let mut before = (net.points.len() as f64 * FEW_FOLDS) as usize;
+    for round in 0..OPENING_ROUNDS {
         let folded = folded_cells(net);
         if folded.is_empty() {
             return Ok(true);
@@ -118,9 +118,9 @@ pub fn open_folds(net: &mut Net, strictly: bool, observer: &dyn Observer) -> Res
         if folded.len() > before {
             break;
         }
-        before = before.min((folded.len() as f64 * WORTH) as usize).max(HANDFUL);
+        before = before.min((folded.len() as f64 * WORTHWHILE_LEFT) as usize).max(HANDFUL);
         let region = Region::new(net, &folded, RINGS + round);
-        for _ in 0..SWEEPS {
+        for _ in 0..OPENING_SWEEPS {
             observer.check()?;
             if region.sweep(net, strictly) < STILL {
                 break;
@@ -228,7 +228,7 @@ impl Region {
             let gradient = s * slope(net, s) + t * slope(net, t);
             let downhill = -gradient.normalize_or_zero() * length;
             let spot = net.spots[k];
-            for step in STEPS {
+            for step in TRIED_MOVES {
                 place(net, k, net.chart.advance(spot, downhill * step));
                 if self.energy(net, k) < before && !(strictly && turns_around(net, k)) {
                     longest = longest.max(step);

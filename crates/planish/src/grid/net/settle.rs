@@ -33,7 +33,7 @@ pub const CG_STEPS: usize = 24;
 const ATTEMPTS: usize = 4;
 const DAMPING_STEP: f64 = 10.0;
 /// A round that lowers the energy by less than this fraction ends the resolution.
-const SETTLED: f64 = 1e-3;
+const LEAST_ENERGY_DROP: f64 = 1e-3;
 /// Conjugate gradients rest where the square of the preconditioned residual has fallen to this share.
 const CG_REST: f64 = 1e-6;
 
@@ -68,7 +68,7 @@ pub fn settle<'a>(
             }
             damping *= DAMPING_STEP;
         }
-        if least >= before * (1.0 - SETTLED) {
+        if least >= before * (1.0 - LEAST_ENERGY_DROP) {
             break;
         }
         known = Some(least);

@@ -73,12 +73,12 @@ impl Quadric {
 /// Pull towards the edge, relative to the quadric: keeps places on flat and straight parts evenly spread.
 const PULL: f64 = 1e-4;
 /// Weight of the planes that hold a sharp line in place, relative to those of the surface.
-const LINE: f64 = 4.0;
+const LINE_WEIGHT: f64 = 4.0;
 /// A triangle may turn so far (cosine), and its height shrink to this share of its longest edge.
-const TURN: f64 = 0.2;
+const FACE_TURN_COSINE: f64 = 0.2;
 const SLIVER: f64 = 0.001;
 /// The normal of a triangle whose height is below this share of its longest edge tells nothing.
-const THIN: f64 = 0.1;
+const THIN_TRIANGLE: f64 = 0.1;
 /// Collapses between two looks at the observer.
 const LOOK: usize = 1 << 12;
 
@@ -239,7 +239,7 @@ impl<'a> Collapse<'a> {
             let end = (k + 1) % 3;
             let d = p[end] - p[k];
             let upright = n.cross(d).normalize_or_zero();
-            let plane = Quadric::plane(upright, p[k], share * LINE * d.length_squared() / 6.0);
+            let plane = Quadric::plane(upright, p[k], share * LINE_WEIGHT * d.length_squared() / 6.0);
             let plane = Quadric { weight: 0.0, ..plane };
             [k, end].into_iter().for_each(|k| self.quadrics[corners[k] as usize].add(&plane));
         }
@@ -494,8 +494,8 @@ impl<'a> Collapse<'a> {
                 let longest = (px - p).length_squared().max((py - p).length_squared()).max((px - py).length_squared());
                 let before = (px - pv).length_squared().max((py - pv).length_squared()).max((px - py).length_squared());
                 // The normal of a sliver tells nothing; what is around does.
-                let (facing, length) = if lo < THIN * before { (around, around.length()) } else { (old, lo) };
-                if facing.dot(new) < TURN * length * ln || ln == 0.0 {
+                let (facing, length) = if lo < THIN_TRIANGLE * before { (around, around.length()) } else { (old, lo) };
+                if facing.dot(new) < FACE_TURN_COSINE * length * ln || ln == 0.0 {
                     return false;
                 }
                 // Slivers may stay, but not arise.

@@ -2,12 +2,12 @@
 //!
 //! See `docs/methods/contour.md`, step 7.
 
-use super::{FLIPS, GONE, LEAN, Local, Stray};
+use super::{GONE, LEANING_COSINE, Local, MOST_FLIPS, Stray};
 use crate::geom::closest_in_triangle;
 use glam::DVec3;
 
 /// Weight of a corner below which a place in a triangle is as well on the edge opposite of it.
-const INNER: f64 = 0.2;
+const INNER_WEIGHT: f64 = 0.2;
 
 impl Local<'_> {
     /// Places a new vertex at `p` by dividing the nearest triangle, or two over one of its edges, if the mesh is
@@ -30,7 +30,7 @@ impl Local<'_> {
             near.push((square.sqrt(), t, bary));
         }
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        near.truncate(FLIPS);
+        near.truncate(MOST_FLIPS);
         near.retain(|n| n.0 < reach);
         near.into_iter().find_map(|(_, t, bary)| {
             let names = self.mesh.triangles[t as usize];
@@ -38,7 +38,7 @@ impl Local<'_> {
             let k = (0..3).min_by(|&i, &j| bary[i].total_cmp(&bary[j])).unwrap_or(0);
             let (a, b) = (names[(k + 1) % 3], names[(k + 2) % 3]);
             let shares = |s: &&u32| **s != t && self.mesh.triangles[**s as usize].contains(&b);
-            let over = (bary[k] < INNER && !fixed(a, b)).then(|| self.star(a).iter().find(shares).copied());
+            let over = (bary[k] < INNER_WEIGHT && !fixed(a, b)).then(|| self.star(a).iter().find(shares).copied());
             let over = over.flatten().and_then(|s| self.divide(p, normals, &[t, s]));
             over.or_else(|| self.divide(p, normals, &[t]))
         })
@@ -90,7 +90,7 @@ impl Local<'_> {
             self.mesh.triangles[t as usize] = [a, b, v];
         }
         let wide = changed.iter().all(|&t| self.mesh.area(t as usize) > self.least);
-        let stray = |t: &u32| normals.iter().all(|n| !(self.mesh.normal(*t as usize).dot(*n) > LEAN));
+        let stray = |t: &u32| normals.iter().all(|n| !(self.mesh.normal(*t as usize).dot(*n) > LEANING_COSINE));
         let doubtful: Vec<u32> = changed.iter().copied().filter(stray).collect();
         if !(wide && self.leaning(&doubtful) <= leaning && self.is_embedded(&changed)) {
             self.mesh.points.pop();
