@@ -359,7 +359,7 @@ fn fit_makes_of_a_model_that_edit_left_without_surfaces_what_edit_would_have_mad
     // Grids are still to be made: their options count, also those that were given to `edit`.
     done(&["fit", "bare.planish", "-o", "dense.planish", "--min-side", "40", "--report", "dense.json"]);
     done(&["edit", "box.ply", "lines.toml", "-o", "wish.planish", "--no-fit", "--min-side", "40"]);
-    done(&["fit", "wish.planish", "-o", "wish.planish", "--report", "wish.json"]);
+    done(&["fit", "wish.planish", "-o", "wish.planish", "--in-place", "--report", "wish.json"]);
     let points = |name: &str| figure(&path.join(name), "grid.points");
     assert_eq!([points("plain.json"), points("dense.json"), points("wish.json")], [1734.0, 9600.0, 9600.0]);
     // Now they are there.

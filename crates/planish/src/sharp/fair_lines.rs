@@ -28,8 +28,8 @@ const FLANK_REACH_CELLS: f64 = 4.0;
 const FARTHEST_MOVE_NOISE: f64 = 2.0;
 /// Others are drawn less the farther they are from the flank, beyond one noise level not at all: that is structure.
 const STRUCTURE_NOISE: f64 = 1.0;
-/// Variance of a flank's slope that counts as none: half a degree.
-const NO_SLOPE_VARIANCE: f64 = 8e-5;
+/// Variance of a flank's slope that counts as none: that of .7 degrees.
+const NO_SLOPE_VARIANCE: f64 = 1.6e-4;
 /// A triangle may turn so far from what is expected of it (cosine) if it was no farther before.
 const FACE_TURN_COSINE: f64 = 0.7;
 /// A triangle keeps so much of its area.

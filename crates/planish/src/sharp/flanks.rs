@@ -18,17 +18,17 @@ const WINDOW_CELLS: [f64; 5] = [2.0, 3.0, 4.5, 6.75, 10.0];
 /// Terms of the polynomials among `1, x, y, y², x², xy` with `y` along the line: a plane, one that bends along the line, and a
 /// quadric.
 const MODELS: [usize; 3] = [3, 4, 6];
-/// A window must stand for so many points of the scan: two more than a quadric has terms.
-const FEWEST_WINDOW_POINTS: f64 = 8.0;
-/// Squared difference at which two estimates no longer agree, over the variance of that difference, d. The wider window has
-/// less variance by d and a squared bias b; the squared difference is b + d in the mean, so the wider one is the better as
-/// long as the squared difference is below 2 d (unbiased risk, as in Mallows' C_p).
-const AGREE_SQUARED: f64 = 2.0;
+/// A window must stand for so many points of the scan: one more than a plane has terms.
+const FEWEST_WINDOW_POINTS: f64 = 4.0;
+/// Squared difference up to which two estimates agree, over the variance of that difference: about one standard deviation.
+/// Less follows the noise, more rounds off what bends. Unbiased risk (Mallows' C_p) would have 2; decision 0016 tells what
+/// that does.
+const AGREE_SQUARED: f64 = 0.98;
 /// Least share of an estimate's own variance that counts as that of its difference to a more precise one.
 const SHARED: f64 = 0.25;
 /// Estimates from beyond a rounding need this weight in their first `CLOSE_WINDOWS` windows: what is seen from afar alone may bend in between.
 const CLOSE_WINDOWS: usize = 2;
-const CLOSE_POINTS: f64 = 4.0;
+const CLOSE_POINTS: f64 = 2.0;
 /// Radius of the first normal and of the direction of the line, cells.
 const NEAR_CELLS: f64 = 3.0;
 /// What lies this near to a line, in cells, may be the rounding of an edge.

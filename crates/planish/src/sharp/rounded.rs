@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 const SHORT_NOISE: f64 = 1.0;
 const SHORT_CELLS: f64 = 0.1;
 /// ... by so many standard deviations of what its flanks say ...
-const SHORT_DEVIATIONS: f64 = 1.0;
+const SHORT_DEVIATIONS: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// ... and goes on to be so where it stays short by this share of that.
 const WEAK_SHARE: f64 = 0.5;
 /// Half of the vertices of a line within so many cells decide; no shorter piece is other than what is around it.
