@@ -76,7 +76,7 @@ def test_a_project_alone_is_fitted_anew_with_the_control_points_asked_for(demo, 
     again = fit(tmp_path, "m.planish", "-o", "again.planish")
     same_surfaces(report, again)
     # Onto itself, and with its history.
-    fit(tmp_path, "fine.planish", "--control", "6,6", "-o", "fine.planish")
+    fit(tmp_path, "fine.planish", "--control", "6,6", "-o", "fine.planish", "--in-place")
     assert "fit, refit, refit" in planish("info", "fine.planish", cwd=tmp_path).stdout
     assert (tmp_path / "m.planish").read_bytes() == (demo / "model.planish").read_bytes()
 

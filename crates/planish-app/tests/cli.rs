@@ -411,7 +411,7 @@ fn a_script_makes_one_edge_of_a_box_smooth_and_model_network_and_seams_keep_to_i
     write_box(&path.join("box.ply"), 6);
     let edit = |input: &str, script: &str| {
         fs::write(path.join("s.toml"), script).unwrap();
-        let output = planish(&["edit", input, "s.toml", "-o", "box.planish", "--report", "r.json"], path);
+        let output = planish(&["edit", input, "s.toml", "-o", "box.planish", "--in-place", "--report", "r.json"], path);
         assert_eq!(status(&output), 0, "{script}: {}", stderr(&output));
         let report: serde_json::Value = serde_json::from_slice(&fs::read(path.join("r.json")).unwrap()).unwrap();
         let output = planish(&["export", "box.planish", "-o", "n.json"], path);
