@@ -10,7 +10,8 @@
 //!
 //! let ball = shapes::sphere(10.0, 4);
 //! // What is wanted otherwise than suits the input: a scan would be `Input::Scan(&cloud)`.
-//! let stages = |suited: PipelineParams| PipelineParams { layout: LayoutParams { patches: 24, ..suited.layout }, ..suited };
+//! // Lengths are shares of the diagonal, which comes along.
+//! let stages = |suited: PipelineParams, _diagonal: f64| PipelineParams { layout: LayoutParams { patches: 24, ..suited.layout }, ..suited };
 //! let params = RunParams { stages: Box::new(stages), ..RunParams::default() };
 //! let run = pipeline::run(Input::from(&ball), &params, &planish::Silent)?;
 //! let model = &run.fitted.model;

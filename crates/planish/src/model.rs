@@ -6,6 +6,7 @@ use crate::mesh::TriMesh;
 use crate::network::Network;
 use crate::relief::Relief;
 use crate::surface::Surface;
+use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +28,8 @@ pub struct Model {
     pub reliefs: Vec<Relief>,
     /// What one unit of a coordinate is.
     pub units: Units,
+    /// What brings the coordinates back to their place: a model that is far from the origin lies near it here.
+    pub shift: DVec3,
     /// Parameters of the stages that made the model, as one JSON object (empty: unknown).
     pub params: String,
     /// The commands that led here, oldest first.

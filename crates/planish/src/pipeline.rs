@@ -18,14 +18,19 @@ mod record;
 mod scan;
 mod truth;
 
-pub use quality::{SEAM_ANGLE_WARNING_DEG, displaced_mesh, span_count, surface_mesh, surface_mesh_cut, worst_seams};
+pub use quality::{
+    SEAM_ANGLE_WARNING_DEG, displaced_mesh, displaced_patches, span_count, surface_mesh, surface_mesh_cut,
+    surface_patches, worst_seams,
+};
 pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
-pub use scan::{ScanError, ScanMeshed, ScanParams, mesh_scan, params_for, sample_figures, scan_figures, voxel_for};
+pub use scan::{
+    ScanError, ScanMeshed, ScanParams, mesh_samples, mesh_scan, params_for, sample_figures, scan_figures, voxel_for,
+};
 pub use truth::{EdgesFound, Zone, edge_reach, edges_found, truth_figures, zone};
 
 use crate::cloud::{self, Cleaned, Cloud, CloudError};
 use crate::grid::{self, FeatureError, Grid, GridError, GridParams};
-use crate::layout::{self, Known, LayoutError, LayoutParams};
+use crate::layout::{self, Known, Layout, LayoutError, LayoutParams};
 use crate::mend::{self, Repairs};
 use crate::mesh::{CompareError, FeatureTags, MeshError, TriMesh};
 use crate::model::{Model, Sketch};
@@ -80,13 +85,13 @@ pub struct RunParams<'a> {
     /// How a scan is meshed.
     pub scan: ScanParams,
     /// Parameters of the stages after the mesh. The function is given those that suit the input (the noise of a scan has a
-    /// say in them; for a mesh they are the defaults) and sets what is wanted otherwise.
-    pub stages: Box<dyn Fn(PipelineParams) -> PipelineParams + 'a>,
+    /// say in them; for a mesh they are the defaults) with the diagonal of the mesh, and sets what is wanted otherwise.
+    pub stages: Box<dyn Fn(PipelineParams, f64) -> PipelineParams + 'a>,
 }
 
 impl Default for RunParams<'_> {
     fn default() -> Self {
-        RunParams { scan: ScanParams::default(), stages: Box::new(|suited| suited) }
+        RunParams { scan: ScanParams::default(), stages: Box::new(|suited, _| suited) }
     }
 }
 
@@ -116,7 +121,7 @@ pub struct Scanned {
 pub fn run(input: Input, params: &RunParams, observer: &dyn PipelineObserver) -> Result<Run, PipelineError> {
     let cloud = match input {
         Input::Mesh { mesh, tags, network } => {
-            let params = (params.stages)(PipelineParams::default());
+            let params = (params.stages)(PipelineParams::default(), mesh.bounds().diagonal());
             let fitted = fit(mesh, tags, network, &params, observer)?;
             return Ok(Run { fitted, params, scan: None });
         }
@@ -135,8 +140,8 @@ pub fn run(input: Input, params: &RunParams, observer: &dyn PipelineObserver) ->
         |o| cloud::project(cloud, &meshed.samples, scan.clean.outlier, &scan.points, o),
         |p| [("points", p.cloud.points.len())],
     )?;
-    let params = (params.stages)(params_for(&meshed));
     let (mesh, tags) = (&meshed.meshed.extracted.mesh, &meshed.meshed.extracted.tags);
+    let params = (params.stages)(params_for(&meshed), mesh.bounds().diagonal());
     let mut fitted = fit_with(mesh, Some(tags), None, &params, &mut clock)?;
     // Outliers are no part of the shape: its size is that of the mesh.
     run_figures(&meshed, &points, mesh.bounds().diagonal(), &mut fitted);
@@ -238,9 +243,12 @@ fn fit_with(
     clock: &mut Clock,
 ) -> Result<Fitted, PipelineError> {
     let (mesh, repairs) = repair(input, clock)?;
-    let network = match network {
-        Some(network) => network,
-        None => draw(input, tags, &mesh, &params.layout, clock)?,
+    let (network, method) = match network {
+        Some(network) => (network, None),
+        None => {
+            let Layout { network, method } = draw(input, tags, &mesh, &params.layout, clock)?;
+            (network, Some(method))
+        }
     };
     let patches = clock.stage("imprint", |o| network::imprint(&mesh, &network, o), |p| [("patches", p.len())])?;
     let grids = clock.stage(
@@ -250,8 +258,11 @@ fn fit_with(
     )?;
     let mut model = Model { mesh, network, grids, ..Model::default() };
     surfaces(&mut model, params, clock)?;
-    let measured =
+    let mut measured =
         clock.stage("measure", |o| quality::measure(&model, &patches, &repairs, o), |m| [("seams", m.seams.len())])?;
+    if let Some(method) = &method {
+        quality::method_figures(method, &mut measured.quality, &mut measured.warnings);
+    }
     Ok(Fitted {
         model,
         stages: std::mem::take(&mut clock.records),
@@ -289,13 +300,14 @@ pub fn layout(
     let mut clock = Clock::new(observer, &WEIGHTS[..2]);
     let draft = |clock: &mut Clock| {
         let (mesh, repairs) = repair(input, clock)?;
-        let network = draw(input, tags, &mesh, params, clock)?;
-        Ok::<_, PipelineError>((mesh, repairs, network))
+        let laid = draw(input, tags, &mesh, params, clock)?;
+        Ok::<_, PipelineError>((mesh, repairs, laid))
     };
-    let (mesh, repairs, network) = draft(&mut clock)?;
+    let (mesh, repairs, Layout { network, method }) = draft(&mut clock)?;
     let (mut quality, mut warnings) = (Quality::new(), Vec::new());
     quality::mesh_figures(&mesh, &network, &repairs, &mut quality, &mut warnings);
     quality::network_figures(&network, &mut quality);
+    quality::method_figures(&method, &mut quality, &mut warnings);
     Ok(Drafted { mesh, network, stages: clock.records, quality, warnings })
 }
 
@@ -451,9 +463,9 @@ fn draw(
     mesh: &TriMesh,
     params: &LayoutParams,
     clock: &mut Clock,
-) -> Result<Network, PipelineError> {
+) -> Result<Layout, PipelineError> {
     let tagged = tags.map(|tags| tags.half_edges(input, mesh)).unwrap_or_default();
-    let counts = |n: &Network| [("patches", n.patches.len())];
+    let counts = |laid: &Layout| [("patches", laid.network.patches.len())];
     Ok(clock.stage(
         "layout",
         |o| layout::layout(mesh, Known { sharp: &tagged, ..Known::default() }, params, o),

@@ -29,7 +29,14 @@ const FLOORS: [(&str, u32); 20] = [
 ];
 
 /// The crates whose files are read.
-const CRATES: [&str; 3] = ["planish", "planish-io", "planish-app"];
+const CRATES: [&str; 4] = ["planish", "planish-io", "planish-app", "planish-py"];
+/// Crates of the house that each other one may use.
+const MAY_USE: [(&str, &[&str]); 4] = [
+    ("planish", &["planish_sparse"]),
+    ("planish-io", &["planish"]),
+    ("planish-app", &["planish", "planish_io"]),
+    ("planish-py", &["planish", "planish_io", "planish_app"]),
+];
 /// Lines that a file may have.
 const CEILING: usize = 800;
 /// Files and folders that a room may hold.
@@ -217,6 +224,21 @@ fn no_room_of_the_library_uses_a_later_room() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn no_crate_uses_one_above_it() {
+    let house = ["planish", "planish_sparse", "planish_io", "planish_app", "planish_py"];
+    for (name, allowed) in MAY_USE {
+        let own = name.replace('-', "_");
+        for file in sources(name) {
+            let text = code(&file.text);
+            for other in house.iter().filter(|c| **c != own && !allowed.contains(c)) {
+                let wrong = text.contains(&format!("{other}::"));
+                assert!(!wrong, "{} uses {other}", file.path.display());
+            }
+        }
+    }
 }
 
 #[test]

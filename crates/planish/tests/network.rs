@@ -35,7 +35,8 @@ fn length(mesh: &TriMesh, network: &Network, kind: CurveKind) -> f64 {
 #[test]
 fn every_layout_is_disks_that_cover_the_mesh_to_1e_9_of_its_area() {
     for (name, mesh, euler) in surfaces() {
-        let network = layout(&mesh, Known::default(), &params(24), &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let network =
+            layout(&mesh, Known::default(), &params(24), &Silent).unwrap_or_else(|e| panic!("{name}: {e}")).network;
         let patches = imprint(&mesh, &network, &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(patches.len(), network.patches.len());
         let area = |m: &TriMesh| (0..m.triangles.len()).map(|t| m.area(t)).sum::<f64>();
@@ -66,7 +67,8 @@ fn sharp_edges_and_boundaries_are_curves_to_1e_9_of_their_length() {
                 edges += d / 2.0;
             }
         }
-        let network = layout(&mesh, Known::default(), &params(24), &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let network =
+            layout(&mesh, Known::default(), &params(24), &Silent).unwrap_or_else(|e| panic!("{name}: {e}")).network;
         for (kind, want) in [(CurveKind::Feature, edges), (CurveKind::Boundary, rim)] {
             let got = length(&mesh, &network, kind);
             assert!((got - want).abs() <= 1e-9 * want.max(1.0), "{name}: {kind:?} {got} of {want}");
@@ -77,7 +79,7 @@ fn sharp_edges_and_boundaries_are_curves_to_1e_9_of_their_length() {
 #[test]
 fn corners_of_a_torus_of_60_patches_are_square_within_20_degrees_in_the_mean() {
     let mesh = shapes::torus(1.0, 0.4, 90, 45);
-    let network = layout(&mesh, Known::default(), &params(60), &Silent).expect("a torus has a layout");
+    let network = layout(&mesh, Known::default(), &params(60), &Silent).expect("a torus has a layout").network;
     assert!(network.patches.len().abs_diff(60) <= 12, "{} patches", network.patches.len());
     let mut off = Vec::new();
     for patch in imprint(&mesh, &network, &Silent).expect("disks") {
@@ -122,7 +124,7 @@ fn near_corners(mesh: &TriMesh, network: &Network) -> Vec<f64> {
 #[test]
 fn near_their_nodes_the_curves_of_a_torus_meet_at_90_degrees_within_12_in_the_mean_and_none_below_40() {
     let mesh = shapes::torus(1.0, 0.4, 180, 90);
-    let network = layout(&mesh, Known::default(), &params(60), &Silent).expect("a torus has a layout");
+    let network = layout(&mesh, Known::default(), &params(60), &Silent).expect("a torus has a layout").network;
     let angles = near_corners(&mesh, &network);
     let off = angles.iter().map(|a| (a - 90.0).abs()).sum::<f64>() / angles.len() as f64;
     let least = angles.iter().fold(f64::INFINITY, |a, &b| a.min(b));
@@ -132,16 +134,16 @@ fn near_their_nodes_the_curves_of_a_torus_meet_at_90_degrees_within_12_in_the_me
 #[test]
 fn a_pinhole_in_a_sphere_of_24_patches_adds_at_most_16() {
     let mut mesh = shapes::sphere(1.0, 5);
-    let whole = layout(&mesh, Known::default(), &params(24), &Silent).unwrap().patches.len();
+    let whole = layout(&mesh, Known::default(), &params(24), &Silent).unwrap().network.patches.len();
     mesh.triangles.remove(7);
-    let pierced = layout(&mesh, Known::default(), &params(24), &Silent).unwrap().patches.len();
+    let pierced = layout(&mesh, Known::default(), &params(24), &Silent).unwrap().network.patches.len();
     assert!(pierced <= whole + 16, "{pierced} patches, {whole} without the hole");
 }
 
 #[test]
 fn a_sheet_of_24_patches_with_36_pinholes_has_at_most_8_more_once_they_are_closed_and_16_for_each_before() {
     let whole = shapes::rectangle(6.0, 6.0, 60, 60);
-    let sheet = layout(&whole, Known::default(), &params(24), &Silent).unwrap().patches.len();
+    let sheet = layout(&whole, Known::default(), &params(24), &Silent).unwrap().network.patches.len();
     let low = whole.bounds().min;
     let mut mesh = whole.clone();
     // Two triangles around the middle of each of 36 squares of side 1.
@@ -151,12 +153,12 @@ fn a_sheet_of_24_patches_with_36_pinholes_has_at_most_8_more_once_they_are_close
         off(p.x) > 0.05 || off(p.y) > 0.05
     });
     assert_eq!(whole.triangles.len() - mesh.triangles.len(), 72);
-    let pierced = layout(&mesh, Known::default(), &params(24), &Silent).unwrap().patches.len();
+    let pierced = layout(&mesh, Known::default(), &params(24), &Silent).unwrap().network.patches.len();
     assert!(pierced <= sheet + 16 * 36, "{pierced} patches, {sheet} without holes");
     let mut tags = FeatureTags::from_edges(mesh.points.len(), []);
     assert_eq!(close_holes(&mut mesh, &mut tags, 1.0, &Silent), Ok(36));
     assert_eq!(diagnose(&mesh).boundary_loops, 1);
-    let closed = layout(&mesh, Known::default(), &params(24), &Silent).unwrap().patches.len();
+    let closed = layout(&mesh, Known::default(), &params(24), &Silent).unwrap().network.patches.len();
     assert!(closed <= sheet + 8, "{closed} patches, {sheet} without holes");
 }
 
@@ -165,7 +167,7 @@ fn layouts_are_equal_on_1_and_4_threads() {
     let mesh = synthetic::demo(7, 6000);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| layout(&mesh, Known::default(), &params(40), &Silent)).expect("the demo has a layout")
+        pool.install(|| layout(&mesh, Known::default(), &params(40), &Silent)).expect("the demo has a layout").network
     };
     assert_eq!(on(1), on(4));
 }
@@ -174,7 +176,7 @@ fn layouts_are_equal_on_1_and_4_threads() {
 fn a_mesh_of_two_triangles_has_a_layout_of_one_patch() {
     let square = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
     let mesh = TriMesh::new(square.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
-    let network = layout(&mesh, Known::default(), &params(1), &Silent).expect("a square has a layout");
+    let network = layout(&mesh, Known::default(), &params(1), &Silent).expect("a square has a layout").network;
     let patches = imprint(&mesh, &network, &Silent).expect("disks");
     assert!((1..=4).contains(&patches.len()), "{} patches", patches.len());
 }
@@ -244,7 +246,8 @@ fn a_part_that_no_patch_covers_is_refused() {
 fn real_meshes_have_layouts_of_disks_with_no_patch_above_8_times_the_mean() {
     for name in ["fandisk", "goathead", "casting"] {
         let Some(mesh) = common::data_mesh(&format!("{name}.ply")) else { continue };
-        let network = layout(&mesh, Known::default(), &params(100), &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let network =
+            layout(&mesh, Known::default(), &params(100), &Silent).unwrap_or_else(|e| panic!("{name}: {e}")).network;
         let areas: Vec<f64> = imprint(&mesh, &network, &Silent)
             .unwrap_or_else(|e| panic!("{name}: {e}"))
             .iter()

@@ -3,7 +3,7 @@
 //!
 //! See `docs/methods/layout.md`, step 6.
 
-use super::polygon::{self, Sectors, VALENCE_COST};
+use super::partition::polygon::{self, Sectors, VALENCE_COST};
 use super::recut::{Bench, Change, Union, outline_with_cells};
 use super::shape::{Shape, Trace};
 use crate::network::disk::Met;

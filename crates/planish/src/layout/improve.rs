@@ -6,8 +6,9 @@
 
 use super::complex::{Complex, Node};
 use super::fill::{Gain, Scale};
+use super::partition::polygon;
 use super::recut::{Bench, Change, outline};
-use super::{LayoutError, polygon, slide};
+use super::{LayoutError, slide};
 use crate::mesh::disjoint::disjoint;
 use crate::network::CurveKind;
 use crate::observe::Observer;

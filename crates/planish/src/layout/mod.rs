@@ -1,35 +1,38 @@
 //! Automatic layout: a network of four-sided patches on any manifold mesh.
 //!
-//! 1. sharp lines and boundaries are fixed; long edges are split ([`refine`]);
-//! 2. a centroidal partition into disks between the fixed lines ([`partition`], [`outline`]);
-//! 3. all cells are made even and parted into quads ([`polygon`]);
+//! 1. sharp lines and boundaries are fixed; long edges are split ([`proxy::refine`]);
+//! 2. a centroidal partition into disks between the fixed lines ([`partition`], [`partition::outline`]);
+//! 3. all cells are made even and parted into quads ([`partition::polygon`]);
 //! 4. nodes, arcs and connectivity are improved by changes inside the union of a few cells, each drawn in a one-to-one
 //!    map of that union ([`recut`]), so that nothing ever crosses or gets lost; this happens on a coarser mesh of the
-//!    same surface, and the arcs are carried back ([`coarse`]);
+//!    same surface, and the arcs are carried back ([`proxy::coarse`]);
 //! 5. near every node its arcs are spread to even angles ([`fan`]).
 //!
 //! The papers have no automatic layout; the method with its energy is in `docs/methods/layout.md`, the choice of maps in
 //! `docs/decisions/0005-spade-and-convex-maps.md`.
 
-mod coarse;
+mod aligned;
 mod complex;
+mod embed;
 mod fan;
 mod fill;
 mod improve;
+mod integers;
 mod lines;
-mod outline;
+mod map;
 mod partition;
-mod polygon;
+mod proxy;
 mod recut;
-mod refine;
 mod shape;
 mod slide;
-mod strands;
-mod tips;
+mod strips;
 
+use crate::layout::aligned::AlignError;
 use crate::layout::complex::Complex;
+use crate::layout::partition::{outline, polygon, tips};
+use crate::layout::proxy::refine::Refined;
+use crate::layout::proxy::{coarse, refine};
 use crate::layout::recut::Bench;
-use crate::layout::refine::Refined;
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
 use crate::network::imprint::{self, Shared};
 use crate::network::{Corner, Curve, Network, Patch, Side};
@@ -60,13 +63,18 @@ const FORCED: f64 = 0.85;
 /// Rounds of settling for each round of smoothing asked for: a round redraws disjoint unions only.
 const SETTLING_PER_SMOOTHING: usize = 8;
 
+/// Patches of a partition where no number is asked for.
+const PARTITION_PATCHES: usize = 120;
+
 /// Parameters of [`layout`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LayoutParams {
-    /// Number of patches to aim at. Sharp lines may force more.
-    #[schemars(range(min = 1, max = 100_000))]
+    /// Number of patches to aim at; 0 for as few as the form needs. Sharp lines may force more.
+    #[schemars(range(min = 0, max = 100_000))]
     pub patches: usize,
+    /// As few patches as the form allows, however they are shaped.
+    pub coarsest: bool,
     /// Edges whose faces meet at more than this angle are sharp and become patch boundaries.
     #[schemars(range(min = 1.0, max = 180.0), extend("unit" = "deg"))]
     pub sharp_angle_deg: f64,
@@ -81,7 +89,7 @@ pub struct LayoutParams {
 
 impl Default for LayoutParams {
     fn default() -> LayoutParams {
-        LayoutParams { patches: 120, sharp_angle_deg: 40.0, feature_length: 0.1, smoothing: 3 }
+        LayoutParams { patches: 0, coarsest: false, sharp_angle_deg: 40.0, feature_length: 0.1, smoothing: 3 }
     }
 }
 
@@ -120,6 +128,32 @@ pub struct Known<'a> {
     pub corners: &'a [bool],
 }
 
+/// How a network was laid.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Method {
+    /// Along a cross field, by a map of it.
+    Field {
+        /// Places where the field has three or five directions.
+        cones: usize,
+        /// Mean angle between the isolines of the patches and the field, degrees.
+        deviation_deg: f64,
+    },
+    /// By a partition into even cells, improved one by one: where there is no usable map.
+    Partition {
+        /// Why there is none.
+        why: String,
+    },
+}
+
+/// A network with the story of its making.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    /// The network.
+    pub network: Network,
+    /// How it was laid.
+    pub method: Method,
+}
+
 /// Lays a conforming network of four-sided patches on `mesh`, an oriented manifold with or without boundary.
 ///
 /// Sharp lines and boundaries lie on patch boundaries; every patch is an exact disk ([`crate::network::imprint`]).
@@ -130,15 +164,40 @@ pub fn layout(
     known: Known,
     params: &LayoutParams,
     observer: &dyn Observer,
-) -> Result<Network, LayoutError> {
+) -> Result<Layout, LayoutError> {
     let Known { sharp: tagged, lines, corners } = known;
     check(mesh)?;
     let adjacency = Adjacency::new(mesh);
+    let mut sharp = lines::feature_lines(mesh, &adjacency, tagged, params, observer)?;
+    sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
+    let why = match aligned::lay(mesh, &sharp, corners, params, observer) {
+        Ok(aligned::Laid { network, cones, deviation_deg }) => {
+            return Ok(Layout { network, method: Method::Field { cones, deviation_deg } });
+        }
+        Err(AlignError::Cancelled(cancelled)) => return Err(cancelled.into()),
+        Err(why) => why.to_string(),
+    };
+    let patches = match params.patches {
+        _ if params.coarsest => 1,
+        0 => PARTITION_PATCHES,
+        patches => patches,
+    };
+    let params = LayoutParams { patches, ..params.clone() };
+    let network = partitioned((mesh, &adjacency), &sharp, corners, &params, observer)?;
+    Ok(Layout { network, method: Method::Partition { why } })
+}
+
+/// The network of a partition, for meshes without a usable map.
+fn partitioned(
+    (mesh, adjacency): (&TriMesh, &Adjacency),
+    sharp: &[bool],
+    corners: &[bool],
+    params: &LayoutParams,
+    observer: &dyn Observer,
+) -> Result<Network, LayoutError> {
     let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
     let side = (area / params.patches.max(1) as f64).sqrt();
     let mut edge = EDGE_TO_SIDE * side;
-    let mut sharp = lines::feature_lines(mesh, &adjacency, tagged, params, observer)?;
-    sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
     let mut fixed = vec![false; mesh.points.len()];
     for h in 0..sharp.len() as u32 {
         if sharp[h as usize] || adjacency.opposite[h as usize] == NONE {
@@ -148,7 +207,7 @@ pub fn layout(
     }
     for _ in 0..MESH_ATTEMPTS {
         let work = refine::refine(mesh, edge, &fixed);
-        if let Some((work, complex)) = draft(work, (&sharp, corners), side, params, observer)? {
+        if let Some((work, complex)) = draft(work, (sharp, corners), side, params, observer)? {
             let work_adjacency = Adjacency::new(&work.mesh);
             if let Some(mut bench) = Bench::new(&work.mesh, &work_adjacency, complex)
                 && improve::quads(&mut bench)

@@ -4,6 +4,7 @@
 
 pub(crate) mod diagnose;
 pub(crate) mod disk;
+pub mod field;
 pub(crate) mod imprint;
 mod reimprint;
 

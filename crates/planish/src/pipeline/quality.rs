@@ -4,12 +4,13 @@
 
 use super::{Figure, PipelineError, Quality, Warning};
 use crate::grid::{self, Grid};
+use crate::layout::Method;
 use crate::mend::Repairs;
 use crate::mesh::{self, CompareParams, Comparison, TriMesh};
 use crate::model::Model;
 use crate::network::{CurveKind, Network, PatchMesh};
 use crate::observe::{Cancelled, Observer, Part};
-use crate::relief;
+use crate::relief::{self, PatchedMesh};
 use crate::surface::basis::uniform_parameters;
 use crate::surface::{self, SeamQuality, Surface};
 use rayon::prelude::*;
@@ -79,13 +80,28 @@ pub fn displaced_mesh(model: &Model, observer: &dyn Observer) -> Result<TriMesh,
     Ok(relief::displaced_mesh(&model.network, &model.surfaces, &model.reliefs, observer)?)
 }
 
+/// As [`displaced_mesh`], with the patches.
+/// # Errors
+/// As [`displaced_mesh`].
+pub fn displaced_patches(model: &Model, observer: &dyn Observer) -> Result<PatchedMesh, PipelineError> {
+    Ok(relief::displaced_patches(&model.network, &model.surfaces, &model.reliefs, observer)?)
+}
+
 /// The smooth surfaces of a model as one mesh, fine enough to measure distances on.
 /// # Errors
 /// If the parts of the model do not belong together.
 pub fn surface_mesh(model: &Model, observer: &dyn Observer) -> Result<TriMesh, PipelineError> {
+    surface_patches(model, observer).map(|patched| patched.mesh)
+}
+
+/// As [`surface_mesh`], with the patches.
+/// # Errors
+/// As [`surface_mesh`].
+pub fn surface_patches(model: &Model, observer: &dyn Observer) -> Result<PatchedMesh, PipelineError> {
     // Sampling relies on sound surfaces.
     model.surfaces.iter().try_for_each(Surface::check).map_err(relief::ReliefError::from)?;
-    surface_mesh_cut(model, cuts_to_measure(model, observer)?, observer)
+    let shapes = relief::span_shapes(&model.surfaces, cuts_to_measure(model, observer)?);
+    Ok(relief::surface_patches(&model.network, &model.surfaces, &shapes, observer)?)
 }
 
 /// The smooth surfaces of a model as one mesh, with `cuts` quads per knot span and direction.
@@ -225,6 +241,23 @@ fn in_words(repairs: &Repairs) -> String {
     format!("The mesh was repaired: {}.", words.join(", "))
 }
 
+/// How the network was laid, and what to do where it does not follow the form.
+pub(super) fn method_figures(method: &Method, quality: &mut Quality, warnings: &mut Vec<Warning>) {
+    match method {
+        Method::Field { cones, deviation_deg } => {
+            quality.insert("layout.cones".into(), Figure::Count(*cones as u64));
+            quality.insert("layout.deviation_deg".into(), Figure::Number(*deviation_deg));
+        }
+        Method::Partition { why } => {
+            let message = format!(
+                "The network does not follow the form, for {why}; its patches are even instead. More or fewer sharp edges \
+                 (the sharp angle of the layout), or another number of patches, may help."
+            );
+            warnings.push(Warning::new("layout_partition", message, ""));
+        }
+    }
+}
+
 pub(super) fn network_figures(network: &Network, quality: &mut Quality) {
     let mut valence = vec![0usize; network.corners.len()];
     let mut boundary = vec![false; network.corners.len()];
@@ -289,7 +322,7 @@ fn seam_figures(
     if bent > 0 {
         let text = format!(
             "{bent} of {} smooth seams bend by more than {SEAM_ANGLE_WARNING_DEG} degrees somewhere, {widest:.2} at most; \
-             along all smooth seams it is {rms:.2} on average.",
+             along all smooth seams it is {rms:.2} RMS.",
             smooth.len()
         );
         let worst: Vec<String> = worst_seams(&seams).iter().take(3).map(|s| s.curve.to_string()).collect();

@@ -115,11 +115,24 @@ pub fn voxel_for(samples: &Samples) -> f64 {
 /// [`ScanError`].
 pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> Result<ScanMeshed, ScanError> {
     let samples = cloud::clean(scan, &params.clean, &Part::new(observer, 0.0, 0.6))?;
+    mesh_samples(scan, samples, params, &Part::new(observer, 0.6, 0.4))
+}
+
+/// Meshes the samples of a scan: [`mesh_scan`] from there on.
+/// * `scan` - the points that the samples were made from
+/// # Errors
+/// [`ScanError`].
+pub fn mesh_samples(
+    scan: &Cloud,
+    samples: Samples,
+    params: &ScanParams,
+    observer: &dyn Observer,
+) -> Result<ScanMeshed, ScanError> {
     let closed = params.close.unwrap_or_else(|| samples.closed.first().copied().unwrap_or(false));
     let field = SampleField::new(&samples, closed);
     let spacing = params.cells.unwrap_or_else(|| Spacing::Voxel(voxel_for(&samples)));
     let sampling = Sampling { spacing, memory: params.memory };
-    let mut meshed = contour::from_field(&field, sampling, &params.contour, &Part::new(observer, 0.6, 0.35))?;
+    let mut meshed = contour::from_field(&field, sampling, &params.contour, &Part::new(observer, 0.0, 0.88))?;
     let mut lids = 0;
     if !closed {
         let points: Vec<DVec3> = scan.points.iter().copied().filter(|p| p.is_finite()).collect();
@@ -128,11 +141,11 @@ pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> 
     }
     let contour::Extracted { mesh, tags, .. } = &mut meshed.extracted;
     let cell = meshed.lattice.step.x;
-    observer.progress(0.96);
+    observer.progress(0.9);
     sharp::mend_lines(mesh, tags, observer)?;
     let scale = ScanScale { noise: samples.noise, spacing: samples.spacing, cell };
     sharp::fair_lines(mesh, tags, &scale, observer)?;
-    observer.progress(0.98);
+    observer.progress(0.95);
     sharp::split_bent(mesh, tags, BENT_TOLERANCE * fit_tolerance(&samples) * samples.diagonal, observer)?;
     tags.mark(mesh);
     let mut reached = reach(scan, &meshed.extracted.mesh, observer)?;
@@ -247,7 +260,8 @@ pub(super) fn run_figures(made: &ScanMeshed, points: &Cleaned, diagonal: f64, fi
     scan_figures(made, &mut found, &mut fitted.warnings);
     found.insert("scan.outliers".into(), Figure::Count(points.outliers as u64));
     found.insert("scan.moved_rms".into(), Figure::Number(points.moved_rms));
-    for key in ["scan.noise", "scan.spacing", "scan.moved_rms", "scan.to_mesh_rms", "scan.to_mesh_mean"] {
+    // Noise and spacing are those of the samples, whatever is made of these.
+    for key in ["scan.moved_rms", "scan.to_mesh_rms", "scan.to_mesh_mean"] {
         if let Some(x) = found.get(key).map(|f| f.value()) {
             found.insert(format!("{key}_rel"), Figure::Number(x / diagonal));
         }

@@ -2,8 +2,8 @@
 //!
 //! See `docs/methods/layout.md`, step 2.
 
-use super::complex::{Arc, Complex, Node};
-use super::partition::{Ground, next_around};
+use super::{Ground, next_around};
+use crate::layout::complex::{Arc, Complex, Node};
 use crate::mesh::{NONE, next};
 use crate::network::CurveKind;
 use crate::network::imprint::Place;
@@ -20,7 +20,7 @@ const LOOP_NODES: usize = 4;
 
 /// Vertices where a sharp line or the boundary has a corner. `reach` is the length over which the turn is
 /// measured.
-pub(super) fn corners(ground: &Ground, reach: f64) -> Vec<bool> {
+pub(in crate::layout) fn corners(ground: &Ground, reach: f64) -> Vec<bool> {
     let mesh = ground.mesh;
     let from = |h: u32| mesh.triangles[h as usize / 3][h as usize % 3];
     let mut around: HashMap<u32, Vec<u32>> = HashMap::new();
@@ -76,7 +76,7 @@ pub(super) fn corners(ground: &Ground, reach: f64) -> Vec<bool> {
 }
 
 /// The complex of the cells that `label` names.
-pub(super) fn outline(ground: &Ground, label: &[u32], count: usize, corner: &[bool]) -> Complex {
+pub(in crate::layout) fn outline(ground: &Ground, label: &[u32], count: usize, corner: &[bool]) -> Complex {
     let mesh = ground.mesh;
     let barrier = ground.barriers(label);
     let from = |h: u32| mesh.triangles[h as usize / 3][h as usize % 3];

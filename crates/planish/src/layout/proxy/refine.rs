@@ -9,7 +9,7 @@ use std::collections::HashMap;
 const SPLIT_ROUNDS: usize = 12;
 
 /// The refined mesh with the way back.
-pub(super) struct Refined {
+pub(in crate::layout) struct Refined {
     pub mesh: TriMesh,
     /// For each triangle the input face, and its corners as barycentric coordinates of that face.
     pub parent: Vec<(u32, [[f64; 3]; 3])>,
@@ -17,12 +17,8 @@ pub(super) struct Refined {
 
 /// Splits every edge longer than `longest` at its middle until none is left. Edges with both ends on a fixed line
 /// (`fixed`, per vertex) are split once in any case: a curve across a narrow strip needs an inner vertex.
-pub(super) fn refine(mesh: &TriMesh, longest: f64, fixed: &[bool]) -> Refined {
-    let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let mut work = Refined {
-        mesh: TriMesh::new(mesh.points.clone(), mesh.triangles.clone()),
-        parent: (0..mesh.triangles.len() as u32).map(|f| (f, unit)).collect(),
-    };
+pub(in crate::layout) fn refine(mesh: &TriMesh, longest: f64, fixed: &[bool]) -> Refined {
+    let mut work = Refined::new(mesh);
     for round in 0..SPLIT_ROUNDS {
         let points = &work.mesh.points;
         let chosen = |a: u32, b: u32| {
@@ -40,7 +36,7 @@ pub(super) fn refine(mesh: &TriMesh, longest: f64, fixed: &[bool]) -> Refined {
 
 /// Splits the edges between the vertices that `chosen` accepts (lower vertex first) at their middle. Returns the
 /// finer mesh and for each of its faces the face that it is a part of.
-pub(super) fn split(work: &Refined, chosen: impl Fn(u32, u32) -> bool) -> (Refined, Vec<u32>) {
+pub(in crate::layout) fn split(work: &Refined, chosen: impl Fn(u32, u32) -> bool) -> (Refined, Vec<u32>) {
     let adjacency = Adjacency::new(&work.mesh);
     let mut middle: HashMap<u32, u32> = HashMap::new();
     let mut points = work.mesh.points.clone();
@@ -93,7 +89,37 @@ pub(super) fn split(work: &Refined, chosen: impl Fn(u32, u32) -> bool) -> (Refin
     (Refined { mesh: TriMesh::new(points, triangles), parent }, from)
 }
 
+/// Splits the faces that `chosen` accepts into three at their middle.
+pub(super) fn split_faces(work: &mut Refined, chosen: impl Fn(u32) -> bool) {
+    for f in (0..work.parent.len()).filter(|&f| chosen(f as u32)) {
+        let (face, bary) = work.parent[f];
+        let tri = work.mesh.triangles[f];
+        let m = work.mesh.points.len() as u32;
+        let middle = std::array::from_fn(|i| (bary[0][i] + bary[1][i] + bary[2][i]) / 3.0);
+        work.mesh.points.push(work.mesh.corners(f).into_iter().sum::<glam::DVec3>() / 3.0);
+        for k in 0..3 {
+            let (triangle, corners) = ([tri[k], tri[(k + 1) % 3], m], [bary[k], bary[(k + 1) % 3], middle]);
+            if k == 0 {
+                work.mesh.triangles[f] = triangle;
+                work.parent[f] = (face, corners);
+            } else {
+                work.mesh.triangles.push(triangle);
+                work.parent.push((face, corners));
+            }
+        }
+    }
+}
+
 impl Refined {
+    /// The mesh as it is.
+    pub fn new(mesh: &TriMesh) -> Refined {
+        let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        Refined {
+            mesh: TriMesh::new(mesh.points.clone(), mesh.triangles.clone()),
+            parent: (0..mesh.triangles.len() as u32).map(|f| (f, unit)).collect(),
+        }
+    }
+
     /// The place of barycentric `bary` in refined face `f`, as a face point of the input mesh.
     pub fn to_input(&self, f: u32, bary: [f64; 3]) -> FacePoint {
         let (face, corners) = self.parent[f as usize];

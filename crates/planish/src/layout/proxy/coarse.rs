@@ -5,9 +5,9 @@
 //! is one of the fine mesh. (The idea of carrying a map through such steps is that of Lee et al., MAPS, 1998; here only
 //! the arcs are carried.)
 
-use super::complex::Complex;
 use super::strands::{Star, Strands};
 use crate::geom::predicates::orient2d;
+use crate::layout::complex::Complex;
 use crate::mesh::{Adjacency, NONE, TriMesh};
 use crate::network::CurveKind;
 use crate::network::imprint::Place;
@@ -38,7 +38,7 @@ const WORTHWHILE_PASS: f64 = 0.01;
 const SMALLER: f64 = 0.6;
 
 /// The coarse mesh.
-pub(super) struct Coarse {
+pub(in crate::layout) struct Coarse {
     pub mesh: TriMesh,
     /// The complex on it.
     pub complex: Complex,
@@ -62,7 +62,7 @@ struct Melt<'a> {
 }
 
 /// A coarser mesh with `complex` on it; `side` is that of a patch. `None` if it would not be much smaller.
-pub(super) fn coarsen(
+pub(in crate::layout) fn coarsen(
     mesh: &TriMesh,
     adjacency: &Adjacency,
     complex: &Complex,
@@ -215,8 +215,12 @@ impl Melt<'_> {
             let k = t.iter().position(|&x| x == v).expect("a face around the vertex");
             (t[(k + 1) % 3], t[(k + 2) % 3])
         };
-        let mut star =
-            Star { vertex: v, ring: Vec::with_capacity(faces.len()), faces: Vec::with_capacity(faces.len()) };
+        let mut star = Star {
+            vertex: v,
+            ring: Vec::with_capacity(faces.len()),
+            faces: Vec::with_capacity(faces.len()),
+            line: None,
+        };
         let mut at = corner(*faces.first()?).0;
         for _ in 0..faces.len() {
             let (f, to) = faces.iter().find_map(|&f| {
@@ -262,8 +266,9 @@ fn shape([a, b, c]: [DVec3; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::Silent;
+    use crate::layout::proxy::refine;
     use crate::layout::recut::Bench;
-    use crate::layout::{LayoutParams, draft, improve, refine};
+    use crate::layout::{LayoutParams, draft, improve};
     use crate::synthetic::shapes;
 
     #[test]

@@ -6,9 +6,9 @@
 //!
 //! See `docs/methods/layout.md`, step 5.
 
-use super::complex::Complex;
-use super::recut::keep_apart;
 use crate::geom::predicates::orient2d;
+use crate::layout::complex::Complex;
+use crate::layout::recut::keep_apart;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::imprint::{Place, Shared, canonical, half_edge, shared_face};
 use glam::{DVec2, DVec3};
@@ -18,30 +18,64 @@ use std::collections::BTreeMap;
 /// the edge (less where many meet it).
 const MEETINGS_APART: f64 = 0.05;
 
+/// Angle at a vertex between a neighbour at the same place and the next one, radians: some positive number.
+const NO_ANGLE: f64 = 1e-3;
+
 /// A vertex and the faces around it, counter-clockwise: `faces[i]` has the corners `vertex, ring[i], ring[i + 1]`.
 /// Without the vertex the polygon is a fan from `ring[0]`: `faces[i]` has the corners `ring[0], ring[i], ring[i + 1]`,
 /// the first and the last are gone.
+///
+/// A vertex of a line or of the boundary goes to one of its two neighbours there. The other one is `ring[m]`, and the
+/// edge between them takes the place of the line. On the boundary one of the two sectors is outside the mesh: one step of
+/// the ring, whose face is [`NONE`].
 #[derive(Clone, Debug)]
-pub(super) struct Star {
+pub(in crate::layout) struct Star {
     pub vertex: u32,
     pub ring: Vec<u32>,
     pub faces: Vec<u32>,
+    /// The number `m` for a vertex of a line.
+    pub line: Option<usize>,
+}
+
+/// A change of the mesh that runs can be carried back over.
+#[derive(Clone, Debug)]
+pub(in crate::layout) enum Step {
+    /// A vertex was taken out.
+    Out(Star),
+    /// The diagonal of four vertices, counter-clockwise, was turned from the first and third to the second and fourth.
+    /// Before, the first face had the corners 0, 1, 2 and the second 2, 3, 0; since then 1, 2, 3 and 3, 0, 1.
+    Turn([u32; 4], [u32; 2]),
 }
 
 impl Star {
-    /// The ring in the plane around the vertex at the origin: lengths are kept, and angles but for one factor.
+    /// The ring in the plane around the vertex at the origin: lengths are kept, and angles but for one factor, on each
+    /// side of a line its own, so that the line is straight.
     pub fn flat(&self, points: &[DVec3]) -> Vec<DVec2> {
         let at = |i: usize| points[self.ring[i] as usize] - points[self.vertex as usize];
         let n = self.ring.len();
-        let angles: Vec<f64> = (0..n).map(|i| at(i).angle_between(at((i + 1) % n))).collect();
-        let scale = std::f64::consts::TAU / angles.iter().sum::<f64>();
+        let mut angles: Vec<f64> = (0..n).map(|i| at(i).angle_between(at((i + 1) % n))).collect();
+        // A neighbour at the same place has no direction.
+        angles.iter_mut().filter(|a| a.is_nan()).for_each(|a| *a = NO_ANGLE);
+        let (sides, turn) = match self.line {
+            Some(m) => (vec![0..m, m..n], std::f64::consts::PI),
+            None => (vec![0..n; 1], std::f64::consts::TAU),
+        };
+        for side in sides {
+            let scale = turn / angles[side.clone()].iter().sum::<f64>();
+            angles[side].iter_mut().for_each(|a| *a *= scale);
+        }
         let mut turned = 0.0;
         let place = |i: usize| {
             let place = DVec2::from_angle(turned) * at(i).length();
-            turned += scale * angles[i];
+            turned += angles[i];
             place
         };
         (0..n).map(place).collect()
+    }
+
+    /// True if these places on the ring, in rising order, are the ends of the line that goes through the vertex.
+    fn is_line(&self, ends: [f64; 2]) -> bool {
+        self.line.is_some_and(|m| ends == [0.0, m as f64])
     }
 
     /// The faces of the fan.
@@ -74,6 +108,16 @@ impl Star {
             _ => None,
         }
     }
+}
+
+/// Two triangles 0, 1, 2 and 2, 3, 0 laid in the plane: the first corner at the origin, the third on the first axis.
+pub(in crate::layout) fn unfolded([a, b, c, d]: [DVec3; 4]) -> [DVec2; 4] {
+    let axis = (c - a).normalize_or_zero();
+    let beside = |p: DVec3, sign: f64| {
+        let along = (p - a).dot(axis);
+        DVec2::new(along, sign * (p - a - along * axis).length())
+    };
+    [DVec2::ZERO, beside(b, -1.0), DVec2::new(a.distance(c), 0.0), beside(d, 1.0)]
 }
 
 /// Where a strand is tied down.
@@ -112,7 +156,7 @@ struct Way {
 
 /// Arcs as strands of knots, linked through single faces.
 #[derive(Clone, Debug)]
-pub(super) struct Strands {
+pub(in crate::layout) struct Strands {
     knots: Vec<Knot>,
     /// First knot of every arc.
     first: Vec<u32>,
@@ -148,7 +192,7 @@ impl Strands {
             for (k, pair) in (start..).zip(arc.chain.windows(2)) {
                 let through = match shared_face(adjacency, &mesh.triangles, &pair[0], &pair[1])? {
                     Shared::Face(f) => f,
-                    Shared::Edge => super::common_face(adjacency, &mesh.triangles, pair),
+                    Shared::Edge => crate::layout::common_face(adjacency, &mesh.triangles, pair),
                 };
                 strands.link(k, k + 1, face[through as usize]);
             }
@@ -227,7 +271,12 @@ impl Strands {
         let face = |i: i64| star.faces[i.rem_euclid(n) as usize];
         let way = |run: &Run| {
             let [s, e] = run.ends;
-            if !self.goes_around(star, run, &flat) {
+            if star.is_line(run.ends) {
+                // Along the line, by faces that have its two edges.
+                let faces = [[0, n - 1], [e as i64 - 1, e as i64]];
+                let faces = faces.map(|[a, b]| if face(a) == NONE { face(b) } else { face(a) });
+                Way { met: Vec::new(), faces: faces.to_vec() }
+            } else if !self.goes_around(star, run, &flat) {
                 let met = (s as i64 + 1..).take_while(|&m| (m as f64) < e);
                 let met: Vec<_> = met.map(|m| (m as usize, [m as f64 - s, e - m as f64])).collect();
                 let faces = std::iter::once(s as i64).chain(met.iter().map(|x| x.0 as i64)).map(face).collect();
@@ -245,12 +294,48 @@ impl Strands {
         self.draw(star, &runs, ways, (star.vertex, DVec2::ZERO), &flat);
     }
 
+    /// Takes back a change of the mesh.
+    pub fn undo(&mut self, step: &Step, points: &[DVec3]) {
+        let idle = |f: &u32| *f == NONE || self.links[*f as usize].is_empty();
+        match step {
+            Step::Out(star) if !star.fan().iter().all(idle) => self.put_in(star, points),
+            Step::Turn(ring, faces) if !faces.iter().all(idle) => self.turn_back(ring, *faces, points),
+            _ => {}
+        }
+    }
+
+    /// Draws what runs through two faces on both sides of their other diagonal.
+    fn turn_back(&mut self, ring: &[u32; 4], faces: [u32; 2], points: &[DVec3]) {
+        let star = Star { vertex: NONE, ring: ring.to_vec(), faces: Vec::new(), line: None };
+        let face = |x: f64| faces[(x >= 2.0) as usize];
+        let runs = loop {
+            let runs = self.runs(&star, &faces);
+            match runs.iter().find_map(|run| Some((run, star.edge_of(run.ends)?))) {
+                Some((run, edge)) => self.pull(run, face(edge as f64)),
+                None => break runs,
+            }
+        };
+        self.hand_over(&star, &faces, |i| face(i as f64));
+        let way = |&Run { ends: [s, e], .. }: &Run| match () {
+            _ if s == 0.0 => Way { met: Vec::new(), faces: vec![faces[(e > 2.0) as usize]] },
+            _ if s < 2.0 && e > 2.0 => Way { met: vec![(2, [2.0 - s, e - 2.0])], faces: faces.to_vec() },
+            _ => Way { met: Vec::new(), faces: vec![face(s)] },
+        };
+        let ways = runs.iter().map(way).collect();
+        let flat = unfolded(ring.map(|v| points[v as usize]));
+        self.draw(&star, &runs, ways, (ring[0], flat[0]), &flat);
+    }
+
     /// True if the vertex lies between a run through the fan and the part of the ring from its lower to its higher end,
     /// so that the way to its higher end leads down around the vertex.
     fn goes_around(&self, star: &Star, run: &Run, flat: &[DVec2]) -> bool {
         let n = star.ring.len();
         let [s, e] = run.ends;
         let place = |x: f64| flat[x as usize].lerp(flat[(x as usize + 1) % n], x.fract());
+        // What does not run along a line stays on its side of it.
+        if let Some(m) = star.line {
+            return s == 0.0 && e > m as f64;
+        }
         if s == 0.0 {
             return orient2d(flat[0], place(e), DVec2::ZERO) < 0.0;
         }
@@ -307,7 +392,8 @@ impl Strands {
         let (Spot::Vertex(a), Spot::Vertex(b)) = (knot.at, self.knots[knot.next as usize].at) else { return false };
         let place = |v: u32| star.along(Spot::Vertex(v));
         let (Some(a), Some(b)) = (place(a), place(b)) else { return false };
-        star.edge_of([a.min(b), a.max(b)]).is_some()
+        let ends = [a.min(b), a.max(b)];
+        star.edge_of(ends).is_some() && !star.is_line(ends)
     }
 
     /// Names for links along the ring in `faces` the face that has their edge from now on.
@@ -396,7 +482,12 @@ impl Strands {
                 self.knots.push(Knot { at, before: NONE, next: NONE, face: NONE });
             }
         }
-        for ((run, way), inner) in runs.iter().zip(ways).zip(knots) {
+        for ((run, way), mut inner) in runs.iter().zip(ways).zip(knots) {
+            if way.faces.len() > inner.len() + 1 {
+                // Along a line, through the vertex.
+                inner.push(self.knots.len() as u32);
+                self.knots.push(Knot { at: Spot::Vertex(apex.0), before: NONE, next: NONE, face: NONE });
+            }
             let mut chain: Vec<u32> = std::iter::once(run.knots[0]).chain(inner).chain([run.knots[1]]).collect();
             let mut faces = way.faces;
             if run.reversed {

@@ -4,10 +4,10 @@
 //! disk climb to the place furthest from the boundary of their disk; a boundary in two pieces belongs to the middle of a
 //! limb, not to its end. See `docs/methods/layout.md`, step 4.
 
-use super::fill::{Gain, Scale};
-use super::partition::Ground;
-use super::recut::{Bench, Change};
+use super::Ground;
 use crate::geom::graph::Search;
+use crate::layout::fill::{Gain, Scale};
+use crate::layout::recut::{Bench, Change};
 use crate::mesh::NONE;
 use crate::mesh::disjoint::disjoint;
 use crate::network::CurveKind;
@@ -98,7 +98,7 @@ fn end(ground: &Ground, found: &Disc) -> Option<u32> {
 }
 
 /// Tips of limbs, the most slender first; `side` is that of a patch.
-pub(super) fn tips(ground: &Ground, side: f64) -> Vec<u32> {
+pub(in crate::layout) fn tips(ground: &Ground, side: f64) -> Vec<u32> {
     let mut tips: Vec<u32> = Vec::new();
     for radius in TIP_RADII.map(|r| r * side) {
         let mut covered = vec![false; ground.mesh.points.len()];
@@ -123,7 +123,7 @@ pub(super) fn tips(ground: &Ground, side: f64) -> Vec<u32> {
 }
 
 /// Puts a node on every tip: the nearest one moves there, or a new one is made, whichever leaves better cells.
-pub(super) fn plant(bench: &mut Bench, tips: &[u32], patches: usize) {
+pub(in crate::layout) fn plant(bench: &mut Bench, tips: &[u32], patches: usize) {
     let mut waiting = tips.to_vec();
     while !waiting.is_empty() {
         let scale = Scale::new(bench, patches);
@@ -142,7 +142,8 @@ fn best(bench: &Bench, scale: &Scale, tip: u32) -> Option<Gain> {
     let mut unions: Vec<Change> = Vec::new();
     for &h in cells.iter().flat_map(|&c| complex.loop_of(c)) {
         let node = complex.from(h);
-        let star = super::improve::star_change(complex, &complex.star(node)).filter(|change| change.pin.is_none());
+        let star =
+            crate::layout::improve::star_change(complex, &complex.star(node)).filter(|change| change.pin.is_none());
         unions.extend(star);
         let arc = complex.arc(h);
         if arc.kind == CurveKind::Smooth && arc.cells[0] != arc.cells[1] {

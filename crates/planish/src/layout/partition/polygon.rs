@@ -8,11 +8,11 @@
 //!
 //! See `docs/methods/layout.md`, step 3.
 
-use super::complex::Complex;
-use super::recut::Change;
-use super::shape::flat_cost;
 use crate::geom::graph::{Reached, Search};
 use crate::geom::polyline;
+use crate::layout::complex::Complex;
+use crate::layout::recut::Change;
+use crate::layout::shape::flat_cost;
 use crate::mesh::{Adjacency, NONE, TriMesh, previous};
 use crate::network::CurveKind;
 use crate::network::imprint::{Place, half_edge};
@@ -20,7 +20,7 @@ use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// Cost of a cell too many or too few around a node, against a quad whose corners are all 45 degrees off.
-pub(super) const VALENCE_COST: f64 = 1.5;
+pub(in crate::layout) const VALENCE_COST: f64 = 1.5;
 
 /// Cost of a cell corner of 180 degrees or more, where a patch has no normal of its own.
 const FLAT_COST: f64 = 16.0;
@@ -36,7 +36,7 @@ const SPLIT_COST: f64 = 1.0;
 
 /// Gives every cell an even number of sides, at least four. False if an arc that must be split has no inner
 /// vertex (the working mesh is too coarse there).
-pub(super) fn make_even(mesh: &TriMesh, complex: &mut Complex) -> bool {
+pub(in crate::layout) fn make_even(mesh: &TriMesh, complex: &mut Complex) -> bool {
     let length = |complex: &Complex, a: u32| -> f64 {
         let chain = &complex.arc(2 * a).chain;
         polyline::length(chain.iter().map(|p| p.position(mesh)))
@@ -153,7 +153,7 @@ fn split_middle(mesh: &TriMesh, complex: &mut Complex, a: u32) {
 
 /// The sectors around the nodes: fans of cells between fixed arcs, each with the number of cells it should
 /// have and the number it has.
-pub(super) struct Sectors {
+pub(in crate::layout) struct Sectors {
     /// For each half-arc the sector of the cell corner where it starts.
     pub of: Vec<u32>,
     pub ideal: Vec<f64>,
@@ -258,7 +258,7 @@ fn polygon_normal(corners: &[DVec3]) -> DVec3 {
 }
 
 /// The lines that part every cell into quads.
-pub(super) fn quadrangulate(mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex) -> Vec<Change> {
+pub(in crate::layout) fn quadrangulate(mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex) -> Vec<Change> {
     let mut sectors = Sectors::new(mesh, adjacency, complex);
     let cells: Vec<u32> = complex.live_cells().filter(|&c| complex.loop_of(c).len() > 4).collect();
     let mut lines: Vec<Vec<(usize, usize)>> = vec![Vec::new(); cells.len()];
@@ -298,7 +298,7 @@ fn part(mesh: &TriMesh, complex: &Complex, sides: &[u32], sectors: &Sectors) -> 
 }
 
 /// True if a quad between corners of an outline has both sides of one arc: the arc would end inside it.
-pub(super) fn swallows(outline: &[u32], quad: [usize; 4]) -> bool {
+pub(in crate::layout) fn swallows(outline: &[u32], quad: [usize; 4]) -> bool {
     let n = outline.len();
     let next = |k: usize| quad[(k + 1) % 4];
     let along = |k: usize| quad[k] < n && next(k) == (quad[k] + 1) % n;
@@ -310,7 +310,11 @@ pub(super) fn swallows(outline: &[u32], quad: [usize; 4]) -> bool {
 
 /// The cheapest lines that part a polygon with an even number `n` of corners into quads; `quad` is what one costs,
 /// `extra` what another cell at a corner costs.
-pub(super) fn part_polygon(n: usize, quad: impl Fn([usize; 4]) -> f64, extra: &[f64]) -> Vec<(usize, usize)> {
+pub(in crate::layout) fn part_polygon(
+    n: usize,
+    quad: impl Fn([usize; 4]) -> f64,
+    extra: &[f64],
+) -> Vec<(usize, usize)> {
     let mut best = vec![vec![(f64::INFINITY, 0, 0); n]; n];
     for (i, row) in best.iter_mut().enumerate().take(n - 1) {
         row[i + 1] = (0.0, 0, 0);

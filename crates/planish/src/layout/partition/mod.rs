@@ -8,6 +8,10 @@
 //! Eck and Hoppe, *Automatic Reconstruction of B-Spline Surfaces of Arbitrary Topological Type*, 1996, start from such
 //! cells, too.
 
+pub(super) mod outline;
+pub(super) mod polygon;
+pub(super) mod tips;
+
 use super::LayoutError;
 use crate::geom::graph::{Dense, Reached, Search};
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};

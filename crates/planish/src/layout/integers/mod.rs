@@ -1,0 +1,159 @@
+//! From a seamless map to an integer-grid map: cones and corners of lines come to lie on whole numbers.
+//!
+//! 1. the mesh is thinned out in the map until only cones and corners of lines are left ([`thin`], on [`flat`]);
+//! 2. the edges of the triangles that are left get whole vectors, at a scale at which all triangles are upright, and then
+//!    as near to those wished as walks over the triangles bring them ([`walks`]);
+//! 3. every corner of the mesh goes where the stretched triangle takes it ([`charts`]).
+//!
+//! Coudert-Osmont, Desobry, Heistermann, Bommes, Ray, Sokolov 2024, *Quad Mesh Quantization Without a T-Mesh*.
+
+mod charts;
+mod flat;
+#[cfg(test)]
+mod tests;
+mod thin;
+mod walks;
+
+use crate::layout::map::SeamlessMap;
+use crate::mesh::{Adjacency, NONE, TriMesh};
+use crate::observe::{Cancelled, Observer};
+use flat::Flat;
+use glam::DVec2;
+use walks::Whole;
+
+/// How large the unit squares are to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Scale {
+    /// As few squares as the cones and lines allow.
+    Coarsest,
+    /// About so many squares.
+    Squares(usize),
+}
+
+/// A map in which the grid of whole numbers is a mesh of quads.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct IntegerMap {
+    /// Corners of each triangle in its chart, unit squares. The charts are turned as those of the seamless map, whose
+    /// jumps hold; from chart to chart the shift is whole, and so is what lies across lines. Exact to the last bit. A
+    /// triangle may be turned over where its corners lie in different triangles of the thinned mesh.
+    pub uv: Vec<[DVec2; 3]>,
+    /// Vertices that lie on whole numbers: cones, ends, bends and junctions of lines, and a few that could not be taken
+    /// out.
+    pub kept: Vec<u32>,
+    /// Number of unit squares.
+    pub squares: usize,
+}
+
+/// Why there is no integer-grid map.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub(super) enum QuantizeError {
+    /// The map is not injective.
+    #[error("triangle {triangle} has no area in the map - hint: untangle the map first")]
+    Flipped {
+        /// The first such triangle.
+        triangle: usize,
+    },
+    /// Whole numbers were not found.
+    #[error(
+        "{triangles} triangles between cones and lines could not all be kept upright on whole numbers - hint: fewer lines"
+    )]
+    Stuck {
+        /// Triangles of the thinned mesh.
+        triangles: usize,
+    },
+    /// The map does not fit along its seams.
+    #[error("the map does not fit along its seams by more than rounding - hint: its jumps and corners must agree")]
+    Torn,
+    /// Stopped by the observer.
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
+}
+
+/// Rounds of steering the scale towards the number of squares asked for, and how near is near enough.
+const ROUNDS: usize = 8;
+const NEAR: f64 = 0.04;
+
+/// Turns of flips and walks.
+const FLIP_ROUNDS: usize = 6;
+
+/// Stretches an injective seamless map so that cones, ends, junctions and bends of lines lie on whole numbers and every
+/// transition between charts is by whole numbers.
+/// * `lines` - for each half-edge whether it lies on a line that the squares must follow; boundaries always do
+/// # Errors
+/// [`QuantizeError`]; among others `Flipped` if a triangle of the map is not counter-clockwise.
+pub(super) fn quantize(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    map: &SeamlessMap,
+    lines: &[bool],
+    scale: Scale,
+    observer: &dyn Observer,
+) -> Result<IntegerMap, QuantizeError> {
+    let area = |t: &[DVec2; 3]| (t[1] - t[0]).perp_dot(t[2] - t[0]) / 2.0;
+    if let Some(triangle) = map.uv.iter().position(|t| !(area(t) > 0.0)) {
+        return Err(QuantizeError::Flipped { triangle });
+    }
+    let mut flat = Flat::new(mesh, adjacency, map, lines);
+    let line = flat.line.clone();
+    let stays = thin::corners(&flat);
+    thin::thin(&mut flat, &stays, observer)?;
+    let flat = flat.compact();
+    observer.progress(0.4);
+    let total: f64 = map.uv.iter().map(area).sum();
+    let triangles = flat.len();
+    let whole = integers(flat, total, scale, observer)?.ok_or(QuantizeError::Stuck { triangles })?;
+    let flat = &whole.flat;
+    observer.progress(0.8);
+    let edges: Vec<DVec2> = whole.q.iter().map(|q| q.as_dvec2()).collect();
+    let shapes = charts::shapes(&charts::Stretch::new(flat, &edges), map);
+    let kept: Vec<bool> = flat.outgoing.iter().map(|&h| h != NONE).collect();
+    let uv = charts::place(mesh, adjacency, map, shapes, &kept, &line).ok_or(QuantizeError::Torn)?;
+    let squares = whole.squares() as usize;
+    Ok(IntegerMap { uv, kept: (0..kept.len() as u32).filter(|&v| kept[v as usize]).collect(), squares })
+}
+
+/// Whole edge vectors for a thinned mesh; `None` if there are none with all triangles upright.
+/// * `area` - of the map
+fn integers(flat: Flat, area: f64, scale: Scale, observer: &dyn Observer) -> Result<Option<Whole>, Cancelled> {
+    let asked = match scale {
+        Scale::Coarsest => flat.len() as f64 / 2.0,
+        Scale::Squares(count) => count as f64,
+    };
+    let mut steer = (asked / area).sqrt();
+    let Some(mut whole) = Whole::start(flat, steer, observer)? else { return Ok(None) };
+    if scale == Scale::Coarsest {
+        settle(&mut whole, 0.0, observer)?;
+        return Ok(Some(whole));
+    }
+    let off = |w: &Whole| (w.squares() as f64 / asked).ln();
+    let mut best: Option<Whole> = None;
+    // Scales that gave too few and too many.
+    let (mut low, mut high) = (None, None);
+    for _ in 0..ROUNDS {
+        settle(&mut whole, steer, observer)?;
+        if best.as_ref().is_none_or(|b| off(&whole).abs() < off(b).abs()) {
+            best = Some(whole.clone());
+        }
+        if off(&whole).abs() <= NEAR {
+            break;
+        }
+        *(if off(&whole) < 0.0 { &mut low } else { &mut high }) = Some(steer);
+        steer = match (low, high) {
+            (Some(low), Some(high)) => f64::sqrt(low * high),
+            _ => steer * (-0.5 * off(&whole)).exp(),
+        };
+    }
+    Ok(best)
+}
+
+/// Brings the vectors near to the map at a scale: walks and flips in turn.
+fn settle(whole: &mut Whole, scale: f64, observer: &dyn Observer) -> Result<(), Cancelled> {
+    whole.wish_scale(scale);
+    for _ in 0..FLIP_ROUNDS {
+        whole.descend(observer)?;
+        if !whole.flip_edges(scale) {
+            break;
+        }
+    }
+    whole.descend_far(observer)
+}

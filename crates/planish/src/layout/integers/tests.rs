@@ -1,0 +1,174 @@
+//! Closed forms: boxes, flat pieces, tori; and what holds of every integer-grid map.
+
+use super::*;
+use crate::layout::map::polycube::{Charted, cuboid, flat, random_union, solid, torus};
+use crate::layout::map::quarter_turn;
+use crate::mesh::next;
+use crate::observe::Silent;
+use std::collections::HashSet;
+
+/// The map of a made mesh, after a look at everything that must hold of it.
+fn squares_of(made: &Charted, lines: &[bool], scale: Scale) -> IntegerMap {
+    let found = quantize(&made.mesh, &made.adjacency, &made.map, lines, scale, &Silent).unwrap();
+    let at = |h: u32| found.uv[h as usize / 3][h as usize % 3];
+    for h in 0..made.map.jump.len() as u32 {
+        let o = made.adjacency.opposite[h as usize];
+        let along = at(next(h)) - at(h);
+        if o != NONE {
+            let jump = made.map.jump[h as usize];
+            let shift = at(next(o)) - quarter_turn(at(h), jump);
+            assert_eq!(shift, shift.round(), "shift over {h}");
+            assert_eq!(at(o) - quarter_turn(at(next(h)), jump), shift, "seam at {h}");
+        }
+        if o == NONE || lines.get(h as usize) == Some(&true) {
+            let across = if along.x.abs() > along.y.abs() { (along.y, at(h).y) } else { (along.x, at(h).x) };
+            assert_eq!(across, (0.0, across.1.round()), "line at {h}");
+        }
+        if found.kept.binary_search(&made.mesh.origin(h)).is_ok() {
+            assert_eq!(at(h), at(h).round());
+        }
+    }
+    let area: f64 = found.uv.iter().map(|[a, b, c]| (*b - *a).perp_dot(*c - *a) / 2.0).sum();
+    assert!((area - found.squares as f64).abs() < 1e-6 * area, "{area} {}", found.squares);
+    found
+}
+
+/// Triangles of a map that are not counter-clockwise.
+fn turned_over(map: &IntegerMap) -> usize {
+    map.uv.iter().filter(|[a, b, c]| (*b - *a).perp_dot(*c - *a) <= 0.0).count()
+}
+
+#[test]
+fn a_cube_keeps_its_8_corners_and_has_6_24_or_54_squares_as_asked_with_and_without_lines() {
+    let made = solid(&cuboid([1, 1, 1]), 8).shaken(1);
+    for lines in [&made.lines[..], &[]] {
+        for (asked, squares) in [(Scale::Coarsest, 6), (Scale::Squares(24), 24), (Scale::Squares(54), 54)] {
+            let found = squares_of(&made, lines, asked);
+            assert_eq!((found.squares, found.kept.len(), turned_over(&found)), (squares, 8, 0), "{asked:?}");
+        }
+    }
+}
+
+#[test]
+fn an_l_of_3_cells_with_a_concave_corner_has_3_12_or_27_squares() {
+    let made = flat(&[[0, 0], [1, 0], [0, 1]], 8).shaken(2);
+    for (asked, squares) in [(Scale::Coarsest, 3), (Scale::Squares(12), 12), (Scale::Squares(27), 27)] {
+        let found = squares_of(&made, &made.lines, asked);
+        assert_eq!((found.squares, found.kept.len(), turned_over(&found)), (squares, 6, 0), "{asked:?}");
+    }
+}
+
+#[test]
+fn a_torus_without_cones_keeps_1_vertex_and_has_1_square_or_the_6_or_96_of_its_sides() {
+    let made = torus(3, 2, 8).shaken(5);
+    for (asked, squares) in [(Scale::Coarsest, 1), (Scale::Squares(6), 6), (Scale::Squares(96), 96)] {
+        let found = squares_of(&made, &[], asked);
+        assert_eq!((found.squares, found.kept.len()), (squares, 1), "{asked:?}");
+    }
+}
+
+#[test]
+fn a_box_of_1_by_2_by_5_has_6_squares_at_least_and_34_or_136_even_ones_as_asked() {
+    let made = solid(&cuboid([1, 2, 5]), 8).shaken(1);
+    for lines in [&made.lines[..], &[]] {
+        for (asked, squares) in [(Scale::Coarsest, 6), (Scale::Squares(34), 34), (Scale::Squares(136), 136)] {
+            let found = squares_of(&made, lines, asked);
+            assert_eq!((found.squares, found.kept.len()), (squares, 8), "{asked:?}");
+        }
+    }
+}
+
+#[test]
+fn a_plate_with_a_square_hole_keeps_16_corners_and_has_its_32_squares() {
+    let ring: Vec<[i32; 3]> = cuboid([3, 3, 1]).into_iter().filter(|v| *v != [1, 1, 0]).collect();
+    let made = solid(&ring, 8).shaken(1);
+    for asked in [Scale::Coarsest, Scale::Squares(32)] {
+        let found = squares_of(&made, &made.lines, asked);
+        assert_eq!((found.squares, found.kept.len(), turned_over(&found)), (32, 16, 0), "{asked:?}");
+    }
+}
+
+#[test]
+fn components_are_counted_together_and_one_without_a_cone_is_kept_too() {
+    let made = solid(&cuboid([1, 1, 1]), 6).beside(&torus(3, 2, 6)).beside(&flat(&[[0, 0], [1, 0]], 6));
+    let found = squares_of(&made, &made.lines, Scale::Coarsest);
+    assert_eq!((found.squares, found.kept.len()), (6 + 1 + 1, 8 + 1 + 4));
+    assert_eq!(squares_of(&made, &made.lines, Scale::Squares(14)).squares, 14);
+}
+
+#[test]
+fn uneven_unions_of_4_to_40_voxels_meet_twice_and_5_times_their_sides_within_20_percent_and_keep_all_cones() {
+    for (seed, voxels) in [(1, 4), (2, 10), (3, 20), (4, 40)] {
+        let made = solid(&random_union(seed, voxels), 5).shaken(seed).stretched();
+        for lines in [&made.lines[..], &[]] {
+            for asked in [2 * made.sides, 5 * made.sides] {
+                let found = squares_of(&made, lines, Scale::Squares(asked));
+                let off = found.squares as f64 / asked as f64;
+                assert!((0.8..1.2).contains(&off), "{} of {asked}, {voxels} voxels", found.squares);
+                assert_eq!(found, squares_of(&made, lines, Scale::Squares(asked)));
+            }
+            let coarsest = squares_of(&made, lines, Scale::Coarsest);
+            assert!(coarsest.squares <= made.sides, "{} of {} sides", coarsest.squares, made.sides);
+            let kept: HashSet<u32> = coarsest.kept.iter().copied().collect();
+            let inner =
+                |v: &u32| made.adjacency.fan(*v).map(|h| made.map.jump[h as usize] as usize).sum::<usize>() % 4 != 0;
+            assert!((0..made.mesh.points.len() as u32).filter(inner).all(|v| kept.contains(&v)));
+        }
+    }
+}
+
+#[test]
+fn another_order_of_the_triangles_changes_the_number_of_squares_by_less_than_15_percent() {
+    let made = solid(&random_union(7, 20), 5).shaken(7).stretched();
+    for scale in [Scale::Coarsest, Scale::Squares(2 * made.sides)] {
+        let one = squares_of(&made, &[], scale).squares as f64;
+        for seed in 0..3 {
+            let other = squares_of(&made.reordered(seed), &[], scale).squares as f64;
+            assert!((other / one - 1.0).abs() < 0.15, "{other} for {one}");
+        }
+    }
+}
+
+#[test]
+fn charts_turned_and_shifted_at_will_with_seams_that_fit_to_rounding_give_the_same_squares() {
+    let made = solid(&cuboid([1, 2, 5]), 8).shaken(1).recharted(4);
+    for lines in [&made.lines[..], &[]] {
+        for (asked, squares) in [(Scale::Coarsest, 6), (Scale::Squares(34), 34)] {
+            let found = squares_of(&made, lines, asked);
+            assert_eq!((found.squares, found.kept.len()), (squares, 8), "{asked:?}");
+        }
+    }
+    let made = solid(&random_union(9, 20), 6).shaken(9).stretched().recharted(5);
+    let found = squares_of(&made, &made.lines, Scale::Squares(3 * made.sides));
+    assert!((found.squares as f64 / (3 * made.sides) as f64 - 1.0).abs() < 0.2);
+}
+
+#[test]
+fn a_map_with_a_triangle_turned_over_and_one_that_does_not_fit_are_refused() {
+    let made = solid(&cuboid([1, 1, 1]), 4);
+    let refused = |map: &SeamlessMap| {
+        quantize(&made.mesh, &made.adjacency, map, &[], Scale::Coarsest, &Silent).map(|m| m.squares)
+    };
+    let mut over = made.map.clone();
+    over.uv[17].swap(0, 1);
+    assert_eq!(refused(&over), Err(QuantizeError::Flipped { triangle: 17 }));
+    let mut torn = made.map.clone();
+    for p in torn.uv.iter_mut().take(16).flatten() {
+        p.x *= 3.0;
+    }
+    assert!(matches!(refused(&torn), Err(QuantizeError::Torn)), "{:?}", refused(&torn));
+}
+
+#[test]
+fn a_cancelled_observer_stops_it() {
+    struct Stop;
+    impl Observer for Stop {
+        fn progress(&self, _: f64) {}
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    let made = solid(&cuboid([1, 1, 1]), 4);
+    let found = quantize(&made.mesh, &made.adjacency, &made.map, &[], Scale::Coarsest, &Stop);
+    assert_eq!(found, Err(QuantizeError::Cancelled(Cancelled)));
+}

@@ -1,0 +1,155 @@
+//! What a map costs: how far it is from the directions of the field, and how far its triangles are from their shape and
+//! from being flipped.
+
+use super::cones::Charts;
+use super::seams::Seams;
+use crate::mesh::TriMesh;
+use crate::network::field::flat;
+use glam::{DMat2, DVec2};
+use planish_sparse::SparseCholesky;
+use rayon::prelude::*;
+
+/// Weight of the change of area beside the change of angles in [`Maps::barrier`] (the authors' choice is a half or less).
+const AREA_WEIGHT: f64 = 0.3;
+
+/// The faces of a mesh as they are mapped.
+pub(super) struct Maps<'a> {
+    pub seams: &'a Seams,
+    /// Gradients of the corner functions of each face, in the frame of its field: with corners `x`, the Jacobian is
+    /// the sum of `x[k] gradient[k]^T`.
+    gradient: Vec<[DVec2; 3]>,
+    /// Areas as parts of the whole.
+    share: Vec<f64>,
+}
+
+impl<'a> Maps<'a> {
+    /// * `scale` - units of the map for a world unit
+    pub fn new(mesh: &TriMesh, charts: &Charts, seams: &'a Seams, scale: f64) -> Maps<'a> {
+        let faces = mesh.triangles.len();
+        let area: Vec<f64> = (0..faces).map(|f| mesh.area(f)).collect();
+        let whole: f64 = area.iter().sum();
+        // A face without area pulls at nothing; its shape is taken as that of a tiny regular one.
+        let least = 1e-9 * whole / faces.max(1) as f64;
+        let gradient = |f: usize| {
+            let [a, b, c] = flat(mesh, f);
+            let back = DVec2::from_angle(-charts.axis[f]);
+            let double = 2.0 * area[f].max(least) * scale;
+            [c - b, a - c, b - a].map(|edge| back.rotate(edge.perp()) / double)
+        };
+        let gradient = (0..faces).map(gradient).collect();
+        Maps { seams, gradient, share: area.iter().map(|a| a.max(least) / whole).collect() }
+    }
+
+    /// Jacobian of face `f`, columns along and across its field, from the corners of all faces.
+    pub fn jacobian(&self, f: usize, x: &[f64]) -> DMat2 {
+        let mut j = DMat2::ZERO;
+        for (place, g) in self.seams.place[f].iter().zip(&self.gradient[f]) {
+            let at = DVec2::new(x[2 * *place as usize], x[2 * *place as usize + 1]);
+            j += DMat2::from_cols(at * g.x, at * g.y);
+        }
+        j
+    }
+
+    /// The system of the map that follows the field best, and of any step: `sum share |J|^2` by the free unknowns.
+    pub fn laplacian(&self) -> Option<SparseCholesky> {
+        let entries: Vec<Vec<(usize, usize, f64)>> = (0..self.gradient.len())
+            .into_par_iter()
+            .with_min_len(256)
+            .map(|f| {
+                let mut entries = Vec::new();
+                for axis in 0..2 {
+                    let rows = self.seams.place[f].map(|p| self.seams.row(2 * p + axis).0);
+                    for i in 0..3 {
+                        for j in 0..3 {
+                            let weight = self.share[f] * self.gradient[f][i].dot(self.gradient[f][j]);
+                            for &(a, c) in rows[i] {
+                                let below = rows[j].iter().filter(|t| t.0 <= a);
+                                entries.extend(below.map(|&(b, d)| (a as usize, b as usize, weight * c * d)));
+                            }
+                        }
+                    }
+                }
+                entries
+            })
+            .collect();
+        SparseCholesky::factor(self.seams.free(), &entries.concat()).ok()
+    }
+
+    /// The free unknowns of the map that follows the field best: the gradients of u and v are its two directions.
+    pub fn follow(&self, laplacian: &SparseCholesky) -> Vec<f64> {
+        let none = self.seams.coordinates(&vec![0.0; self.seams.free()]);
+        let mut gradient = vec![0.0; none.len()];
+        for f in 0..self.gradient.len() {
+            let miss = self.share[f] * (DMat2::IDENTITY - self.jacobian(f, &none));
+            self.add(f, miss, &mut gradient);
+        }
+        let mut free = self.seams.pull_back(&gradient);
+        laplacian.solve(&mut free);
+        free
+    }
+
+    /// Adds the gradient by the corners of face `f` from that by its Jacobian.
+    fn add(&self, f: usize, by_jacobian: DMat2, gradient: &mut [f64]) {
+        for (place, g) in self.seams.place[f].iter().zip(&self.gradient[f]) {
+            let sum = by_jacobian * *g;
+            gradient[2 * *place as usize] += sum.x;
+            gradient[2 * *place as usize + 1] += sum.y;
+        }
+    }
+
+    /// Energy with a barrier against flipped faces, and its gradient by the free unknowns, at the corners `x`.
+    ///
+    /// Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov, *Foldover-free Maps in 50 Lines of Code*, 2021, eq. 2 to 4:
+    /// with `chi(det)` in place of the determinant the energy is finite on flipped faces, too, and comes nearer to the true one
+    /// as `softness` goes to 0. `hold` is the weight of the field's directions.
+    pub fn barrier(&self, x: &[f64], softness: f64, hold: f64) -> (f64, Vec<f64>) {
+        let each = |f: usize| {
+            let j = self.jacobian(f, x);
+            let det = j.determinant();
+            let root = (softness * softness + det * det).sqrt();
+            // Without cancellation where the determinant is negative.
+            let chi = if det > 0.0 { (det + root) / 2.0 } else { softness * softness / (2.0 * (root - det)) };
+            if chi <= 0.0 {
+                return (f64::INFINITY, DMat2::ZERO);
+            }
+            let chi_by_det = chi / root;
+            let squares = j.x_axis.length_squared() + j.y_axis.length_squared();
+            let shape = (squares + AREA_WEIGHT * (det * det + 1.0)) / (2.0 * chi);
+            let by_det = AREA_WEIGHT * det / chi - shape / chi * chi_by_det;
+            let cofactor = DMat2::from_cols(DVec2::new(j.y_axis.y, -j.y_axis.x), DVec2::new(-j.x_axis.y, j.x_axis.x));
+            let off = j - DMat2::IDENTITY;
+            let miss = off.x_axis.length_squared() + off.y_axis.length_squared();
+            let by_jacobian = j * (1.0 / chi) + cofactor * by_det + off * (2.0 * hold);
+            (self.share[f] * (shape + hold * miss), self.share[f] * by_jacobian)
+        };
+        let parts: Vec<(f64, DMat2)> = (0..self.gradient.len()).into_par_iter().with_min_len(512).map(each).collect();
+        let mut gradient = vec![0.0; x.len()];
+        let mut energy = 0.0;
+        for (f, &(part, by_jacobian)) in parts.iter().enumerate() {
+            energy += part;
+            self.add(f, by_jacobian, &mut gradient);
+        }
+        (energy, self.seams.pull_back(&gradient))
+    }
+
+    /// Least determinant of all Jacobians.
+    pub fn least_determinant(&self, x: &[f64]) -> f64 {
+        (0..self.gradient.len())
+            .into_par_iter()
+            .with_min_len(512)
+            .map(|f| self.jacobian(f, x).determinant())
+            .reduce(|| f64::INFINITY, f64::min)
+    }
+
+    /// Mean over the surface of the angle between the isolines of the map and the field, degrees.
+    pub fn deviation_deg(&self, x: &[f64]) -> f64 {
+        let each = |f: usize| {
+            // Isolines of u run across its gradient; the rows of the Jacobian are the gradients.
+            let rows = self.jacobian(f, x).transpose();
+            let off = [rows.x_axis, rows.y_axis.perp()].map(|g| g.to_angle().abs().to_degrees());
+            let off = off.map(|a| (a % 90.0).min(90.0 - a % 90.0));
+            self.share[f] * (off[0] + off[1]) / 2.0
+        };
+        (0..self.gradient.len()).map(each).sum()
+    }
+}

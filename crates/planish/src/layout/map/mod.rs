@@ -1,0 +1,368 @@
+//! Seamless maps: every triangle has its own chart in the plane, and neighbouring charts differ by quarter turns.
+//!
+//! 1. the field becomes charts with cones and a cut ([`cones`]);
+//! 2. the equations of the seams are solved by substitution, so that they hold exactly ([`seams`], [`eliminate`]);
+//! 3. the map that follows the field best is one sparse solve ([`energy`]);
+//! 4. flipped triangles are turned back ([`untangle`]), and exact arithmetic certifies that none is left.
+//!
+//! Bommes, Zimmer, Kobbelt, *Mixed-Integer Quadrangulation*, 2009, for charts, cut and energy; `docs/methods/layout.md`,
+//! steps 3 and 4.
+
+mod cones;
+mod eliminate;
+mod energy;
+#[cfg(test)]
+pub(in crate::layout) mod polycube;
+mod seams;
+mod untangle;
+
+pub(super) use cones::Charts;
+
+use crate::geom::predicates::orient2d;
+use crate::mesh::{Adjacency, NONE, TriMesh, next};
+use crate::observe::{Cancelled, Observer};
+use energy::Maps;
+use glam::DVec2;
+use planish_sparse::SparseCholesky;
+use seams::Seams;
+use std::f64::consts::FRAC_PI_2;
+
+/// Steps of the lattice that a certified map lies on, in parts of its size: eight digits are left for sums.
+const LATTICE_BITS: i32 = 40;
+
+/// Weight of the field's directions in the barrier energy: enough to keep isolines along it where nothing is folded.
+const HOLD: f64 = 0.5;
+
+/// Softness of the barrier at the start of an attempt to untangle a map, against determinants of 1: what one does not
+/// untangle another mostly does.
+const SOFTNESS: [f64; 3] = [0.1, 1.0, 0.01];
+
+/// A map of a mesh to the plane, triangle by triangle.
+///
+/// Seen from both of its triangles an edge has the same length, and the same direction but for quarter turns: with `d`
+/// the edge vector of half-edge `h` in its own triangle, the same edge, run the same way, is
+/// `quarter_turn(d, jump[h])` in the triangle of the opposite half-edge. Sharp lines and boundaries run along an axis.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct SeamlessMap {
+    /// Place of each corner of each triangle, in the chart of the triangle.
+    pub uv: Vec<[DVec2; 3]>,
+    /// For each half-edge the quarter turns, counter-clockwise, from its triangle's chart to that of the opposite
+    /// half-edge: 0 to 3; 0 on the boundary. Opposite half-edges have opposite turns.
+    pub jump: Vec<u8>,
+}
+
+/// `v` turned counter-clockwise by `turns` quarters; exact.
+pub(super) fn quarter_turn(v: DVec2, turns: u8) -> DVec2 {
+    match turns % 4 {
+        0 => v,
+        1 => DVec2::new(-v.y, v.x),
+        2 => -v,
+        _ => DVec2::new(v.y, -v.x),
+    }
+}
+
+/// What became of a map.
+#[derive(Clone, Debug)]
+pub(super) struct Mapped {
+    pub map: SeamlessMap,
+    /// Faces that are flipped or without area in the map: an injective map has none.
+    pub flipped: Vec<u32>,
+    /// Vertices whose faces go around them by another angle than the charts say: an injective map has none.
+    pub wound: Vec<u32>,
+    /// Mean angle between the isolines and the field, degrees.
+    pub deviation_deg: f64,
+}
+
+impl Mapped {
+    /// True if the map is one-to-one around every vertex.
+    pub fn is_injective(&self) -> bool {
+        self.flipped.is_empty() && self.wound.is_empty()
+    }
+
+    pub fn faults(&self) -> usize {
+        self.flipped.len() + self.wound.len()
+    }
+}
+
+/// The map of least distortion that follows `charts`, in world units.
+/// # Errors
+/// `Cancelled`.
+pub(super) fn seamless(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    lines: &[bool],
+    charts: &Charts,
+    observer: &dyn Observer,
+) -> Result<Option<Mapped>, Cancelled> {
+    let Some(seams) = Seams::new(mesh, adjacency, lines, charts, None) else { return Ok(None) };
+    let maps = Maps::new(mesh, charts, &seams, 1.0);
+    let Some(laplacian) = maps.laplacian() else { return Ok(None) };
+    observer.check()?;
+    let free = maps.follow(&laplacian);
+    let straight = certified((mesh, adjacency), &maps, charts, free.clone());
+    if straight.is_injective() {
+        return Ok(Some(straight));
+    }
+    untangled((mesh, adjacency), &maps, &laplacian, charts, &[free], observer).map(Some)
+}
+
+/// The first untangled map without faults, from these starts; else that with the fewest.
+fn untangled(
+    ground: (&TriMesh, &Adjacency),
+    maps: &Maps,
+    laplacian: &SparseCholesky,
+    charts: &Charts,
+    starts: &[Vec<f64>],
+    observer: &dyn Observer,
+) -> Result<Mapped, Cancelled> {
+    let mut best: Option<Mapped> = None;
+    for (softness, start) in SOFTNESS.into_iter().flat_map(|s| starts.iter().map(move |start| (s, start))) {
+        let mut free = start.clone();
+        untangle::untangle(maps, laplacian, &mut free, (softness, HOLD), observer)?;
+        let mapped = certified(ground, maps, charts, free);
+        let done = mapped.is_injective();
+        if best.as_ref().is_none_or(|b| mapped.faults() < b.faults()) {
+            best = Some(mapped);
+        }
+        if done {
+            break;
+        }
+    }
+    best.ok_or(Cancelled)
+}
+
+/// The smoothest integer map with the integers of `uv` (corners of patches, lines and translations), which has the jumps of
+/// `charts`; `None` if it contradicts itself.
+/// # Errors
+/// `Cancelled`.
+pub(super) fn smooth_integers(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    lines: &[bool],
+    charts: &Charts,
+    uv: &[[DVec2; 3]],
+    observer: &dyn Observer,
+) -> Result<Option<Mapped>, Cancelled> {
+    let uv = joined(mesh, adjacency, charts, uv);
+    let Some(seams) = Seams::new(mesh, adjacency, lines, charts, Some(&uv)) else { return Ok(None) };
+    let (area, mapped) = (0..uv.len()).fold((0.0, 0.0), |(area, mapped), f| {
+        let [a, b, c] = uv[f];
+        (area + mesh.area(f), mapped + (b - a).perp_dot(c - a) / 2.0)
+    });
+    let maps = Maps::new(mesh, charts, &seams, (mapped / area).sqrt());
+    let (Some(laplacian), Some(free)) = (maps.laplacian(), seams.read(&uv)) else { return Ok(None) };
+    let starts = [free, maps.follow(&laplacian)];
+    untangled((mesh, adjacency), &maps, &laplacian, charts, &starts, observer).map(Some)
+}
+
+/// The same map with the charts that are not cut apart put next to each other, and one corner of each component at an
+/// integer place.
+fn joined(mesh: &TriMesh, adjacency: &Adjacency, charts: &Charts, uv: &[[DVec2; 3]]) -> Vec<[DVec2; 3]> {
+    let mut moved: Vec<Option<DVec2>> = vec![None; uv.len()];
+    let at = |h: u32| uv[h as usize / 3][h as usize % 3];
+    let corner = charts.corners();
+    for root in 0..uv.len() {
+        if moved[root].is_some() {
+            continue;
+        }
+        moved[root] = Some(-at(3 * root as u32));
+        let mut faces = vec![root as u32];
+        let mut i = 0;
+        while i < faces.len() {
+            let f = faces[i];
+            i += 1;
+            for h in 3 * f..3 * f + 3 {
+                let o = adjacency.opposite[h as usize];
+                if o != NONE && !charts.cut[h as usize] && moved[o as usize / 3].is_none() {
+                    moved[o as usize / 3] = moved[f as usize].map(|m| m + at(h) - at(next(o)));
+                    faces.push(o / 3);
+                }
+            }
+        }
+        let anchor = faces.iter().flat_map(|&f| 3 * f..3 * f + 3).find(|&h| corner[mesh.origin(h) as usize]);
+        if let Some(h) = anchor {
+            let place = at(h) + moved[h as usize / 3].unwrap_or_default();
+            faces.iter().for_each(|&f| moved[f as usize] = moved[f as usize].map(|m| m - (place - place.round())));
+        }
+    }
+    uv.iter().zip(moved).map(|(corners, m)| corners.map(|c| c + m.unwrap_or_default())).collect()
+}
+
+/// The map on a lattice of binary fractions, so that its equations hold without rounding, and its flipped faces by exact
+/// arithmetic.
+fn certified((mesh, adjacency): (&TriMesh, &Adjacency), maps: &Maps, charts: &Charts, mut free: Vec<f64>) -> Mapped {
+    let size = maps.seams.coordinates(&free).iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let step = 2f64.powi(size.max(f64::MIN_POSITIVE).log2().ceil() as i32 - LATTICE_BITS);
+    free.iter_mut().for_each(|v| *v = (*v / step).round() * step);
+    let uv = maps.seams.corners(&free);
+    let flipped = (0..uv.len() as u32).filter(|&f| {
+        let [a, b, c] = uv[f as usize];
+        orient2d(a, b, c) <= 0.0
+    });
+    let flipped = flipped.collect();
+    let deviation_deg = maps.deviation_deg(&maps.seams.coordinates(&free));
+    let angle = |h: u32| {
+        let (f, k) = (h as usize / 3, h as usize % 3);
+        (uv[f][(k + 1) % 3] - uv[f][k]).angle_to(uv[f][(k + 2) % 3] - uv[f][k])
+    };
+    let winds = |v: &u32| {
+        let whole = if adjacency.is_boundary_vertex(*v) { 2 } else { 4 };
+        let quarters = (adjacency.fan(*v).map(angle).sum::<f64>() / FRAC_PI_2).round() as i32;
+        adjacency.outgoing[*v as usize] != NONE && whole - quarters != charts.index[*v as usize]
+    };
+    let wound = (0..mesh.points.len() as u32).filter(winds).collect();
+    Mapped { map: SeamlessMap { uv, jump: charts.jump.clone() }, flipped, wound, deviation_deg }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::field::{FieldParams, field};
+    use crate::observe::Silent;
+    use crate::synthetic::shapes;
+    use glam::{DQuat, DVec3};
+
+    const PARAMS: FieldParams = FieldParams { curvature: 1.0, smoothing: 1.0, radius: 0.1, pair_distance: 1.0 };
+
+    fn charts(mesh: &TriMesh, lines: &[bool]) -> Charts {
+        let adjacency = Adjacency::new(mesh);
+        let field = field(mesh, &adjacency, lines, &PARAMS, &Silent).unwrap();
+        Charts::new(mesh, &adjacency, lines, &field)
+    }
+
+    fn mapped(mesh: &TriMesh, lines: &[bool]) -> (Charts, Mapped) {
+        let charts = charts(mesh, lines);
+        let mapped = seamless(mesh, &Adjacency::new(mesh), lines, &charts, &Silent).unwrap().unwrap();
+        (charts, mapped)
+    }
+
+    fn sharp(mesh: &TriMesh) -> Vec<bool> {
+        crate::mesh::sharp_edges(mesh, &Adjacency::new(mesh), 40.0)
+    }
+
+    /// Euler number of a mesh without loose vertices.
+    fn euler(mesh: &TriMesh) -> i32 {
+        let adjacency = Adjacency::new(mesh);
+        let edges = (0..adjacency.opposite.len()).filter(|&h| adjacency.opposite[h] > h as u32).count();
+        mesh.points.len() as i32 - edges as i32 + mesh.triangles.len() as i32
+    }
+
+    #[test]
+    fn indices_sum_to_four_times_the_euler_number_with_and_without_boundaries() {
+        for (mesh, number) in [
+            (shapes::sphere(1.0, 3), 2),
+            (shapes::torus(1.0, 0.4, 40, 20), 0),
+            (shapes::double_torus(24), -2),
+            (shapes::cuboid(DVec3::new(1.0, 2.0, 3.0), 6), 2),
+            (shapes::rectangle(3.0, 2.0, 9, 6), 1),
+            (shapes::annulus(0.5, 1.0, 40), 0),
+        ] {
+            assert_eq!(euler(&mesh), number);
+            assert_eq!(charts(&mesh, &sharp(&mesh)).index.iter().sum::<i32>(), 4 * number);
+        }
+    }
+
+    #[test]
+    fn a_box_has_8_cones_at_its_corners_and_a_map_without_any_distortion() {
+        let mesh = shapes::cuboid(DVec3::new(1.0, 2.0, 3.0), 6);
+        let (charts, mapped) = mapped(&mesh, &sharp(&mesh));
+        let corners = charts.corners();
+        for (v, p) in mesh.points.iter().enumerate() {
+            let is_corner = (p.abs() - DVec3::new(0.5, 1.0, 1.5)).abs().max_element() < 1e-9;
+            assert_eq!(corners[v], is_corner, "{p}");
+        }
+        assert!(mapped.flipped.is_empty() && mapped.deviation_deg < 1e-6);
+        for (f, [a, b, c]) in mapped.map.uv.iter().enumerate() {
+            assert!(((b - a).perp_dot(c - a) / 2.0 - mesh.area(f)).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn seams_hold_to_the_last_bit_and_no_face_is_flipped() {
+        for mesh in [
+            shapes::sphere(1.0, 3),
+            shapes::torus(1.0, 0.4, 40, 20),
+            shapes::double_torus(24),
+            shapes::cylinder(0.5, 1.0, 48),
+            shapes::annulus(0.5, 1.0, 40),
+        ] {
+            let adjacency = Adjacency::new(&mesh);
+            let (_, Mapped { map, flipped, .. }) = mapped(&mesh, &sharp(&mesh));
+            assert!(flipped.is_empty(), "{} of {}", flipped.len(), mesh.triangles.len());
+            let edge = |h: u32| {
+                let k = h as usize % 3;
+                map.uv[h as usize / 3][(k + 1) % 3] - map.uv[h as usize / 3][k]
+            };
+            for h in 0..adjacency.opposite.len() as u32 {
+                let o = adjacency.opposite[h as usize];
+                if o == NONE {
+                    assert!(edge(h).x == 0.0 || edge(h).y == 0.0, "boundaries run along an axis");
+                } else {
+                    assert_eq!(quarter_turn(edge(h), map.jump[h as usize]), -edge(o));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_ball_has_eight_cones_of_three_patches_wherever_it_is_turned_to() {
+        let ball = shapes::sphere(1.0, 4);
+        for turn in [DQuat::IDENTITY, DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -0.7)] {
+            let points = ball.points.iter().map(|&p| turn * p * 3.0 + DVec3::splat(5.0)).collect();
+            let index =
+                charts(&TriMesh::new(points, ball.triangles.clone()), &vec![false; 3 * ball.triangles.len()]).index;
+            assert_eq!((index.iter().filter(|i| **i == 1).count(), index.iter().filter(|i| **i != 0).count()), (8, 8));
+        }
+    }
+
+    #[test]
+    fn a_wedge_of_15_degrees_keeps_a_quarter_turn_between_its_faces() {
+        // A prism over a triangle with a corner of 15 degrees: without the opening the ends of the wedge have no angle.
+        let (sin, cos) = 15f64.to_radians().sin_cos();
+        let mesh = prism(&[[0.0, 0.0], [2.0, 0.0], [2.0 * cos, 2.0 * sin]], 1.0, 5);
+        let (charts, mapped) = mapped(&mesh, &sharp(&mesh));
+        assert!(charts.sectors.iter().all(|s| s.1 >= 1));
+        assert!(mapped.flipped.is_empty(), "{}", mapped.flipped.len());
+    }
+
+    /// A prism over a convex polygon around its middle, each triangle and wall split `level` times.
+    fn prism(polygon: &[[f64; 2]], height: f64, level: usize) -> TriMesh {
+        let n = polygon.len() as u32;
+        let at = |p: &[f64; 2], z: f64| DVec3::new(p[0], p[1], z);
+        let mut points: Vec<DVec3> = polygon.iter().map(|p| at(p, 0.0)).collect();
+        points.extend(polygon.iter().map(|p| at(p, height)));
+        let mut triangles = Vec::new();
+        let middle: DVec3 = points.iter().sum::<DVec3>() / f64::from(2 * n);
+        points.extend([DVec3::new(middle.x, middle.y, 0.0), DVec3::new(middle.x, middle.y, height)]);
+        for i in 0..n {
+            let j = (i + 1) % n;
+            triangles.extend([[2 * n, j, i], [2 * n + 1, n + i, n + j]]);
+        }
+        for i in 0..n {
+            let j = (i + 1) % n;
+            triangles.extend([[i, j, n + j], [i, n + j, n + i]]);
+        }
+        let mut mesh = TriMesh::new(points, triangles);
+        for _ in 0..level {
+            mesh = split(&mesh);
+        }
+        mesh
+    }
+
+    /// Every triangle in four.
+    fn split(mesh: &TriMesh) -> TriMesh {
+        let mut points = mesh.points.clone();
+        let mut middle = std::collections::HashMap::new();
+        let mut triangles = Vec::new();
+        for &[a, b, c] in &mesh.triangles {
+            let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[a, b]| {
+                *middle.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                    points.push(points[a as usize].midpoint(points[b as usize]));
+                    points.len() as u32 - 1
+                })
+            });
+            triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        TriMesh::new(points, triangles)
+    }
+}

@@ -1,0 +1,222 @@
+//! Other meshes of the same surface to lay out on: finer where the input is too coarse, coarser where it is finer than a
+//! layout needs, each with the way back.
+//!
+//! A *proxy* is an even mesh of some thousand triangles. The input is refined first ([`refine`]): edges much longer than
+//! wanted are split, and so is what a map cannot use: edges between two vertices of lines that are no line themselves,
+//! for both ends are bound; triangles with two edges on lines, for their corner has nothing to bend. Then vertices are
+//! taken out one by one ([`melt`]). Curves drawn on the proxy are carried back through the same steps ([`strands`]).
+
+pub(super) mod coarse;
+mod melt;
+pub(super) mod refine;
+mod strands;
+
+use self::melt::Melt;
+use self::refine::Refined;
+use self::strands::{Step, Strands};
+use crate::layout::complex::Complex;
+use crate::layout::{carry, network};
+use crate::mesh::{Adjacency, NONE, TriMesh, next};
+use crate::network::Network;
+use crate::observe::Observer;
+use std::collections::HashSet;
+
+/// Longest edge of the refined mesh in edges of the proxy: short enough to choose from.
+const FINE: f64 = 0.6;
+
+/// Rounds of splitting; each halves an edge.
+const SPLIT_ROUNDS: usize = 14;
+
+/// An even mesh of the input's surface, with the way back.
+pub(super) struct Proxy {
+    /// Nearly equilateral triangles.
+    pub mesh: TriMesh,
+    pub adjacency: Adjacency,
+    /// For each half-edge whether it lies on a sharp line; not those of the boundary.
+    pub lines: Vec<bool>,
+    /// The refined input, which the proxy is made from by `steps`.
+    work: Refined,
+    work_adjacency: Adjacency,
+    steps: Vec<Step>,
+    /// For each vertex and face of the proxy that of the refined input.
+    vertex: Vec<u32>,
+    face: Vec<u32>,
+}
+
+/// A proxy of `mesh` with about `wanted` triangles: fewer are not possible where lines are dense.
+///
+/// No edge but those of lines and of the boundary joins two vertices on them, and no triangle has two edges on them.
+/// * `sharp` - for each half-edge whether it is on a sharp line
+/// * `corners` - for each vertex whether it stays; may be empty
+///
+/// `None` if cancelled, or if the mesh has no area.
+pub(super) fn proxy(
+    mesh: &TriMesh,
+    sharp: &[bool],
+    corners: &[bool],
+    wanted: usize,
+    observer: &dyn Observer,
+) -> Option<Proxy> {
+    let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
+    // The area of an equilateral triangle is its edge squared times the root of 3 by 4.
+    let edge = (4.0 / 3f64.sqrt() * area / wanted.max(1) as f64).sqrt();
+    if !(edge.is_finite() && edge > 0.0) {
+        return None;
+    }
+    let work = refined(mesh, sharp, FINE * edge);
+    let work_adjacency = Adjacency::new(&work.mesh);
+    let tagged = tags(&work, &work_adjacency, sharp);
+    observer.progress(0.2);
+    let mut melt = Melt::new(&work.mesh, tagged, corners, edge);
+    melt.run(wanted, observer);
+    if observer.cancelled() {
+        return None;
+    }
+    let used = |v: &u32| !melt.around[*v as usize].is_empty();
+    let vertex: Vec<u32> = (0..work.mesh.points.len() as u32).filter(used).collect();
+    let face: Vec<u32> = (0..melt.triangles.len() as u32).filter(|&f| melt.is_live(f)).collect();
+    let mut number = vec![NONE; work.mesh.points.len()];
+    vertex.iter().enumerate().for_each(|(i, &v)| number[v as usize] = i as u32);
+    let points = vertex.iter().map(|&v| work.mesh.points[v as usize]).collect();
+    let triangles = face.iter().map(|&f| melt.triangles[f as usize].map(|v| number[v as usize])).collect();
+    let tagged: Vec<bool> =
+        face.iter().flat_map(|&f| (0..3).map(move |k| 3 * f + k)).map(|h| melt.tagged[h as usize]).collect();
+    let steps = std::mem::take(&mut melt.steps);
+    let mesh = TriMesh::new(points, triangles);
+    let adjacency = Adjacency::new(&mesh);
+    let lines = tagged.iter().zip(&adjacency.opposite).map(|(&tag, &o)| tag && o != NONE).collect();
+    Some(Proxy { mesh, adjacency, lines, work, work_adjacency, steps, vertex, face })
+}
+
+impl Proxy {
+    /// The refined input mesh, where [`Proxy::back`] draws.
+    pub fn fine(&self) -> (&TriMesh, &Adjacency) {
+        (&self.work.mesh, &self.work_adjacency)
+    }
+
+    /// A complex on the proxy, drawn on the refined input: what runs along lines stays on them. `None` if a place of it
+    /// lies inside a triangle, or it crosses a line between nodes.
+    pub fn back(&self, complex: &Complex) -> Option<Complex> {
+        let names = (&self.vertex[..], &self.face[..]);
+        let mut strands = Strands::new((&self.mesh, &self.adjacency), complex, names, self.work.mesh.triangles.len())?;
+        for step in self.steps.iter().rev() {
+            strands.undo(step, &self.work.mesh.points);
+        }
+        let mut complex = complex.clone();
+        complex.nodes.iter_mut().for_each(|n| n.vertex = self.vertex[n.vertex as usize]);
+        strands.put(self.fine(), |v| v, &mut complex)?;
+        Some(complex)
+    }
+
+    /// A complex on the refined input as a network on the input.
+    pub fn network(&self, complex: &Complex) -> Network {
+        network(&self.work, &self.work_adjacency, complex)
+    }
+}
+
+/// The input without edges longer than `longest`, those apart that no split shortens, and without what a map cannot use.
+fn refined(mesh: &TriMesh, sharp: &[bool], longest: f64) -> Refined {
+    let mut work = Refined::new(mesh);
+    let adjacency = Adjacency::new(mesh);
+    let bound = |tagged: &[bool], f: u32| (0..3).all(|k| tagged[3 * f as usize + k]);
+    let tagged = tags(&work, &adjacency, sharp);
+    refine::split_faces(&mut work, |f| bound(&tagged, f));
+    let adjacency = Adjacency::new(&work.mesh);
+    let tagged = tags(&work, &adjacency, sharp);
+    let mut on_line = vec![false; work.mesh.points.len()];
+    let mut edges: HashSet<[u32; 2]> = HashSet::new();
+    for h in (0..tagged.len() as u32).filter(|&h| tagged[h as usize]) {
+        let (a, b) = (work.mesh.origin(h), work.mesh.origin(next(h)));
+        edges.insert([a.min(b), a.max(b)]);
+        on_line[a as usize] = true;
+        on_line[b as usize] = true;
+    }
+    work = refine::split(&work, |a, b| on_line[a as usize] && on_line[b as usize] && !edges.contains(&[a, b])).0;
+    for _ in 0..SPLIT_ROUNDS {
+        let points = &work.mesh.points;
+        let (finer, from) = refine::split(&work, |a, b| points[a as usize].distance(points[b as usize]) > longest);
+        if from.len() == work.parent.len() {
+            break;
+        }
+        work = finer;
+    }
+    work
+}
+
+/// The half-edges of the refined mesh on sharp lines and on the boundary.
+fn tags(work: &Refined, adjacency: &Adjacency, sharp: &[bool]) -> Vec<bool> {
+    let mut tagged = carry(work, adjacency, sharp);
+    for (h, &o) in adjacency.opposite.iter().enumerate() {
+        if o == NONE {
+            tagged[h] = true;
+        } else if tagged[h] {
+            tagged[o as usize] = true;
+        }
+    }
+    tagged
+}
+
+#[cfg(test)]
+mod tests {
+    use super::melt::shape;
+    use super::*;
+    use crate::Silent;
+    use crate::mesh::sharp_edges;
+    use crate::synthetic::shapes;
+    use glam::DVec3;
+
+    fn made(mesh: &TriMesh, wanted: usize) -> Proxy {
+        let sharp = sharp_edges(mesh, &Adjacency::new(mesh), 40.0);
+        proxy(mesh, &sharp, &[], wanted, &Silent).expect("a proxy")
+    }
+
+    /// Half-edges on lines and on the boundary.
+    fn tagged(p: &Proxy) -> Vec<bool> {
+        p.lines.iter().zip(&p.adjacency.opposite).map(|(&line, &o)| line || o == NONE).collect()
+    }
+
+    #[test]
+    fn boxes_of_12_and_of_40_000_triangles_become_even_ones_with_their_12_lines() {
+        for n in [1, 58] {
+            let p = made(&shapes::cuboid(DVec3::new(1.0, 2.0, 3.0), n), 5_000);
+            assert!((4_999..=5_000).contains(&p.mesh.triangles.len()), "{}", p.mesh.triangles.len());
+            let least = (0..p.mesh.triangles.len()).map(|f| shape(p.mesh.corners(f))).fold(1.0, f64::min);
+            assert!(least > 0.4, "{least}");
+            let length: f64 =
+                (0..p.lines.len() as u32).filter(|&h| p.lines[h as usize]).map(|h| p.mesh.edge_length(h)).sum();
+            assert!((length - 2.0 * 24.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn no_edge_joins_two_lines_and_no_triangle_has_two_edges_on_lines() {
+        let fan = TriMesh::new(
+            vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::new(0.0, 1.0, 0.5)],
+            vec![[0, 1, 2], [0, 2, 3]],
+        );
+        for mesh in
+            [fan, shapes::cylinder(1.0, 0.3, 48), shapes::annulus(0.4, 1.0, 40), shapes::rectangle(1.0, 0.01, 30, 1)]
+        {
+            let p = made(&mesh, 800);
+            let tagged = tagged(&p);
+            let mut on_line = vec![false; p.mesh.points.len()];
+            for h in (0..tagged.len() as u32).filter(|&h| tagged[h as usize]) {
+                on_line[p.mesh.origin(h) as usize] = true;
+                on_line[p.mesh.origin(next(h)) as usize] = true;
+            }
+            let joins = |h: u32| on_line[p.mesh.origin(h) as usize] && on_line[p.mesh.origin(next(h)) as usize];
+            assert!((0..tagged.len() as u32).all(|h| tagged[h as usize] || !joins(h)));
+            assert!(tagged.chunks(3).all(|t| t.iter().filter(|&&t| t).count() <= 1));
+        }
+    }
+
+    #[test]
+    fn rims_of_a_cylinder_keep_11_vertices_or_more_and_no_triangle_spans_them() {
+        let p = made(&shapes::cylinder(1.0, 2.0, 200), 400);
+        let rim = |z: f64| {
+            let at = |h: u32| p.mesh.points[p.mesh.origin(h) as usize];
+            (0..p.lines.len() as u32).filter(|&h| p.lines[h as usize] && (at(h).z - z).abs() < 1e-9).count() / 2
+        };
+        assert!(rim(0.0) >= 11 && rim(2.0) >= 11 && rim(0.0) < 60, "{} {}", rim(0.0), rim(2.0));
+    }
+}
