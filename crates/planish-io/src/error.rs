@@ -10,7 +10,7 @@ pub enum ReadError {
     #[error("cannot read it: {0} - hint: check the name and the permissions")]
     Io(#[from] io::Error),
     /// A folder, a pipe or a device.
-    #[error("it is {0}, not a file - hint: name a mesh file")]
+    #[error("it is {0}, not a file - hint: name a file; save what comes through a pipe in one")]
     NotAFile(&'static str),
     /// No bytes at all.
     #[error("the file is empty (byte 0) - hint: write or download it again")]

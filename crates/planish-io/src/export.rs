@@ -1,8 +1,12 @@
 //! A model as what its file name asks for.
 
-use crate::{MeshFormat, StepInput, WriteError, WriteOptions, write_mesh, write_network, write_relief, write_step};
+use crate::{
+    IgesInput, MappedMesh, MeshFormat, StepInput, UsdInput, WriteError, WriteOptions, write_iges, write_mesh,
+    write_network, write_patches, write_relief, write_step, write_usd,
+};
 use planish::Model;
 use planish::mesh::TriMesh;
+use planish::relief::PatchedMesh;
 use std::path::Path;
 
 /// What a file name asks for.
@@ -10,6 +14,10 @@ use std::path::Path;
 pub enum ExportKind {
     /// `.step`, `.stp`: the surfaces.
     Step,
+    /// `.igs`, `.iges`: the surfaces.
+    Iges,
+    /// `.usda`: the surfaces and their mesh.
+    Usd,
     /// `.ply`, `.obj`, `.stl`, `.glb`: the displaced surface as a mesh.
     Mesh,
     /// `.json`: the network.
@@ -26,13 +34,15 @@ pub fn export_kind(path: impl AsRef<Path>) -> Result<ExportKind, WriteError> {
     let extension = crate::mesh_file::extension(path);
     match extension.to_ascii_lowercase().as_str() {
         "step" | "stp" => Ok(ExportKind::Step),
+        "igs" | "iges" => Ok(ExportKind::Iges),
+        "usda" => Ok(ExportKind::Usd),
         "json" => Ok(ExportKind::Network),
         _ if MeshFormat::of(path).is_some_and(|f| f != MeshFormat::Gltf) => Ok(ExportKind::Mesh),
         "" => Ok(ExportKind::Relief),
         _ if path.is_dir() => Ok(ExportKind::Relief),
         _ => Err(WriteError::UnknownExtension {
             extension,
-            known: ".step, .stp, .ply, .obj, .stl, .glb, .json for the network, or a folder for the displacement maps"
+            known: ".step, .stp, .igs, .iges, .usda, .ply, .obj, .stl, .glb, .json for the network, or a folder for the displacement maps"
                 .into(),
         }),
     }
@@ -41,11 +51,11 @@ pub fn export_kind(path: impl AsRef<Path>) -> Result<ExportKind, WriteError> {
 /// Writes `model` as the name of `path` asks for (see [`ExportKind`]).
 /// * `displaced` - makes the displaced surface; called only if a mesh is asked for
 /// # Errors
-/// Those of [`write_step`], [`write_mesh`], [`write_network`], [`write_relief`] and [`export_kind`].
+/// Those of [`write_step`], [`write_iges`], [`write_usd`], [`write_mesh`], [`write_network`], [`write_relief`] and [`export_kind`].
 pub fn export(
     path: impl AsRef<Path>,
     model: &Model,
-    displaced: impl FnOnce() -> TriMesh,
+    displaced: impl FnOnce() -> PatchedMesh,
 ) -> Result<ExportKind, WriteError> {
     let path = path.as_ref();
     let kind = export_kind(path)?;
@@ -55,7 +65,19 @@ pub fn export(
             let (network, surfaces) = (&model.network, model.surfaces.as_slice());
             write_step(path, &StepInput { network, surfaces, units: model.units, name: &name, time: None })?;
         }
-        ExportKind::Mesh => export_mesh(path, &displaced(), model)?,
+        ExportKind::Iges => {
+            let name = &options(path, model).name;
+            let (network, surfaces) = (&model.network, model.surfaces.as_slice());
+            write_iges(path, &IgesInput { network, surfaces, units: model.units, name })?;
+        }
+        ExportKind::Usd => {
+            let mesh = MappedMesh::new(displaced(), &model.reliefs);
+            let (surfaces, mesh) = (model.surfaces.as_slice(), Some(("displaced", &mesh)));
+            write_usd(path, &UsdInput { surfaces, mesh, shift: model.shift, options: &options(path, model) })?;
+        }
+        ExportKind::Mesh => {
+            write_patches(path, &MappedMesh::new(displaced(), &model.reliefs), &options(path, model))?;
+        }
         ExportKind::Network => write_network(path, &model.network, &model.mesh)?,
         ExportKind::Relief => write_relief(path, &model.reliefs, model.units)?,
     }
@@ -67,6 +89,10 @@ pub fn export(
 /// Those of [`write_mesh`].
 pub fn export_mesh(path: impl AsRef<Path>, mesh: &TriMesh, model: &Model) -> Result<(), WriteError> {
     let path = path.as_ref();
+    write_mesh(path, mesh, &options(path, model))
+}
+
+fn options(path: &Path, model: &Model) -> WriteOptions {
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    write_mesh(path, mesh, &WriteOptions { units: model.units, name, ..Default::default() })
+    WriteOptions { units: model.units, name, ..Default::default() }
 }

@@ -1,4 +1,4 @@
-//! Everything that enters or leaves planish: meshes, STEP, displacement images, the project file.
+//! Everything that enters or leaves planish: meshes, STEP, IGES, USD, displacement images, the project file.
 //!
 //! One file or folder per format. Readers take the whole file into memory, believe no count that the rest of
 //! the file has no room for, and say what is wrong and where. Writers leave either the finished file or
@@ -7,11 +7,15 @@
 pub mod atomic;
 mod error;
 mod export;
+mod far;
 mod gltf;
 mod grid_file;
+mod iges;
+mod mapped;
 mod mesh_file;
 mod network_file;
 mod obj;
+mod obj_surface;
 mod place;
 mod ply;
 mod polygon;
@@ -23,15 +27,29 @@ pub mod script;
 mod step;
 mod stl;
 mod text;
+mod topology;
+mod usd;
 mod weld;
 
 pub use error::{ReadError, WriteError};
 pub use export::{ExportKind, export, export_kind, export_mesh};
+pub use far::{FileUnits, file_units, shift_of, single_step};
 pub use grid_file::{is_grid, read_grid};
-pub use mesh_file::{MeshFormat, Up, WriteOptions, read_mesh, read_tagged_mesh, write_mesh, write_tagged_mesh};
-pub use network_file::{NetworkFileError, read_network, write_network};
+pub use iges::{IgesInput, IgesSummary, write_iges};
+pub use mapped::MappedMesh;
+pub use mesh_file::{
+    MeshFormat, Up, WriteOptions, content as read_bytes, read_mesh, read_tagged_mesh, write_mesh, write_patches,
+    write_tagged_mesh,
+};
+pub use network_file::{NetworkFileError, network_json, parse_network, read_network, write_network};
+pub use obj_surface::write_obj_surfaces;
 pub use place::Place;
 pub use project::{ProjectError, read_model, write_model};
-pub use relief_files::{read_relief, relief_names, relief_roundtrip, write_relief};
-pub use scan::{SCAN_EXTENSIONS, ScanOptions, WRITTEN_SCANS, is_scan, read_scan, write_scan};
+pub use relief_files::{
+    SIDECAR as RELIEF_SIDECAR, image_facts, is_relief_name, read_relief, relief_names, relief_roundtrip, write_relief,
+};
+pub use scan::{
+    SCAN_EXTENSIONS, ScanOptions, WRITTEN_SCANS, check_columns, is_scan, read_scan, write_scan, write_scan_in,
+};
 pub use step::{StepInput, StepSummary, write_step};
+pub use usd::{UsdInput, write_usd};

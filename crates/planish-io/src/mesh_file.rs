@@ -1,6 +1,6 @@
 //! Meshes from and to files: the format by the extension, checked against the content.
 
-use crate::{Place, ReadError, WriteError, atomic, gltf, obj, ply, stl};
+use crate::{MappedMesh, Place, ReadError, WriteError, atomic, gltf, obj, ply, stl};
 use planish::Units;
 use planish::mesh::{FeatureTags, TriMesh};
 use std::fs::File;
@@ -177,7 +177,37 @@ pub fn write_tagged_mesh(
     write_with_edges(path.as_ref(), &marked, &tags.edges, options)
 }
 
+/// Writes a mesh of patches as [`write_mesh`] does. OBJ gets a group and GLB a primitive with a material for each patch, named
+/// after its displacement map, with normals and with texture coordinates that fit the map. The vertices of OBJ are shared between
+/// patches; those of GLB, which has one normal and one place in the map for each of its vertices, are at the same place.
+/// # Errors
+/// As [`write_mesh`].
+pub fn write_patches(path: impl AsRef<Path>, mesh: &MappedMesh, options: &WriteOptions) -> Result<(), WriteError> {
+    let path = path.as_ref();
+    let format = format_for(path, &mesh.patched.mesh)?;
+    if mesh.patched.patches.is_empty() || !matches!(format, MeshFormat::Obj | MeshFormat::Glb) {
+        return write_mesh(path, &mesh.patched.mesh, options);
+    }
+    let generator = options.generator();
+    atomic::write(path, |out: &mut BufWriter<File>| match format {
+        MeshFormat::Obj => obj::write_patches(out, mesh, &generator),
+        _ => gltf::write_patches(out, mesh, options),
+    })
+}
+
 fn write_with_edges(path: &Path, mesh: &TriMesh, edges: &[[u32; 2]], options: &WriteOptions) -> Result<(), WriteError> {
+    let format = format_for(path, mesh)?;
+    let generator = options.generator();
+    atomic::write(path, |out: &mut BufWriter<File>| match format {
+        MeshFormat::Ply => ply::write(out, mesh, edges, &generator),
+        MeshFormat::Obj => obj::write(out, mesh, &generator),
+        MeshFormat::Stl => stl::write(out, mesh, &generator),
+        _ => gltf::write(out, mesh, options),
+    })
+}
+
+/// The format that the name asks for, if it is written and can hold the mesh.
+fn format_for(path: &Path, mesh: &TriMesh) -> Result<MeshFormat, WriteError> {
     let written = [MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Stl, MeshFormat::Glb];
     let Some(format) = MeshFormat::of(path).filter(|f| written.contains(f)) else {
         return Err(WriteError::UnknownExtension { extension: extension(path), known: known(&written) });
@@ -200,29 +230,35 @@ fn write_with_edges(path: &Path, mesh: &TriMesh, edges: &[[u32; 2]], options: &W
         let what = format!("a triangle names a vertex outside the {}", mesh.points.len());
         return Err(WriteError::Inconsistent { what, place: Place::Face(t) });
     }
-    let generator = options.generator();
-    atomic::write(path, |out: &mut BufWriter<File>| match format {
-        MeshFormat::Ply => ply::write(out, mesh, edges, &generator),
-        MeshFormat::Obj => obj::write(out, mesh, &generator),
-        MeshFormat::Stl => stl::write(out, mesh, &generator),
-        _ => gltf::write(out, mesh, options),
-    })
+    Ok(format)
 }
 
-/// The whole file, if it is one.
-pub(crate) fn content(path: &Path) -> Result<Vec<u8>, ReadError> {
-    let mut file = File::open(path)?;
-    let metadata = file.metadata()?;
+/// The whole file, if it is one: folders, pipes and devices are refused before they are opened.
+/// # Errors
+/// [`ReadError::Io`] or [`ReadError::NotAFile`].
+pub fn content(path: &Path) -> Result<Vec<u8>, ReadError> {
+    // Before it is opened: that alone waits for ever at a pipe that nobody writes to.
+    let metadata = std::fs::metadata(path)?;
     if metadata.is_dir() {
         return Err(ReadError::NotAFile("a folder"));
     }
-    // A pipe or a device might never end.
     if !metadata.is_file() {
         return Err(ReadError::NotAFile("a pipe or a device"));
     }
+    let mut file = File::open(path)?;
     let mut bytes = Vec::with_capacity(metadata.len() as usize);
     file.read_to_end(&mut bytes)?;
     Ok(bytes)
+}
+
+/// The bytes of a file that another one names or that is no mesh; as [`content`], for errors of other kinds.
+/// # Errors
+/// The operating system's, or that it is no file.
+pub(crate) fn bytes_of(path: &Path) -> std::io::Result<Vec<u8>> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("it is a folder, a pipe or a device"));
+    }
+    std::fs::read(path)
 }
 
 /// Refuses content that carries another format's mark, or lacks the mark of its own.

@@ -100,35 +100,46 @@ fn usual_version() -> u32 {
 /// # Errors
 /// If the file cannot be written.
 pub fn write_network(path: impl AsRef<Path>, network: &Network, mesh: &TriMesh) -> Result<(), WriteError> {
-    atomic::write(path.as_ref(), |out| {
-        let head = Head { vertices: mesh.points.len(), triangles: mesh.triangles.len() };
-        write!(out, "{{\n\"format\": \"{FORMAT}\",\n\"version\": {VERSION},\n\"mesh\": {},\n", line(&head)?)?;
-        list(out, "corners", &network.corners, ",")?;
-        list(out, "curves", &network.curves, ",")?;
-        list(out, "patches", &network.patches, "")?;
-        writeln!(out, "}}")?;
-        Ok(())
-    })
+    atomic::write(path.as_ref(), |out| Ok(out.write_all(network_json(network, mesh).as_bytes())?))
 }
 
-fn list<T: Serialize>(out: &mut impl Write, name: &str, items: &[T], after: &str) -> std::io::Result<()> {
-    writeln!(out, "\"{name}\": [")?;
+/// The text that [`write_network`] writes.
+pub fn network_json(network: &Network, mesh: &TriMesh) -> String {
+    let head = Head { vertices: mesh.points.len(), triangles: mesh.triangles.len() };
+    let mut text = format!("{{\n\"format\": \"{FORMAT}\",\n\"version\": {VERSION},\n\"mesh\": {},\n", line(&head));
+    list(&mut text, "corners", &network.corners, ",");
+    list(&mut text, "curves", &network.curves, ",");
+    list(&mut text, "patches", &network.patches, "");
+    text += "}\n";
+    text
+}
+
+fn list<T: Serialize>(text: &mut String, name: &str, items: &[T], after: &str) {
+    *text += &format!("\"{name}\": [\n");
     for (i, item) in items.iter().enumerate() {
-        writeln!(out, "{}{}", line(item)?, if i + 1 < items.len() { "," } else { "" })?;
+        *text += &line(item);
+        *text += if i + 1 < items.len() { ",\n" } else { "\n" };
     }
-    writeln!(out, "]{after}")
+    *text += &format!("]{after}\n");
 }
 
-fn line<T: Serialize>(item: &T) -> std::io::Result<String> {
-    Ok(serde_json::to_string(item)?)
+/// One item; numbers and names always become text.
+fn line<T: Serialize>(item: &T) -> String {
+    serde_json::to_string(item).unwrap_or_default()
 }
 
 /// Reads a network on `mesh` and checks that its parts exist and join.
 /// # Errors
 /// Everything that [`NetworkFileError`] lists.
 pub fn read_network(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<Network, NetworkFileError> {
-    let text = std::fs::read(path)?;
-    let file: File = serde_json::from_slice(&text).map_err(|e| {
+    parse_network(&crate::mesh_file::bytes_of(path.as_ref())?, mesh)
+}
+
+/// Reads a network from the text of its file, as [`read_network`].
+/// # Errors
+/// Everything that [`NetworkFileError`] lists but `Io`.
+pub fn parse_network(text: &[u8], mesh: &TriMesh) -> Result<Network, NetworkFileError> {
+    let file: File = serde_json::from_slice(text).map_err(|e| {
         let what = e.to_string();
         let what = what.rsplit_once(" at line ").map_or(what.as_str(), |(what, _)| what).to_owned();
         NetworkFileError::Syntax { what, line: e.line(), column: e.column() }

@@ -3,9 +3,10 @@
 //! Own reader instead of a crate's: messages with line numbers, concave polygons cut rightly, and vertices that
 //! stay one where normals or texture coordinates differ.
 
+use crate::mapped::patch_name;
 use crate::polygon::{Polygons, checked};
 use crate::text::{Lines, Words, real, shown, whole};
-use crate::{Place, ReadError, WriteError};
+use crate::{MappedMesh, Place, ReadError, WriteError};
 use glam::DVec3;
 use planish::mesh::{Attribute, TriMesh};
 use std::io::Write;
@@ -221,6 +222,34 @@ pub(crate) fn write<W: Write>(out: &mut W, mesh: &TriMesh, generator: &str) -> R
             }
         }
         writeln!(out)?;
+    }
+    Ok(())
+}
+
+/// Writes a mesh of patches: shared vertices, and for each patch a group with texture coordinates and normals of its own.
+pub(crate) fn write_patches<W: Write>(out: &mut W, mesh: &MappedMesh, generator: &str) -> Result<(), WriteError> {
+    writeln!(out, "# {generator}")?;
+    for p in &mesh.patched.mesh.points {
+        writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
+    }
+    for [u, v] in mesh.uvs.iter().flatten() {
+        writeln!(out, "vt {u} {v}")?;
+    }
+    for n in mesh.normals.iter().flatten().map(|n| n.as_vec3()) {
+        writeln!(out, "vn {} {} {}", n.x, n.y, n.z)?;
+    }
+    let mut first = 1;
+    for (p, nodes) in mesh.patched.patches.iter().enumerate() {
+        writeln!(out, "g {}", patch_name(p))?;
+        for triangle in &nodes.triangles {
+            write!(out, "f")?;
+            for n in triangle.map(|n| n as usize) {
+                let own = first + n;
+                write!(out, " {}/{own}/{own}", nodes.vertices[n] as u64 + 1)?;
+            }
+            writeln!(out)?;
+        }
+        first += nodes.vertices.len();
     }
     Ok(())
 }

@@ -65,14 +65,26 @@ pub enum ProjectError {
         /// Table and row.
         place: String,
     },
+    /// The disk has no room left.
+    #[error("the disk is full - hint: make room on it, or name another place")]
+    Full,
     /// SQLite refuses.
     #[error("the database is damaged or in use: {0} - hint: close other programs that use it, or take a copy of it")]
-    Database(#[from] rusqlite::Error),
+    Database(rusqlite::Error),
+}
+
+impl From<rusqlite::Error> for ProjectError {
+    fn from(e: rusqlite::Error) -> ProjectError {
+        match e.sqlite_error_code() {
+            Some(rusqlite::ErrorCode::DiskFull) => ProjectError::Full,
+            _ => ProjectError::Database(e),
+        }
+    }
 }
 
 /// Writes a model as one project file, whole or not at all. The same model gives the same bytes.
 /// # Errors
-/// [`ProjectError::Io`] or [`ProjectError::Database`] if the file cannot be written.
+/// [`ProjectError::Io`], [`ProjectError::Full`] or [`ProjectError::Database`] if the file cannot be written.
 pub fn write_model(path: impl AsRef<Path>, model: &Model) -> Result<(), ProjectError> {
     let path = path.as_ref();
     atomic::write_at(path, |temporary| {
@@ -104,8 +116,8 @@ pub fn write_model(path: impl AsRef<Path>, model: &Model) -> Result<(), ProjectE
 pub fn read_model(path: impl AsRef<Path>) -> Result<Model, ProjectError> {
     let path = path.as_ref();
     let mut head = [0u8; 100];
-    let mut file = std::fs::File::open(path)?;
-    let metadata = file.metadata()?;
+    // Before it is opened: that alone waits for ever at a pipe that nobody writes to.
+    let metadata = std::fs::metadata(path)?;
     if !metadata.is_file() || metadata.len() < head.len() as u64 {
         return Err(if metadata.is_dir() {
             ProjectError::Io(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder"))
@@ -113,7 +125,7 @@ pub fn read_model(path: impl AsRef<Path>) -> Result<Model, ProjectError> {
             ProjectError::NotAProject
         });
     }
-    file.read_exact(&mut head)?;
+    std::fs::File::open(path)?.read_exact(&mut head)?;
     if !head.starts_with(b"SQLite format 3\0") {
         return Err(ProjectError::NotAProject);
     }
@@ -140,7 +152,7 @@ pub fn read_model(path: impl AsRef<Path>) -> Result<Model, ProjectError> {
     if found > SCHEMA_VERSION {
         return Err(ProjectError::Newer { found });
     }
-    schema::read(&connection, found)
+    schema::read(&connection, found, metadata.len())
 }
 
 /// What SQLite keeps beside a database while it is open, and leaves there after a crash.

@@ -24,7 +24,7 @@ const VERSION: u32 = 1;
 /// Deflate makes data at most 1032 times smaller: an image that claims more than this is lying.
 const LARGEST_RATIO: u64 = 1100;
 /// Name of the sidecar.
-const SIDECAR: &str = "relief.json";
+pub const SIDECAR: &str = "relief.json";
 
 /// The sidecar `relief.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -132,6 +132,12 @@ fn write_image(path: &Path, relief: &Relief) -> Result<(), WriteError> {
     atomic::write(path, |out| Ok(out.write_all(bytes.get_ref())?))
 }
 
+/// True for the name of a map that [`write_relief`] may write, and for that of the sidecar.
+pub fn is_relief_name(name: &str) -> bool {
+    let number = name.strip_prefix("patch_").and_then(|n| n.strip_suffix(".exr"));
+    name == SIDECAR || number.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()))
+}
+
 /// Names of the maps that the sidecar in a folder lists, and its own; none where there is no sidecar of this program.
 pub fn relief_names(folder: impl AsRef<Path>) -> Vec<String> {
     #[derive(Deserialize)]
@@ -144,7 +150,7 @@ pub fn relief_names(folder: impl AsRef<Path>) -> Vec<String> {
     struct Name {
         file: String,
     }
-    let Ok(text) = std::fs::read(folder.as_ref().join(SIDECAR)) else { return Vec::new() };
+    let Ok(text) = crate::mesh_file::bytes_of(&folder.as_ref().join(SIDECAR)) else { return Vec::new() };
     let Ok(names) = serde_json::from_slice::<Names>(&text) else { return Vec::new() };
     // A name with a folder in it would lead elsewhere.
     let is_plain = |name: &String| Path::new(name).file_name().is_some_and(|n| n == name.as_str());
@@ -157,7 +163,7 @@ pub fn relief_names(folder: impl AsRef<Path>) -> Vec<String> {
 /// that is missing, damaged, of another size than the sidecar says or with values that are not finite.
 pub fn read_relief(folder: impl AsRef<Path>) -> Result<(Vec<Relief>, Units), ReadError> {
     let folder = folder.as_ref();
-    let text = std::fs::read(folder.join(SIDECAR)).map_err(|source| ReadError::Companion {
+    let text = crate::mesh_file::bytes_of(&folder.join(SIDECAR)).map_err(|source| ReadError::Companion {
         name: SIDECAR.into(),
         source,
         place: Place::Byte(0),
@@ -215,11 +221,24 @@ pub fn relief_roundtrip(folder: impl AsRef<Path>, surfaces: &[Surface], grids: &
     Ok(largest)
 }
 
+/// Size and channels of an EXR image, by its header: columns, rows, names.
+/// # Errors
+/// `ReadError` for what is no EXR image.
+pub fn image_facts(path: impl AsRef<Path>) -> Result<(usize, usize, Vec<String>), ReadError> {
+    let bytes = crate::mesh_file::content(path.as_ref())?;
+    let damaged = |what: String| ReadError::Syntax { what, place: Place::Byte(0) };
+    let meta = exr::meta::MetaData::read_from_buffered(std::io::Cursor::new(&bytes), false);
+    let meta = meta.map_err(|e| damaged(e.to_string()))?;
+    let header = meta.headers.first().ok_or_else(|| damaged("the image has no layer".into()))?;
+    let names = header.channels.list.iter().map(|c| c.name.to_string()).collect();
+    Ok((header.layer_size.x(), header.layer_size.y(), names))
+}
+
 fn read_image(path: &Path, entry: &Entry) -> Result<Relief, ReadError> {
     let place = || Place::Item("patch", entry.patch);
     let damaged = |what: String| ReadError::Syntax { what: format!("{}: {what}", entry.file), place: place() };
     let failed = |source| ReadError::Companion { name: entry.file.clone(), source, place: place() };
-    let bytes = std::fs::read(path).map_err(failed)?;
+    let bytes = crate::mesh_file::bytes_of(path).map_err(failed)?;
     let pixels = (entry.width as u64).saturating_mul(entry.height as u64);
     // Twelve bytes a pixel, before they were compressed.
     if pixels.saturating_mul(12) > (bytes.len() as u64).saturating_mul(LARGEST_RATIO) {

@@ -7,6 +7,7 @@ mod common;
 use common::{coloured_cube, file, folder, torus};
 use planish::grid::Grid;
 use planish::mesh::FacePoint;
+use planish::relief::PatchedMesh;
 use planish::relief::Relief;
 use planish::{DVec3, HistoryEntry, Model, Units};
 use planish_io::{ExportKind, ProjectError, export, export_kind, read_mesh, read_model, write_model};
@@ -116,7 +117,11 @@ CREATE TABLE history (sequence INTEGER PRIMARY KEY, parent INTEGER REFERENCES hi
 /// Writes an array as every schema has them and returns its number: numbers as little-endian bytes, compressed with
 /// zstd, and the CRC-32 of kind, count and what is compressed.
 fn add_array(database: &rusqlite::Connection, kind: &str, count: usize, bytes: &[u8]) -> i64 {
-    let data = zstd::bulk::compress(bytes, 1).unwrap();
+    add_packed(database, kind, count, zstd::bulk::compress(bytes, 1).unwrap())
+}
+
+/// As [`add_array`], of numbers that are compressed already.
+fn add_packed(database: &rusqlite::Connection, kind: &str, count: usize, data: Vec<u8>) -> i64 {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(kind.as_bytes());
     hasher.update(&(count as u64).to_le_bytes());
@@ -259,16 +264,22 @@ fn export_chooses_by_extension_and_lists_the_known_ones() {
         ("a.STEP", ExportKind::Step),
         ("b.glb", ExportKind::Mesh),
         ("c.ply", ExportKind::Mesh),
+        ("d.usda", ExportKind::Usd),
+        ("e.IGS", ExportKind::Iges),
         ("relief", ExportKind::Relief),
     ] {
-        assert_eq!(export(at(name), &model, || model.mesh.clone()).unwrap(), kind);
+        let patched = || PatchedMesh { mesh: model.mesh.clone(), patches: Vec::new() };
+        assert_eq!(export(at(name), &model, patched).unwrap(), kind);
         assert!(at(name).exists(), "{name}");
     }
     assert!((read_mesh(at("b.glb")).unwrap().bounds().max.x - 0.0254).abs() < 1e-9);
     assert!(std::fs::read_to_string(at("a.STEP")).unwrap().contains("CONVERSION_BASED_UNIT('INCH'"));
     assert!(at("relief/patch_0015.exr").exists());
-    let message = export_kind("a.iges").unwrap_err().to_string();
-    assert!(message.contains("unknown extension \"iges\"") && message.contains(".step, .stp, .ply"), "{message}");
+    let message = export_kind("a.fbx").unwrap_err().to_string();
+    assert!(
+        message.contains("unknown extension \"fbx\"") && message.contains(".step, .stp, .igs, .iges, .usda, .ply"),
+        "{message}"
+    );
     let nothing = export(at("d.step"), &Model::default(), Default::default).unwrap_err().to_string();
     assert!(nothing.contains("there is nothing to write"), "{nothing}");
 }
@@ -292,5 +303,50 @@ proptest! {
             bytes[at] = byte;
         }
         let _ = read_model(file(&folder, "b.planish", bytes));
+    }
+}
+
+#[test]
+fn forged_projects_take_no_more_than_their_size_allows_and_compute_nothing() {
+    let folder = folder();
+    let path = folder.path().join("a.planish");
+    write_model(&path, &model(9)).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let zeros = zstd::stream::encode_all(std::io::Read::take(std::io::repeat(0), 1 << 30), 1).unwrap();
+    let changed = |change: &dyn Fn(&rusqlite::Connection)| {
+        let path = file(&folder, "b.planish", &bytes);
+        change(&rusqlite::Connection::open(&path).unwrap());
+        read_model(&path)
+    };
+    // An array that nobody names is not expanded.
+    let found = changed(&|database| _ = add_packed(database, "f64", 1 << 27, zeros.clone()));
+    assert_eq!(found.unwrap(), model(9));
+    // One that the mesh names claims more than such a file holds.
+    let bomb = changed(&|database| {
+        let array = add_packed(database, "f64", 1 << 27, zeros.clone());
+        database.execute("UPDATE mesh SET points = ?1", [array]).unwrap();
+    });
+    assert!(bomb.unwrap_err().to_string().contains("claims 1073741824 bytes, more than a file of this size holds"));
+    let refused = |sql: &str, wanted: &str| {
+        let told = changed(&|database| database.execute_batch(sql).unwrap()).map(|_| sql).unwrap_err().to_string();
+        assert!(told.contains(wanted) && told.contains(" - hint: "), "{sql}: {told}");
+    };
+    let endless = "WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT x AS sequence, 'a' AS command, \
+                   'b' AS parameters FROM n";
+    refused(&format!("DROP TABLE history; CREATE VIEW history AS {endless}"), "\"history\" is no plain table");
+    refused("CREATE TABLE t (a INTEGER, b TEXT AS (hex(zeroblob(100000000))))", "\"t\" is no plain table");
+    // The same array twice would be as many numbers for nothing.
+    refused("UPDATE surface SET knots_v = knots_u", "named twice");
+    for weights in [[0.0; 3], [1e308; 3], [2.0, -1.0, 0.0], [f64::NAN, 0.5, 0.5]] {
+        let told = changed(&|database| {
+            let count =
+                database
+                    .query_row("SELECT count FROM array WHERE id = (SELECT weights FROM network)", [], |r| r.get(0));
+            let count: i64 = count.unwrap();
+            let bytes: Vec<u8> = (0..count / 3).flat_map(|_| weights).flat_map(|w: f64| w.to_le_bytes()).collect();
+            let array = add_array(database, "f64", count as usize, &bytes);
+            database.execute("UPDATE network SET weights = ?1", [array]).unwrap();
+        });
+        assert!(told.unwrap_err().to_string().contains("the places are not on the mesh"), "{weights:?}");
     }
 }

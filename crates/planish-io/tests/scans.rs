@@ -264,3 +264,66 @@ fn wrong_sets_of_views_are_told_with_the_line() {
         assert!(error.contains(told), "{conf:?}: {error}");
     }
 }
+
+#[test]
+fn decimal_commas_and_quoted_columns_are_read_as_they_are_meant() {
+    let folder = folder();
+    let points = [DVec3::new(1.5, -20.25, 3e-3), DVec3::new(1e3, 0.0, 7.0)];
+    for (name, text) in [
+        ("semicolon.csv", "X;Y;Z\n1,5;-20,25;0,003\n1000;0;7,0\n"),
+        ("semicolon_point.csv", "X;Y;Z\n1.5;-20.25;3e-3\n1000;0;7.0\n"),
+        ("tab.txt", "1,5\t-20,25\t0,003\n1000\t0\t7,0\n"),
+        ("blank.xyz", "1,5 -20,25 3,0e-3\n1e3 0 7,0\n"),
+        ("quoted.csv", "\"X\",\"Y\",\"Z\"\n\"1.5\",\"-20.25\",\"0.003\"\n\"1000\",\"0\",\"7.0\"\n"),
+        ("both.csv", "\"x [m]\",\"y [m]\",\"z [m]\"\n\"1,5\",\"-20,25\",\"0,003\"\n\"1000\",\"0\",\"7,0\"\n"),
+        ("excel.csv", "id;name;East;North;Height (m)\n1;a;1,5;-20,25;0,003\n2;b;1000;0;7\n"),
+        ("comma.csv", "x,y,z\n1.5,-20.25,3e-3\n1000, 0, 7.0\n"),
+        ("mixed.asc", "1.5 -20.25,0.003\n1000 0,7.0\n"),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let columns = (name == "excel.csv").then(|| "_,_,x,y,z".to_owned());
+        let found = read_scan(&path, &ScanOptions { columns, ..ScanOptions::default() });
+        if name == "excel.csv" {
+            // A name is no number: told, not skipped.
+            assert!(found.unwrap_err().to_string().contains("\"a\" is not a number (line 2)"));
+            continue;
+        }
+        assert_eq!(found.unwrap_or_else(|e| panic!("{name}: {e}")).points, points, "{name}");
+    }
+}
+
+#[test]
+fn columns_that_nobody_knows_are_refused_with_their_names_and_empty_ones_are_told() {
+    let folder = folder();
+    for (name, text, words) in [
+        (
+            "geo.csv",
+            "id,longitude,latitude,height\n1,7.1,46.2,530\n2,7.2,46.3,531\n",
+            "id, longitude, latitude, height",
+        ),
+        ("words.txt", "a b c\n1 2 3\n", "a, b, c"),
+        ("empty.csv", "x;y;z\n1;;3\n", "\"\" is not a number (line 2)"),
+        ("thousands.csv", "x;y;z\n1.234,5;2;3\n", "\"1.234,5\" is not a number (line 2)"),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let told = read(&path).unwrap_err().to_string();
+        assert!(told.contains(words) && told.contains(" - hint: "), "{name}: {told}");
+    }
+    // A title is no header: it has more words than there are columns. What is meant can be said.
+    for (name, text, columns) in [
+        ("title.xyz", "made by hand on a rainy day\n1 2 3\n4 5 6\n", None),
+        ("geo.csv", "id,e,n,h\n1,7.1,46.2,530\n2,7.2,46.3,531\n", Some("_,x,y,z".to_owned())),
+        ("survey.csv", "id,east,north,height\n1,7.1,46.2,530\n2,7.2,46.3,531\n", None),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let cloud = read_scan(&path, &ScanOptions { columns, ..ScanOptions::default() }).unwrap();
+        assert_eq!(cloud.points.len(), 2, "{name}");
+        if name != "title.xyz" {
+            let first = cloud.points[0] + cloud.shift;
+            assert!((first - DVec3::new(7.1, 46.2, 530.0)).length() < 1e-9, "{name}: {first}");
+        }
+    }
+}

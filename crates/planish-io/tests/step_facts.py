@@ -1,4 +1,4 @@
-"""Facts about STEP files as OpenCASCADE reads them, one JSON object per file.
+"""Facts about STEP and IGES files as OpenCASCADE reads them, one JSON object per file.
 
 Needs the package cadquery-ocp. OpenCASCADE's own "valid" passes gaps, free edges and reversed faces, so what is
 counted here is faces per edge, the direction in which they run along it, and the tolerance it had to grow to.
@@ -15,6 +15,7 @@ from OCP.BRepGProp import BRepGProp
 from OCP.Bnd import Bnd_Box
 from OCP.BRepBndLib import BRepBndLib
 from OCP.GProp import GProp_GProps
+from OCP.IGESControl import IGESControl_Reader
 from OCP.STEPControl import STEPControl_Reader
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS
@@ -43,7 +44,7 @@ def distinct(shapes):
 
 
 def facts(path):
-    reader = STEPControl_Reader()
+    reader = IGESControl_Reader() if path.endswith(".igs") else STEPControl_Reader()
     if int(reader.ReadFile(path)) != 1:
         return {"error": "OpenCASCADE cannot read it"}
     reader.TransferRoots()

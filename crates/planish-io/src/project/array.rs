@@ -5,6 +5,7 @@ use planish::DVec3;
 use planish::mesh::FacePoint;
 use rayon::prelude::*;
 use rusqlite::{Connection, Transaction, params};
+use std::collections::BTreeSet;
 use std::io::Read;
 
 /// The fastest level: scans compress little better at higher ones, and saving must not be felt.
@@ -85,9 +86,19 @@ fn checksum(kind: &str, count: u64, data: &[u8]) -> u32 {
     hasher.finalize()
 }
 
-/// Arrays read from a file; each is taken once.
-pub(super) struct Loaded {
-    arrays: Vec<Option<Array>>,
+/// All arrays together may take so many bytes for each byte of their file, and [`FREE`] more: what is measured or fitted
+/// compresses ten times at best, forged arrays of zeros thousands of times.
+const MOST_RATIO: u64 = 1000;
+/// Bytes that the arrays of even the smallest file may take.
+const FREE: u64 = 64 << 20;
+
+/// Arrays in a file, read and expanded when they are asked for; each is taken once, so that no row can ask for the numbers of
+/// another again.
+pub(super) struct Loaded<'a> {
+    connection: &'a Connection,
+    taken: BTreeSet<i64>,
+    /// Bytes that may still be expanded.
+    left: u64,
 }
 
 struct Row {
@@ -98,53 +109,73 @@ struct Row {
     data: Vec<u8>,
 }
 
-impl Loaded {
-    /// Reads, checks and expands all arrays, in parallel.
-    pub fn read(connection: &Connection) -> Result<Loaded, ProjectError> {
-        let mut select = connection.prepare("SELECT id, kind, count, checksum, data FROM array ORDER BY id")?;
-        let rows = select.query_map([], |row| {
-            let (id, kind, count) = (row.get(0)?, row.get(1)?, row.get(2)?);
-            Ok(Row { id, kind, count, checksum: row.get(3)?, data: row.get(4)? })
-        })?;
-        let rows: Vec<Row> = rows.collect::<Result<_, _>>()?;
-        if let Some((k, row)) = rows.iter().enumerate().find(|(k, row)| row.id != *k as i64 + 1) {
-            return Err(damaged(format!("array {} stands where {} should", row.id, k + 1), "array", row.id));
-        }
-        let arrays = rows.into_par_iter().map(|row| expand(row).map(Some)).collect::<Result<_, _>>()?;
-        Ok(Loaded { arrays })
+impl Loaded<'_> {
+    /// The arrays of a file of `bytes`.
+    pub fn new(connection: &Connection, bytes: u64) -> Loaded<'_> {
+        Loaded { connection, taken: BTreeSet::new(), left: bytes.saturating_mul(MOST_RATIO).saturating_add(FREE) }
     }
 
-    fn take(&mut self, id: i64) -> Option<Array> {
-        self.arrays.get_mut(usize::try_from(id).ok()?.checked_sub(1)?)?.take()
+    /// Array `id`, which must be of a kind and, if that is known, hold `count` numbers.
+    fn take(&mut self, id: i64, kind: &str, count: Option<usize>) -> Result<Array, ProjectError> {
+        let missing = || damaged(format!("it is missing, named twice or not of {kind}"), "array", id);
+        if !self.taken.insert(id) {
+            return Err(missing());
+        }
+        let mut select =
+            self.connection.prepare_cached("SELECT kind, count, checksum, data FROM array WHERE id = ?1")?;
+        let found = select.query_row([id], |row| {
+            Ok(Row { id, kind: row.get(0)?, count: row.get(1)?, checksum: row.get(2)?, data: row.get(3)? })
+        });
+        let row = match found {
+            Err(rusqlite::Error::QueryReturnedNoRows) => return Err(missing()),
+            found => found?,
+        };
+        if row.kind != kind {
+            return Err(missing());
+        }
+        if count.is_some_and(|count| row.count != count as i64) {
+            return Err(damaged(format!("{} numbers are not the points expected", row.count), "array", id));
+        }
+        if checksum(kind, row.count as u64, &row.data) != row.checksum {
+            return Err(ProjectError::Checksum { array: id });
+        }
+        let size = if kind == "f64" { 8 } else { 4 };
+        let needed = (row.count.max(0) as u64).saturating_mul(size);
+        self.left = self.left.checked_sub(needed).ok_or_else(|| {
+            damaged(format!("it claims {needed} bytes, more than a file of this size holds"), "array", id)
+        })?;
+        expand(row)
     }
 
     /// Array `id`, which must hold `f64`.
     pub fn f64(&mut self, id: i64) -> Result<Vec<f64>, ProjectError> {
-        match self.take(id) {
-            Some(Array::F64(x)) => Ok(x),
-            _ => Err(damaged("it is missing or not of 64-bit reals".into(), "array", id)),
+        match self.take(id, "f64", None)? {
+            Array::F64(x) => Ok(x),
+            _ => Err(damaged("it is of another type".into(), "array", id)),
         }
     }
 
     /// Array `id`, which must hold `f32`.
     pub fn f32(&mut self, id: i64) -> Result<Vec<f32>, ProjectError> {
-        match self.take(id) {
-            Some(Array::F32(x)) => Ok(x),
-            _ => Err(damaged("it is missing or not of 32-bit reals".into(), "array", id)),
+        match self.take(id, "f32", None)? {
+            Array::F32(x) => Ok(x),
+            _ => Err(damaged("it is of another type".into(), "array", id)),
         }
     }
 
     /// Array `id`, which must hold `u32`.
     pub fn u32(&mut self, id: i64) -> Result<Vec<u32>, ProjectError> {
-        match self.take(id) {
-            Some(Array::U32(x)) => Ok(x),
-            _ => Err(damaged("it is missing or not of 32-bit whole numbers".into(), "array", id)),
+        match self.take(id, "u32", None)? {
+            Array::U32(x) => Ok(x),
+            _ => Err(damaged("it is of another type".into(), "array", id)),
         }
     }
 
     /// Array `id` as points with finite coordinates; `count` of them if that is given.
     pub fn points(&mut self, id: i64, count: Option<usize>) -> Result<Vec<DVec3>, ProjectError> {
-        let x = self.f64(id)?;
+        let Array::F64(x) = self.take(id, "f64", count.map(|n| n.saturating_mul(3)))? else {
+            return Err(damaged("it is of another type".into(), "array", id));
+        };
         if x.len() % 3 != 0 || count.is_some_and(|count| 3 * count != x.len()) || !x.iter().all(|x| x.is_finite()) {
             return Err(damaged(format!("{} numbers are not the points expected", x.len()), "array", id));
         }
@@ -163,16 +194,25 @@ pub(super) fn add_places<'a>(arrays: &mut Arrays, places: impl Iterator<Item = &
 
 /// Places on the mesh out of their arrays.
 pub(super) fn places(
-    arrays: &mut Loaded,
+    arrays: &mut Loaded<'_>,
     faces: i64,
     weights: i64,
     count: usize,
 ) -> Result<Vec<FacePoint>, ProjectError> {
     let (f, w) = (arrays.u32(faces)?, arrays.f64(weights)?);
-    if w.len() != 3 * f.len() || f.iter().any(|&f| f as usize >= count) || !w.iter().all(|w| w.is_finite()) {
+    if w.len() != 3 * f.len() || f.iter().any(|&f| f as usize >= count) || !w.chunks_exact(3).all(are_weights) {
         return Err(damaged("the places are not on the mesh".into(), "array", faces));
     }
     Ok(f.iter().zip(w.chunks_exact(3)).map(|(&face, w)| FacePoint { face, bary: [w[0], w[1], w[2]] }).collect())
+}
+
+/// Rounding in weights of places; far above what computing leaves, far below what would lie beside its triangle.
+const WEIGHT_SLACK: f64 = 1e-3;
+
+/// True for three weights from 0 to 1 that sum to 1: those of a place on its triangle.
+pub(super) fn are_weights(bary: &[f64]) -> bool {
+    let sum: f64 = bary.iter().sum();
+    bary.iter().all(|b| (-WEIGHT_SLACK..=1.0 + WEIGHT_SLACK).contains(b)) && (sum - 1.0).abs() <= WEIGHT_SLACK
 }
 
 pub(super) fn damaged(what: String, table: &str, row: i64) -> ProjectError {
@@ -181,9 +221,6 @@ pub(super) fn damaged(what: String, table: &str, row: i64) -> ProjectError {
 
 fn expand(row: Row) -> Result<Array, ProjectError> {
     let count = u64::try_from(row.count).map_err(|_| damaged("its count is negative".into(), "array", row.id))?;
-    if checksum(&row.kind, count, &row.data) != row.checksum {
-        return Err(ProjectError::Checksum { array: row.id });
-    }
     let size = if row.kind == "f64" { 8 } else { 4 };
     let needed = count.saturating_mul(size);
     // Grows as bytes come, and stops one after the count: a false count cannot take memory.

@@ -54,10 +54,12 @@ pub(super) fn write(transaction: &Transaction, model: &Model) -> Result<(), Proj
     transaction.execute_batch(TABLES)?;
     let mut arrays = Arrays::default();
     let sketch = serde_json::to_string(&model.sketch).map_err(std::io::Error::other)?;
+    let shift = serde_json::to_string(&model.shift.to_array()).map_err(std::io::Error::other)?;
     for (key, value) in [
         ("generator", concat!("planish ", env!("CARGO_PKG_VERSION"))),
         ("params", &model.params),
         ("sketch", &sketch),
+        ("shift", &shift),
         ("units", model.units.symbol()),
     ] {
         transaction.execute("INSERT INTO meta VALUES (?1, ?2)", params![key, value])?;
@@ -114,18 +116,41 @@ fn write_network(transaction: &Transaction, network: &Network, arrays: &mut Arra
     Ok(())
 }
 
+/// Refuses what computes when it is read: views, triggers, virtual tables and columns made of others. The tables of a project
+/// hold what they hold.
+fn only_tables(connection: &Connection) -> Result<(), ProjectError> {
+    let odd = connection.query_row(
+        "SELECT name FROM sqlite_master WHERE type NOT IN ('table', 'index') OR sql LIKE 'CREATE VIRTUAL%' \
+         OR sql LIKE '% AS (%' OR sql LIKE '% GENERATED %' LIMIT 1",
+        [],
+        |row| row.get::<_, String>(0),
+    );
+    match odd {
+        Err(rusqlite::Error::QueryReturnedNoRows) => Ok(()),
+        odd => Err(damaged(format!("\"{}\" is no plain table", odd?), "sqlite_master", 0)),
+    }
+}
+
 /// Reads a model and checks that its parts fit together.
-pub(super) fn read(connection: &Connection, version: u32) -> Result<Model, ProjectError> {
-    let mut arrays = Loaded::read(connection)?;
+/// * `bytes` - size of the file
+pub(super) fn read(connection: &Connection, version: u32, bytes: u64) -> Result<Model, ProjectError> {
+    only_tables(connection)?;
+    let mut arrays = Loaded::new(connection, bytes);
     let meta = |key: &str| -> Result<String, ProjectError> {
         Ok(connection.query_row("SELECT value FROM meta WHERE key = ?1", [key], |row| row.get(0))?)
     };
     let units = meta("units")?;
     let units: Units = units.parse().map_err(|_| damaged(format!("unknown unit \"{units}\""), "meta", 0))?;
+    // Files of older versions have none.
+    let shift = match meta("shift") {
+        Ok(json) => serde_json::from_str::<[f64; 3]>(&json).map_err(|e| damaged(e.to_string(), "meta", 0))?.into(),
+        Err(ProjectError::Database(rusqlite::Error::QueryReturnedNoRows)) => planish::DVec3::ZERO,
+        Err(e) => return Err(e),
+    };
     let mesh = read_mesh(connection, &mut arrays)?;
     let faces = mesh.triangles.len();
     let network = read_network(connection, &mut arrays, faces)?;
-    let mut model = Model { mesh, network, units, params: meta("params")?, ..Default::default() };
+    let mut model = Model { mesh, network, units, shift, params: meta("params")?, ..Default::default() };
     for (p, rows, cols, [points, f, w, ..]) in sized(connection, "SELECT * FROM grid ORDER BY patch", 3)? {
         let points = arrays.points(points, Some(rows * cols))?;
         let places = places(&mut arrays, f, w, faces)?;

@@ -4,7 +4,7 @@
 //! by number.
 
 use super::ProjectError;
-use super::array::{Array, Arrays, Loaded, add_places, damaged, places};
+use super::array::{Array, Arrays, Loaded, add_places, are_weights, damaged, places};
 use planish::grid::FeatureCurve;
 use planish::mesh::FacePoint;
 use planish::model::{Drawing, HistoryEntry, Model, Sketch, Step};
@@ -141,8 +141,7 @@ fn drawing(drawn: Drawn, chains: &[Vec<FacePoint>], faces: usize) -> Result<Draw
 
 /// Tells what is wrong with a sketch on a mesh of `faces` triangles.
 pub(super) fn check_sketch(sketch: &Sketch, faces: usize) -> Result<(), String> {
-    let wrong =
-        |f: &FeatureCurve| f.points.iter().any(|p| p.face as usize >= faces || !p.bary.iter().all(|b| b.is_finite()));
+    let wrong = |f: &FeatureCurve| f.points.iter().any(|p| p.face as usize >= faces || !are_weights(&p.bary));
     match sketch.features.iter().position(wrong) {
         Some(k) => Err(format!("feature curve {k} is not on the mesh")),
         None => Ok(()),

@@ -139,6 +139,15 @@ impl Report {
         self.quality.get(key).map(|f| f.value())
     }
 
+    /// A length among the figures in words, with its share of the diagonal that the figure `KEY_rel` tells.
+    pub fn length(&self, key: &str) -> String {
+        let value = self.figure(key).unwrap_or(0.0);
+        match self.figure(&format!("{key}_rel")) {
+            Some(share) if share > 0.0 => distance(value, value / share, &self.input.units),
+            _ => distance(value, self.input.diagonal, &self.input.units),
+        }
+    }
+
     /// A yes-or-no figure by its key.
     pub fn flag(&self, key: &str) -> Option<bool> {
         match self.quality.get(key) {

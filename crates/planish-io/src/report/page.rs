@@ -1,6 +1,6 @@
 //! The page: one self-contained HTML file without scripts and without anything from outside.
 
-use super::words::{count, distance, number, percent};
+use super::words::{count, number, percent};
 use super::{Report, SeamRow};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -69,13 +69,15 @@ const TRUTH_FIGURES: [(&str, &str, Reading); 12] = [
 ];
 
 /// Figures of quality in words: key, meaning, and how the value is read.
-const FIGURES: [(&str, &str, Reading); 23] = [
+const FIGURES: [(&str, &str, Reading); 25] = [
     ("mesh.triangles", "Triangles of the mesh after repair", Reading::Plain),
     ("mesh.watertight", "The mesh is closed", Reading::Plain),
     ("mesh.manifold", "The mesh is manifold", Reading::Plain),
     ("mesh.feature_edges", "Sharp edges found", Reading::Plain),
     ("patches.count", "Four-sided patches", Reading::Plain),
     ("patches.irregular_corners", "Corners where not four patches meet", Reading::Plain),
+    ("layout.cones", "Cones of the directions it follows", Reading::Plain),
+    ("layout.deviation_deg", "Patches off these directions, mean", Reading::Degrees),
     ("grid.points", "Points of all grids", Reading::Plain),
     ("grid.folds", "Folded grid cells", Reading::Plain),
     ("grid.spacing_cv", "Unevenness of grid spacing (deviation over mean)", Reading::Fraction),
@@ -157,7 +159,7 @@ fn lead(page: &mut String, report: &Report) {
     let mut text = format!("{} four-sided B-spline patches", count(patches as u64));
     if let (Some(rms), Some(max)) = (report.figure("surface.rms_rel"), report.figure("surface.max_rel")) {
         text += &format!(
-            " follow the input to {} of its diagonal on average and {} at the worst place",
+            " follow the input to {} of its diagonal (RMS) and {} at the worst place",
             percent(rms),
             percent(max)
         );
@@ -205,9 +207,9 @@ fn tiles(page: &mut String, report: &Report) {
         row.push((count(n as u64), "", "Patches", detail));
     }
     for (key, name) in [
-        ("surface.rms", "Mean deviation"),
+        ("surface.rms", "Deviation, RMS"),
         ("surface.max", "Largest deviation"),
-        ("displaced.rms", "With displacement"),
+        ("displaced.rms", "With displacement, RMS"),
     ] {
         if let Some((value, small, detail)) = length(key) {
             row.push((value, small, name, detail));
@@ -342,13 +344,12 @@ fn figures(page: &mut String, report: &Report, title: &str, list: &[(&str, &str,
         "<h2>{title}</h2>\n<p class=\"note\">Each with its key in <code>report.json</code>.</p>\n<div class=\"scroll\">\
          <table><tbody>\n",
     );
-    let unit = report.input.units.as_str();
     for &(key, words, reading) in list {
         let Some(figure) = report.quality.get(key) else { continue };
         let value = match (figure, reading) {
             (Figure::Flag(yes), _) => if *yes { "yes" } else { "no" }.to_owned(),
             (Figure::Count(n), _) => count(*n),
-            (Figure::Number(x), Reading::Length) => distance(*x, report.input.diagonal, unit),
+            (Figure::Number(_), Reading::Length) => report.length(key),
             (Figure::Number(x), Reading::Degrees) => format!("{}°", number(*x)),
             (Figure::Number(x), Reading::Fraction) => percent(*x),
             (Figure::Number(x), Reading::Plain) => number(*x),

@@ -74,7 +74,8 @@ fn guid(name: &str, count: usize) -> String {
     format!("{{planish-{name}-{count}}}")
 }
 
-pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud) -> Result<(), WriteError> {
+/// * `metres` - what one unit of the cloud is
+pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud, metres: f64) -> Result<(), WriteError> {
     let fault = |e: e57::Error| WriteError::Io(std::io::Error::other(e));
     let mut file = E57Writer::from_file(path, &guid("file", world.len())).map_err(fault)?;
     let color = cloud.attribute("color", 3);
@@ -100,13 +101,13 @@ pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud) -> Result<(), W
         let name = format!("scan-{number}");
         let mut scan = file.add_pointcloud(&guid(&name, members.len()), prototype.clone()).map_err(fault)?;
         scan.set_name(Some(format!("planish {name}")));
-        let eye = station.map(|k| cloud.scanners[k] + cloud.shift);
+        let eye = station.map(|k| (cloud.scanners[k] + cloud.shift) * metres);
         if let Some(DVec3 { x, y, z }) = eye {
             let translation = Translation { x, y, z };
             scan.set_transform(Some(Transform { rotation: Quaternion::default(), translation }));
         }
         for i in members {
-            let p = world[i] - eye.unwrap_or(DVec3::ZERO);
+            let p = world[i] * metres - eye.unwrap_or(DVec3::ZERO);
             let mut values: Vec<RecordValue> = p.to_array().map(RecordValue::Double).into();
             if let Some(a) = color {
                 let byte = |x: f32| RecordValue::Integer((x.clamp(0.0, 1.0) * 255.0).round() as i64);

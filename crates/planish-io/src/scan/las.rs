@@ -6,9 +6,7 @@ use glam::DVec3;
 use las::point::Format;
 use las::{Builder, Color, Point, Reader, Transform, Vector, Writer};
 use planish::cloud::Cloud;
-use std::fs::File;
-use std::io::{BufWriter, Cursor};
-use std::path::Path;
+use std::io::{Cursor, Write};
 
 /// Points read at once.
 const PIECE: u64 = 1 << 16;
@@ -87,8 +85,8 @@ pub(super) fn read(bytes: Vec<u8>, classes: &[u8]) -> Result<Cloud, ReadError> {
 /// Steps of a coordinate over the size of the cloud: fine enough for any scanner, coarse enough for 31 bits.
 const STEPS: f64 = 1e9;
 
-/// Writes LAS 1.2, compressed (LAZ) or not.
-pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud, compressed: bool) -> Result<(), WriteError> {
+/// Writes LAS 1.2, compressed (LAZ) or not. The file is made in memory first: the library panics where a disk is full.
+pub(super) fn write(out: &mut impl Write, world: &[DVec3], cloud: &Cloud, compressed: bool) -> Result<(), WriteError> {
     let fault = |e: las::Error| WriteError::Io(std::io::Error::other(e));
     let bounds = planish::geom::Aabb::of(world);
     let mut builder = Builder::from((1, 2));
@@ -106,7 +104,7 @@ pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud, compressed: boo
     };
     builder.transforms = Vector { x: axis(0), y: axis(1), z: axis(2) };
     let header = builder.into_header().map_err(fault)?;
-    let mut writer = Writer::new(BufWriter::new(File::create(path)?), header).map_err(fault)?;
+    let mut writer = Writer::new(Cursor::new(Vec::new()), header).map_err(fault)?;
     for (i, p) in world.iter().enumerate() {
         let whole = |x: f32| (x.clamp(0.0, 1.0) * 65535.0).round() as u16;
         let point = Point {
@@ -127,5 +125,5 @@ pub(super) fn write(path: &Path, world: &[DVec3], cloud: &Cloud, compressed: boo
         };
         writer.write_point(point).map_err(fault)?;
     }
-    writer.close().map_err(fault)
+    Ok(out.write_all(writer.into_inner().map_err(fault)?.get_ref())?)
 }

@@ -11,8 +11,11 @@ mod pcd;
 mod table;
 mod views;
 
+pub use table::check_columns;
+
 use crate::{Place, ReadError, WriteError, atomic, ply};
 use glam::DVec3;
+use planish::Units;
 use planish::cloud::Cloud;
 use planish::mesh::Attribute;
 use std::path::Path;
@@ -81,18 +84,12 @@ pub fn read_scan(path: impl AsRef<Path>, options: &ScanOptions) -> Result<Cloud,
     Ok(cloud)
 }
 
-/// Coordinates this many times larger than the cloud get a shift.
-const FAR: f64 = 100.0;
-
 /// Moves a cloud with large coordinates near the origin by whole numbers, so that single precision loses nothing
 /// that matters and the way back is exact.
 fn shift(cloud: &mut Cloud) {
-    let bounds = cloud.bounds();
-    let size = bounds.diagonal();
-    let center = bounds.center();
-    if center.is_finite() && center.length() > FAR * size && size > 0.0 && cloud.shift == DVec3::ZERO {
-        cloud.shift = center.round();
-        let by = cloud.shift;
+    let by = crate::shift_of(&cloud.bounds());
+    if by != DVec3::ZERO && cloud.shift == DVec3::ZERO {
+        cloud.shift = by;
         cloud.points.iter_mut().chain(&mut cloud.scanners).for_each(|p| *p -= by);
     }
 }
@@ -102,6 +99,13 @@ fn shift(cloud: &mut Cloud) {
 /// [`WriteError::UnknownExtension`], [`WriteError::Nothing`] for no points, [`WriteError::Value`] for coordinates that
 /// are no numbers.
 pub fn write_scan(path: impl AsRef<Path>, cloud: &Cloud) -> Result<(), WriteError> {
+    write_scan_in(path, cloud, Units::M)
+}
+
+/// As [`write_scan`], for a cloud in `units`: E57 is in metres by its standard; the other formats do not say.
+/// # Errors
+/// As [`write_scan`].
+pub fn write_scan_in(path: impl AsRef<Path>, cloud: &Cloud, units: Units) -> Result<(), WriteError> {
     let path = path.as_ref();
     let extension = lower(path);
     if !WRITTEN_SCANS.contains(&extension.as_str()) {
@@ -129,8 +133,8 @@ pub fn write_scan(path: impl AsRef<Path>, cloud: &Cloud) -> Result<(), WriteErro
         "ply" => atomic::write(path, |out| {
             ply::write_points(out, &world, &cloud.attributes, &format!("planish {}", env!("CARGO_PKG_VERSION")))
         }),
-        "las" | "laz" => atomic::write_at(path, |at| las::write(at, &world, cloud, extension == "laz")),
-        "e57" => atomic::write_at(path, |at| e57::write(at, &world, cloud)),
+        "las" | "laz" => atomic::write(path, |out| las::write(out, &world, cloud, extension == "laz")),
+        "e57" => atomic::write_at(path, |at| e57::write(at, &world, cloud, units.metres())),
         _ => atomic::write(path, |out| table::write(out, &world, cloud)),
     }
 }

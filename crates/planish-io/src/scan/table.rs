@@ -7,13 +7,67 @@ use glam::DVec3;
 use planish::cloud::Cloud;
 use std::io::Write;
 
-/// Columns of one line, split at blanks, commas, semicolons and tabs.
-fn words(line: &[u8]) -> Vec<&[u8]> {
-    line.split(|b| b.is_ascii_whitespace() || *b == b',' || *b == b';').filter(|w| !w.is_empty()).collect()
+/// The columns of one line, and whether a comma in them is a decimal point.
+struct Row<'a> {
+    words: Vec<&'a [u8]>,
+    decimal_comma: bool,
 }
 
-fn number(word: &[u8]) -> Option<f64> {
-    std::str::from_utf8(word).ok()?.parse().ok()
+/// Splits a line: at semicolons if it has any, else at blanks where each word is a number with a decimal comma (as `1,5 2,5
+/// 3,5` is), else at blanks and commas. Between two separators that are no blanks stands a column, be it an empty one. What is
+/// quoted is one column.
+fn split(line: &[u8]) -> Row<'_> {
+    let bare = |w: &[u8]| -> bool { !w.is_empty() };
+    let is_blank = |b: &u8| b.is_ascii_whitespace();
+    if line.contains(&b';') {
+        return Row { words: columns_at(line, b';'), decimal_comma: true };
+    }
+    let apart: Vec<&[u8]> = line.split(is_blank).filter(|w| bare(w)).collect();
+    let commas = |w: &[u8]| w.iter().filter(|&&b| b == b',').count();
+    let is_inner = |w: &[u8]| w.first() != Some(&b',') && w.last() != Some(&b',');
+    let decimal = apart.len() >= 3
+        && line.contains(&b',')
+        && !line.contains(&b'.')
+        && apart.iter().all(|w| commas(w) <= 1 && is_inner(w) && real(w, true).is_some());
+    if decimal || !line.contains(&b',') {
+        return Row { words: apart.into_iter().map(unquoted).collect(), decimal_comma: decimal };
+    }
+    let decimal_comma = line.contains(&b'"');
+    let words = columns_at(line, b',').into_iter();
+    // Blanks part columns as well, but for a header of names with blanks in quotes.
+    let words = words.flat_map(|w| {
+        if w.is_empty() || decimal_comma { vec![w] } else { w.split(is_blank).filter(|w| bare(w)).collect() }
+    });
+    Row { words: words.collect(), decimal_comma }
+}
+
+/// The columns between separators outside quotes, without the quotes; an empty last one is none.
+fn columns_at(line: &[u8], separator: u8) -> Vec<&[u8]> {
+    let mut inside = false;
+    let mut words: Vec<&[u8]> = line
+        .split(|&b| {
+            inside ^= b == b'"';
+            b == separator && !inside
+        })
+        .map(unquoted)
+        .collect();
+    if words.last().is_some_and(|w| w.is_empty()) {
+        words.pop();
+    }
+    words
+}
+
+fn unquoted(word: &[u8]) -> &[u8] {
+    let word = word.trim_ascii();
+    word.strip_prefix(b"\"").and_then(|w| w.strip_suffix(b"\"")).unwrap_or(word).trim_ascii()
+}
+
+fn real(word: &[u8], decimal_comma: bool) -> Option<f64> {
+    let text = std::str::from_utf8(word).ok()?;
+    match text.split_once(',') {
+        Some((whole, rest)) if decimal_comma && !text.contains('.') => format!("{whole}.{rest}").parse().ok(),
+        _ => text.parse().ok(),
+    }
 }
 
 /// Reads points. `columns` names them; without it a header line does, else their number and range.
@@ -23,26 +77,27 @@ pub(super) fn read(bytes: &[u8], extension: &str, columns: Option<&str>) -> Resu
     let mut rows: Vec<f64> = Vec::new();
     let mut width = 0;
     let mut count = 0;
-    let mut header_seen = false;
+    let mut header: Option<(Vec<String>, usize)> = None;
     while let Some(line) = lines.next_line() {
         let mut line = line.trim_ascii();
         let comment = line.starts_with(b"#") || line.starts_with(b"//");
         if comment {
             line = line.trim_ascii_start().strip_prefix(b"//").unwrap_or(&line[1..]).trim_ascii();
         }
-        let found = words(line);
+        let Row { words: found, decimal_comma } = split(line);
         if found.is_empty() {
             continue;
         }
-        let numbers: Vec<Option<f64>> = found.iter().map(|w| number(w)).collect();
+        let numbers: Vec<Option<f64>> = found.iter().map(|w| real(w, decimal_comma)).collect();
         if comment || numbers.iter().all(Option::is_none) {
             // A line of words before the data names the columns.
-            if count == 0 && numbers.iter().all(Option::is_none) && found.len() >= 3 && !header_seen {
-                let header: Vec<String> =
-                    found.iter().map(|w| String::from_utf8_lossy(w).trim_matches('"').to_ascii_lowercase()).collect();
-                if names.is_none() && header.iter().any(|n| canonical(n) == "x") {
-                    names = Some(header);
-                    header_seen = true;
+            if count == 0 && numbers.iter().all(Option::is_none) && found.len() >= 3 {
+                let words: Vec<String> =
+                    found.iter().map(|w| String::from_utf8_lossy(w).to_ascii_lowercase()).collect();
+                // A line of words that names no x may be a remark, unless it has as many words as there are columns.
+                let names_x = words.iter().any(|n| canonical(n) == "x");
+                if names_x || !comment && header.is_none() {
+                    header = Some((words, lines.number()));
                 }
                 continue;
             }
@@ -56,6 +111,9 @@ pub(super) fn read(bytes: &[u8], extension: &str, columns: Option<&str>) -> Resu
         }
         if width == 0 {
             width = found.len();
+            if let (None, Some((words, line))) = (&names, &header) {
+                names = named(words, width, *line)?;
+            }
             if width < 3 {
                 let what = format!("a line has {width} numbers, a point needs 3");
                 return Err(ReadError::Syntax { what, place: Place::Line(lines.number()) });
@@ -81,6 +139,36 @@ pub(super) fn read(bytes: &[u8], extension: &str, columns: Option<&str>) -> Resu
     assemble(&rows, width, count, &names)
 }
 
+/// The names of a header line over rows of `width` numbers; `None` if it is a remark.
+/// # Errors
+/// With the names, if x, y and z are not among those of a header.
+fn named(words: &[String], width: usize, line: usize) -> Result<Option<Vec<String>>, ReadError> {
+    let has = |axis: &str| words.iter().any(|w| canonical(w) == axis);
+    if ["x", "y", "z"].into_iter().all(has) {
+        return Ok(Some(words.to_vec()));
+    }
+    if words.len() != width {
+        return Ok(None);
+    }
+    let list: Vec<String> = words.iter().take(MOST_NAMES).map(|w| shown(w.as_bytes())).collect();
+    let more = if words.len() > MOST_NAMES { " ..." } else { "" };
+    Err(ReadError::Header {
+        what: format!("of the columns {}{more} nobody knows which are x, y and z", list.join(", ")),
+        place: Place::Line(line),
+        hint: "name them in their order with --columns, for example _,x,y,z",
+    })
+}
+
+/// Columns that a message lists at most.
+const MOST_NAMES: usize = 12;
+
+/// Checks the names in `--columns` before any file is read.
+/// # Errors
+/// If x, y and z are not among them.
+pub fn check_columns(text: &str) -> Result<(), ReadError> {
+    parse_columns(text).map(drop)
+}
+
 /// The names in `--columns`: letters of their own (`xyzirgb`, `nnn` for a normal) or words parted by commas.
 fn parse_columns(text: &str) -> Result<Vec<String>, ReadError> {
     let words: Vec<String> = if text.contains(',') {
@@ -98,7 +186,7 @@ fn parse_columns(text: &str) -> Result<Vec<String>, ReadError> {
         return Ok(words);
     }
     Err(ReadError::Header {
-        what: format!("the columns \"{text}\" name no x, y and z"),
+        what: format!("the columns \"{}\" name no x, y and z", shown(text.as_bytes())),
         place: Place::Line(1),
         hint: "name them, for example xyzirgb or x,y,z,intensity",
     })
@@ -106,9 +194,10 @@ fn parse_columns(text: &str) -> Result<Vec<String>, ReadError> {
 
 /// Short and long names of one thing.
 fn canonical(name: &str) -> &str {
-    match name {
-        "x" | "easting" | "//x" => "x",
-        "y" | "northing" => "y",
+    // `x [m]`, `height (m)`: a unit belongs to no name.
+    match name.split(['[', '(']).next().unwrap_or(name).trim() {
+        "x" | "easting" | "east" | "//x" => "x",
+        "y" | "northing" | "north" => "y",
         "z" | "height" | "elevation" => "z",
         "r" | "red" => "red",
         "g" | "green" => "green",

@@ -112,7 +112,7 @@ fn content(view: &View, folder: &Path) -> Result<Vec<u8>, ReadError> {
     }
     let plain = folder.join(name);
     let packed = PathBuf::from(format!("{}.gz", plain.display()));
-    let bytes = if plain.exists() || !packed.exists() { std::fs::read(&plain) } else { std::fs::read(&packed) };
+    let bytes = crate::mesh_file::bytes_of(if plain.exists() || !packed.exists() { &plain } else { &packed });
     let bytes = bytes.map_err(|e| companion(view, e))?;
     if !bytes.starts_with(&[0x1f, 0x8b]) {
         return Ok(bytes);

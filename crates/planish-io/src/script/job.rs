@@ -106,7 +106,8 @@ fn from_gcode(
 ) -> Result<(), ScriptError> {
     let name = file.text()?;
     let fault = |fault: String| ScriptError::Companion { name: name.to_owned(), fault, line: file.line() };
-    let bytes = std::fs::read(folder.join(name)).map_err(|e| fault(format!("it cannot be read ({e})")))?;
+    let whole = crate::mesh_file::content(&folder.join(name));
+    let bytes = whole.map_err(|e| fault(e.to_string().split(" - hint: ").next().unwrap_or_default().to_owned()))?;
     let scale = |inches: bool| match (units.unwrap_or_default(), inches) {
         (Units::Mm, false) | (Units::In, true) => 1.0,
         (Units::Mm, true) => 25.4,

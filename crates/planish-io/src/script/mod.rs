@@ -67,7 +67,7 @@ const LARGEST: u64 = 64 << 20;
 /// [`ScriptError`] with the line of the fault.
 pub fn read_script(path: impl AsRef<Path>) -> Result<ScriptFile, ScriptError> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(ReadError::Io)?;
+    let bytes = crate::mesh_file::content(path)?;
     if bytes.is_empty() {
         return Err(ReadError::Empty.into());
     }
@@ -151,5 +151,20 @@ difference = ["block", "bore"]
             };
             assert!(told.contains(what) && told.contains(line) && told.contains(" - hint: "), "{text}: {told}");
         }
+    }
+
+    #[test]
+    fn lines_that_use_the_one_before_twice_do_not_double_the_part() {
+        let start = "[solid.s0]\nsphere = { radius = 2 }\n";
+        let lines = |word: &str, count: usize| -> String {
+            (1..=count).map(|k| format!("[solid.s{k}]\n{word} = [\"s{0}\", \"s{0}\"]\n", k - 1)).collect()
+        };
+        for word in ["union", "intersection"] {
+            let part = part(&format!("{start}{}", lines(word, 150))).unwrap();
+            assert_eq!(part.value(DVec3::new(3.0, 0.0, 0.0)), 1.0, "{word}");
+        }
+        // What really are a million shapes is refused.
+        let told = part(&format!("{start}{}", lines("difference", 20))).err().unwrap();
+        assert!(told.contains("more than 20000 shapes") && told.contains(" - hint: "), "{told}");
     }
 }

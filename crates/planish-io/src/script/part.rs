@@ -5,6 +5,8 @@ use super::toml::{Table, Value};
 use planish::field::csg::Operation;
 use planish::field::{MeshBody, Part, Polygon, Solid};
 use planish::{DVec2, DVec3};
+use std::cell::Cell;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 const SHAPES: [&str; 13] = [
@@ -25,6 +27,8 @@ const SHAPES: [&str; 13] = [
 const CHANGES: [&str; 4] = ["offset", "scale", "rotate", "move"];
 /// Solids within solids at most.
 const DEEPEST: usize = 200;
+/// Shapes of a part at most: twenty lines that each use the one before twice have a million.
+const MOST_SHAPES: usize = 20_000;
 
 /// The solid named `result`, or the last one.
 pub fn read(root: &Table, folder: &Path) -> Result<(Part, usize), ScriptError> {
@@ -36,7 +40,7 @@ pub fn read(root: &Table, folder: &Path) -> Result<(Part, usize), ScriptError> {
     let Some(last) = solids.last() else {
         return Err(root.fault("the script is empty: it has no [solid.NAME]", "write [solid.part] and a shape"));
     };
-    let reader = Reader { solids: &solids, folder };
+    let reader = Reader { solids: &solids, folder, shapes: Cell::new(0) };
     // All of them are looked at, so that no fault hides in one that is not used.
     for solid in &solids {
         reader.check(solid)?;
@@ -51,6 +55,8 @@ pub fn read(root: &Table, folder: &Path) -> Result<(Part, usize), ScriptError> {
 struct Reader<'a> {
     solids: &'a [Value<'a>],
     folder: &'a Path,
+    /// Shapes that the part has so far: a solid counts as often as others use it.
+    shapes: Cell<usize>,
 }
 
 impl Reader<'_> {
@@ -108,9 +114,23 @@ impl Reader<'_> {
             _ => None,
         };
         if let Some(operation) = operation {
-            let parts: Result<Vec<Part>, _> =
-                shape.names()?.into_iter().map(|name| self.named(name, shape, above)).collect();
+            let mut names = shape.names()?;
+            if operation != Operation::Difference {
+                // A union or intersection with itself is what it is.
+                let mut seen = BTreeSet::new();
+                names.retain(|name| seen.insert(*name));
+            }
+            let parts: Result<Vec<Part>, _> = names.into_iter().map(|name| self.named(name, shape, above)).collect();
             return Ok(Part::combined(operation, parts?));
+        }
+        if shape.name() != "copy" {
+            self.shapes.set(self.shapes.get() + 1);
+            if self.shapes.get() > MOST_SHAPES {
+                let what = format!(
+                    "the part has more than {MOST_SHAPES} shapes, for solids count as often as others use them"
+                );
+                return Err(shape.fault(what, "use fewer copies of copies"));
+            }
         }
         match shape.name() {
             "copy" => self.named(shape.text()?, shape, above),

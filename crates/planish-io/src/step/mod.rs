@@ -9,8 +9,8 @@
 //! rows are equal has no gap at all, and no kernel has to sew or to loosen a tolerance.
 
 mod entities;
-mod topology;
 
+use crate::topology::{self, Component, Topology};
 use crate::{Place, WriteError, atomic};
 use entities::{Entities, list, real, text};
 use planish::Units;
@@ -20,7 +20,6 @@ use planish::surface::Surface;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use topology::{Component, Topology};
 
 /// Accuracy that the file claims at least, as a fraction of the diagonal: what CAD kernels work with.
 const ACCURACY: f64 = 1e-7;

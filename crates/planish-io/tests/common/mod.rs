@@ -54,6 +54,7 @@ pub fn data() -> Option<PathBuf> {
 
 use planish::mesh::FacePoint;
 use planish::network::{Corner, Curve, CurveKind, Network, Patch, Side};
+use planish::relief::Relief;
 use planish::surface::Surface;
 
 /// Clamped uniform cubic knots for `n` control points.
@@ -108,6 +109,19 @@ pub fn ball(n: usize, centre: DVec3) -> (Network, Vec<Surface>) {
         })
         .collect();
     (network(8, &rings), surfaces)
+}
+
+/// The cube of edge 2 around `centre`: 6 flat patches of `n x n` control points, the corners of [`ball`].
+pub fn flat_cube(n: usize, centre: DVec3) -> (Network, Vec<Surface>) {
+    let (network, mut surfaces) = ball(n, DVec3::ZERO);
+    // Blown up along rays: each point goes back to its face.
+    surfaces.iter_mut().flat_map(|s| &mut s.control).for_each(|p| *p = centre + *p / p.abs().max_element());
+    (network, surfaces)
+}
+
+/// Displacement maps for surfaces, with that many nodes along `v` and `u`, all of them zero.
+pub fn flat_maps(surfaces: &[Surface], rows: usize, cols: usize) -> Vec<Relief> {
+    surfaces.iter().map(|_| Relief { rows, cols, vectors: vec![DVec3::ZERO; rows * cols] }).collect()
 }
 
 /// A torus of 4 x 4 patches of `n x n` control points, radii 3 and 1.

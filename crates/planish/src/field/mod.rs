@@ -123,6 +123,11 @@ pub trait Field: Sync {
         }
     }
 
+    /// True if [`Field::values`] of many points cost far less than one by one: then hits on many edges are sought at once.
+    fn in_batches(&self) -> bool {
+        false
+    }
+
     /// May the surface cross this box, or may the box hold points of known and unknown side? `false` promises that
     /// all points of the box are on one side, that of its centre. The default says yes to everything, so that
     /// nothing is missed and nothing skipped.

@@ -25,6 +25,13 @@ pub fn sample(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> 
     let sides = sides(field, lattice, observer)?;
     observer.check()?;
     let none = || Hits { start: vec![0; lattice.rows() + 1], ..Hits::default() };
+    if field.in_batches() {
+        let open = |_: usize, _: [usize; 3]| Hit { t: 0.5, normal: DVec3::X };
+        let mut found = Directed::assemble(*lattice, sides, [none(), none(), none()], &open);
+        hits_in_batches(field, &mut found, observer)?;
+        (found.mended, found.noise_deg) = (0, field.noise_deg());
+        return Ok(found);
+    }
     let cancelled = std::sync::atomic::AtomicBool::new(false);
     let row = |j: usize, k: usize| -> directed::Missing {
         if observer.cancelled() {
@@ -227,13 +234,22 @@ pub fn hit_on_edge(field: &dyn Field, lattice: &Lattice, axis: usize, [i, j, k]:
     let (f0, f1) = (field.value(low), field.value(high));
     let t = root_within(field.precision(), |t| field.value(at(t)), f0, f1);
     let p = at(t);
-    let mut normal = field.gradient(p);
-    if normal == DVec3::ZERO || !normal.is_finite() {
-        // A flat spot: from inside to outside along the edge.
-        normal = DVec3::ZERO;
-        normal[axis] = if f0 < 0.0 { 1.0 } else { -1.0 };
+    Hit { t: directed::clear(t), normal: steady(field.gradient(p), axis, outward(f0)) }
+}
+
+/// The way out along an edge whose lower end has the value `f0`: 1 or -1.
+fn outward(f0: f64) -> f64 {
+    if f0 < 0.0 { 1.0 } else { -1.0 }
+}
+
+/// The normal of a hit; at a flat spot from inside to outside along its edge.
+fn steady(gradient: DVec3, axis: usize, outward: f64) -> DVec3 {
+    if gradient != DVec3::ZERO && gradient.is_finite() {
+        return gradient;
     }
-    Hit { t: directed::clear(t), normal }
+    let mut normal = DVec3::ZERO;
+    normal[axis] = outward;
+    normal
 }
 
 /// The place is known to this fraction of the edge.
@@ -248,41 +264,154 @@ pub fn root(f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
     root_within(ROOT, f, f0, f1)
 }
 
-/// Where `f` passes zero between 0 and 1, to `precision`, by interpolation kept within a shrinking bracket (Oliveira and Takahashi
-/// 2020, *An Enhancement of the Bisection Method Average Performance Preserving Minmax Optimality*): never more steps
-/// than bisection plus one.
+/// Where `f` passes zero between 0 and 1, to `precision`.
 fn root_within(precision: f64, f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
-    let sign = if f0 < f1 { 1.0 } else { -1.0 };
-    let (mut a, mut b, mut fa, mut fb) = (0.0, 1.0, sign * f0, sign * f1);
-    if fa.is_nan() || fb.is_nan() {
-        return 0.5;
+    let mut bracket = Bracket::new(precision, f0, f1);
+    while let Some(x) = bracket.ask() {
+        bracket.tell(x, f(x));
     }
-    let most = (0.5 / precision).log2().ceil() as i32 + 1;
-    for n in 0..=most {
-        if b - a <= 2.0 * precision {
-            break;
+    bracket.place()
+}
+
+/// The search for a root between 0 and 1 by interpolation kept within a shrinking bracket (Oliveira and Takahashi 2020, *An
+/// Enhancement of the Bisection Method Average Performance Preserving Minmax Optimality*): never more steps than bisection
+/// plus one. Values are asked for and told, so that many searches can go on at once.
+struct Bracket {
+    a: f64,
+    b: f64,
+    fa: f64,
+    fb: f64,
+    sign: f64,
+    precision: f64,
+    step: i32,
+    most: i32,
+}
+
+impl Bracket {
+    /// A search to `precision`, between values of different sides.
+    fn new(precision: f64, f0: f64, f1: f64) -> Bracket {
+        let sign = if f0 < f1 { 1.0 } else { -1.0 };
+        let most = (0.5 / precision).log2().ceil() as i32 + 1;
+        let mut bracket = Bracket { a: 0.0, b: 1.0, fa: sign * f0, fb: sign * f1, sign, precision, step: 0, most };
+        if bracket.fa.is_nan() || bracket.fb.is_nan() {
+            bracket.end(0.5);
+        }
+        bracket
+    }
+
+    /// Where the value is wanted next; nothing once the root is found.
+    fn ask(&self) -> Option<f64> {
+        let Bracket { a, b, fa, fb, precision, .. } = *self;
+        if self.step > self.most || b - a <= 2.0 * precision {
+            return None;
         }
         let middle = (a + b) / 2.0;
-        let room = (precision * 2f64.powi(most - n) - (b - a) / 2.0).max(0.0);
+        let room = (precision * 2f64.powi(self.most - self.step) - (b - a) / 2.0).max(0.0);
         let falsi = if fb > fa { (fb * a - fa * b) / (fb - fa) } else { middle };
         let direction = if middle >= falsi { 1.0 } else { -1.0 };
         let cut = CUT * (b - a) * (b - a);
         let truncated = if cut <= (middle - falsi).abs() { falsi + direction * cut } else { middle };
         let x = if (truncated - middle).abs() <= room { truncated } else { middle - direction * room };
-        let x = x.clamp(a, b);
-        let fx = sign * f(x);
-        if fx > 0.0 {
-            (b, fb) = (x, fx);
-        } else if fx < 0.0 {
-            (a, fa) = (x, fx);
-        } else if fx == 0.0 {
-            return x;
+        Some(x.clamp(a, b))
+    }
+
+    /// The value `f` at `x`, where it was asked for.
+    fn tell(&mut self, x: f64, f: f64) {
+        let f = self.sign * f;
+        self.step += 1;
+        if f > 0.0 {
+            (self.b, self.fb) = (x, f);
+        } else if f < 0.0 {
+            (self.a, self.fa) = (x, f);
+        } else if f == 0.0 {
+            self.end(x);
         } else {
             // Unknown in between: the middle is as good as any other place.
-            return middle;
+            self.end((self.a + self.b) / 2.0);
         }
     }
-    (a + b) / 2.0
+
+    fn end(&mut self, x: f64) {
+        (self.a, self.b) = (x, x);
+    }
+
+    /// The root.
+    fn place(&self) -> f64 {
+        (self.a + self.b) / 2.0
+    }
+}
+
+/// Edges whose hits are sought at once in a field that answers many points at a time.
+const BATCH: usize = 1 << 16;
+
+/// The hits on all edges at once, for a field that answers many points at a time.
+fn hits_in_batches(field: &dyn Field, found: &mut Directed, observer: &dyn Observer) -> Result<(), Cancelled> {
+    let lattice = found.lattice;
+    let count = found.hit_count().max(1);
+    let mut done = 0;
+    for axis in 0..3 {
+        let Hits { start, at, hits } = &mut found.axes[axis];
+        let rows = start.windows(2).enumerate();
+        let edges: Vec<[DVec3; 2]> = rows
+            .flat_map(|(row, ends)| {
+                let (j, k) = (row % lattice.nodes(1), row / lattice.nodes(1));
+                at[ends[0] as usize..ends[1] as usize].iter().map(move |&i| {
+                    let mut end = [i as usize, j, k];
+                    let low = lattice.node(end[0], j, k);
+                    end[axis] += 1;
+                    [low, lattice.node(end[0], end[1], end[2])]
+                })
+            })
+            .collect();
+        for (edges, hits) in edges.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+            seek(field, axis, lattice.step[axis], edges, hits, observer)?;
+            done += edges.len();
+            observer.progress(0.7 + 0.3 * done as f64 / count as f64);
+        }
+    }
+    Ok(())
+}
+
+/// The hits on edges along `axis`, each between two nodes.
+fn seek(
+    field: &dyn Field,
+    axis: usize,
+    step: f64,
+    edges: &[[DVec3; 2]],
+    hits: &mut [Hit],
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
+    let at = |low: DVec3, t: f64| {
+        let mut p = low;
+        p[axis] += t * step;
+        p
+    };
+    let values = |points: &[DVec3]| {
+        let mut values = vec![0.0; points.len()];
+        field.values(points, &mut values);
+        values
+    };
+    let [low, high] = [0, 1].map(|k| edges.iter().map(|e| e[k]).collect::<Vec<DVec3>>());
+    let ends = values(&low).into_iter().zip(values(&high));
+    let (ways, mut brackets): (Vec<f64>, Vec<Bracket>) =
+        ends.map(|(f0, f1)| (outward(f0), Bracket::new(field.precision(), f0, f1))).unzip();
+    loop {
+        observer.check()?;
+        let open: Vec<(usize, f64)> = brackets.iter().enumerate().filter_map(|(n, b)| Some((n, b.ask()?))).collect();
+        if open.is_empty() {
+            break;
+        }
+        let points: Vec<DVec3> = open.iter().map(|&(n, t)| at(low[n], t)).collect();
+        open.iter().zip(values(&points)).for_each(|(&(n, t), f)| brackets[n].tell(t, f));
+    }
+    let points: Vec<DVec3> = low.iter().zip(&brackets).map(|(&p, b)| at(p, b.place())).collect();
+    let mut normals = vec![DVec3::ZERO; points.len()];
+    field.gradients(&points, &mut normals);
+    for (n, hit) in hits.iter_mut().enumerate() {
+        let normal = steady(normals[n], axis, ways[n]);
+        *hit = Hit { t: directed::clear(brackets[n].place()), normal };
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -302,5 +431,40 @@ mod tests {
         let jump = |t: f64| if t < 0.123456789 { -0.4 } else { 0.6 };
         assert!((root(jump, jump(0.0), jump(1.0)) - 0.123456789).abs() < 1e-12);
         assert!((root(|t| 0.7 - t, 0.7, -0.3) - 0.7).abs() < 1e-12);
+    }
+
+    /// A ball of radius .7 that answers in batches, or point by point.
+    struct Ball(bool);
+
+    impl Field for Ball {
+        fn bounds(&self) -> Aabb {
+            Aabb { min: DVec3::splat(-0.7), max: DVec3::splat(0.7) }
+        }
+
+        fn value(&self, p: DVec3) -> f64 {
+            p.length() - 0.7
+        }
+
+        fn gradient(&self, p: DVec3) -> DVec3 {
+            p.normalize_or_zero()
+        }
+
+        fn in_batches(&self) -> bool {
+            self.0
+        }
+    }
+
+    #[test]
+    fn hits_sought_in_batches_are_those_sought_one_by_one_bit_for_bit() {
+        let lattice = Lattice::around(&Ball(false).bounds(), super::super::Spacing::Resolution(17)).unwrap();
+        let [one, many] = [false, true].map(|b| sample(&Ball(b), &lattice, &crate::observe::Silent).unwrap());
+        assert!(many.hit_count() > 1000);
+        for axis in 0..3 {
+            assert!(
+                one.axes[axis].at == many.axes[axis].at && one.axes[axis].hits == many.axes[axis].hits,
+                "axis {axis}"
+            );
+        }
+        assert_eq!((one.mended, one.thin.edges), (many.mended, many.thin.edges));
     }
 }

@@ -76,7 +76,7 @@ pub struct GridParams {
     #[schemars(range(min = 4, max = 8193))]
     pub max_side: usize,
     /// Greatest number of points of all grids together; the density gives way.
-    #[schemars(range(min = 1000))]
+    #[schemars(range(min = 1000, max = 4_000_000_000u64))]
     pub max_points: usize,
     /// Weight of square cells against even spacing along the iso-curves: at 45 degrees off square a cell counts as
     /// much as an edge whose length is off by the root of this. Higher values give squarer, less even grids.
@@ -102,6 +102,18 @@ impl Default for GridParams {
     }
 }
 
+impl GridParams {
+    /// Checks the values against each other.
+    /// # Errors
+    /// [`GridError::Sides`].
+    pub fn validate(&self) -> Result<(), GridError> {
+        if self.min_side > self.max_side {
+            return Err(GridError::Sides { least: self.min_side, most: self.max_side });
+        }
+        Ok(())
+    }
+}
+
 /// Why patches could not be resampled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GridError {
@@ -112,6 +124,14 @@ pub enum GridError {
         patches: usize,
         /// Sizes given.
         sizes: usize,
+    },
+    /// The least number of points along a side is above the greatest.
+    #[error("sides of at least {least} and at most {most} points are asked for; lower the first or raise the second")]
+    Sides {
+        /// The least number.
+        least: usize,
+        /// The greatest.
+        most: usize,
     },
     /// A grid needs two points in each direction.
     #[error("patch {patch} was asked for a grid of {cols} x {rows} points; give at least 2 x 2")]

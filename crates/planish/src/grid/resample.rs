@@ -84,6 +84,7 @@ fn refined(
     make: &Make,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, FeatureError> {
+    params.validate()?;
     let mut sizes = choose_sizes(network, patches, params);
     give(&mut sizes)?;
     let all: Vec<usize> = (0..patches.len()).collect();

@@ -27,11 +27,11 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case")]
 pub enum DecimateTarget {
     /// Keep this share of the triangles
-    Ratio(#[schemars(range(min = 0.0, max = 1.0), extend("unit" = "share"))] f64),
+    Ratio(#[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0, "unit" = "share"))] f64),
     /// Keep this many triangles
     Triangles(#[schemars(range(min = 4))] usize),
     /// Go as far as no place of the input is farther from the result than this
-    Tolerance(#[schemars(range(min = 0.0), extend("unit" = "input units"))] f64),
+    Tolerance(#[schemars(extend("exclusiveMinimum" = 0.0, "tolerance" = "length"))] f64),
 }
 
 /// How to decimate.

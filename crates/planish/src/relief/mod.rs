@@ -15,7 +15,9 @@ mod weld;
 pub use bake::{bake, bake_network, displace};
 pub use frame::{Frame, frame_at, frames};
 pub use scalar::{fold_over, length, normal_component};
-pub use weld::{displaced_mesh, patch_mesh, span_shapes, surface_mesh};
+pub use weld::{
+    PatchNodes, PatchedMesh, displaced_mesh, displaced_patches, patch_mesh, span_shapes, surface_mesh, surface_patches,
+};
 
 use crate::observe::Cancelled;
 use crate::surface::FitError;

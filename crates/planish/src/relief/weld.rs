@@ -18,6 +18,28 @@ use rayon::prelude::*;
 
 const NONE: u32 = u32::MAX;
 
+/// One mesh of all patches that still tells which node of which patch each corner of a triangle is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PatchedMesh {
+    /// The mesh. Its triangles are those of the patches, in their order.
+    pub mesh: TriMesh,
+    /// One entry per patch of the network.
+    pub patches: Vec<PatchNodes>,
+}
+
+/// The nodes of one patch of a [`PatchedMesh`], row-major as [`Grid`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PatchNodes {
+    /// Nodes along `v`.
+    pub rows: usize,
+    /// Nodes along `u`.
+    pub cols: usize,
+    /// For each node its vertex of the mesh; nodes on a curve share theirs with the patch beside.
+    pub vertices: Vec<u32>,
+    /// Triangles of nodes of this patch.
+    pub triangles: Vec<[u32; 3]>,
+}
+
 /// The displaced grids of all patches as one mesh: for a closed network a closed manifold one.
 ///
 /// # Errors
@@ -28,6 +50,19 @@ pub fn displaced_mesh(
     reliefs: &[Relief],
     observer: &dyn Observer,
 ) -> Result<TriMesh, ReliefError> {
+    displaced_patches(network, surfaces, reliefs, observer).map(|patched| patched.mesh)
+}
+
+/// As [`displaced_mesh`], with the patches.
+///
+/// # Errors
+/// As [`displaced_mesh`].
+pub fn displaced_patches(
+    network: &Network,
+    surfaces: &[Surface],
+    reliefs: &[Relief],
+    observer: &dyn Observer,
+) -> Result<PatchedMesh, ReliefError> {
     let patches = network.patches.len();
     for (what, found) in [("surfaces", surfaces.len()), ("reliefs", reliefs.len())] {
         if found != patches {
@@ -62,6 +97,19 @@ pub fn surface_mesh(
     shapes: &[[usize; 2]],
     observer: &dyn Observer,
 ) -> Result<TriMesh, ReliefError> {
+    surface_patches(network, surfaces, shapes, observer).map(|patched| patched.mesh)
+}
+
+/// As [`surface_mesh`], with the patches.
+///
+/// # Errors
+/// As [`surface_mesh`].
+pub fn surface_patches(
+    network: &Network,
+    surfaces: &[Surface],
+    shapes: &[[usize; 2]],
+    observer: &dyn Observer,
+) -> Result<PatchedMesh, ReliefError> {
     let patches = network.patches.len();
     for (what, found) in [("surfaces", surfaces.len()), ("shapes", shapes.len())] {
         if found != patches {
@@ -91,8 +139,7 @@ pub fn span_shapes(surfaces: &[Surface], per_span: usize) -> Vec<[usize; 2]> {
 pub fn patch_mesh(points: Vec<DVec3>, rows: usize, cols: usize) -> Result<TriMesh, ReliefError> {
     super::bake::check(rows, cols, points.len())?;
     let ids: Vec<u32> = (0..points.len() as u32).collect();
-    let mut triangles = Vec::new();
-    split_quads(&points, &ids, rows, cols, [4; 4], &mut triangles);
+    let triangles = split_quads(&points, &ids, rows, cols, [4; 4]);
     let values = (0..rows * cols)
         .flat_map(|n| [(n % cols) as f32 + 0.5, (n / cols) as f32 + 0.5].into_iter().zip([cols, rows]))
         .map(|(texel, size)| texel / size as f32)
@@ -101,7 +148,7 @@ pub fn patch_mesh(points: Vec<DVec3>, rows: usize, cols: usize) -> Result<TriMes
 }
 
 /// Joins arrays of nodes along the curves and corners of the network.
-fn weld(network: &Network, nodes: &[Grid]) -> Result<TriMesh, ReliefError> {
+fn weld(network: &Network, nodes: &[Grid]) -> Result<PatchedMesh, ReliefError> {
     let shapes: Vec<_> = nodes.iter().map(|g| (g.rows, g.cols, g.points.len())).collect();
     let counts = check(network, "grids", &shapes).map_err(|e| match e {
         FitError::Count { what, found, wanted } => ReliefError::Count { what, found, wanted },
@@ -118,7 +165,7 @@ fn weld(network: &Network, nodes: &[Grid]) -> Result<TriMesh, ReliefError> {
     }
     let mut corner_ids = vec![NONE; network.corners.len()];
     let mut curve_ids: Vec<Vec<u32>> = counts.iter().map(|&n| vec![NONE; n]).collect();
-    let mut mesh = TriMesh::default();
+    let PatchedMesh { mut mesh, mut patches } = PatchedMesh::default();
     for (p, (patch, grid)) in network.patches.iter().zip(nodes).enumerate() {
         let mut ids = vec![NONE; grid.points.len()];
         for (k, side) in patch.sides.iter().enumerate() {
@@ -147,31 +194,29 @@ fn weld(network: &Network, nodes: &[Grid]) -> Result<TriMesh, ReliefError> {
             }
         }
         let valences = std::array::from_fn(|k| valence[network.corner(p, k) as usize]);
-        split_quads(&mesh.points, &ids, grid.rows, grid.cols, valences, &mut mesh.triangles);
+        let triangles = split_quads(&mesh.points, &ids, grid.rows, grid.cols, valences);
+        mesh.triangles.extend(triangles.iter().map(|t| t.map(|n| ids[n as usize])));
+        patches.push(PatchNodes { rows: grid.rows, cols: grid.cols, vertices: ids, triangles });
     }
-    Ok(mesh)
+    Ok(PatchedMesh { mesh, patches })
 }
 
 /// Splits each quad along its shorter diagonal (on a tie the one from the lower left) and leaves out triangles
-/// that have lost a corner to welding.
+/// that have lost a corner to welding; the triangles are of nodes.
 ///
+/// `ids` are the vertices of the nodes.
 /// `valences` are the numbers of patch corners around the four corners. Around one of valence 2 both quads have
 /// the same other diagonal, which must not become an edge of four triangles: they are split through the corner.
 /// At one of valence 1 the corner's own quad is folded shut and its two neighbours are in that position.
-fn split_quads(
-    points: &[DVec3],
-    ids: &[u32],
-    rows: usize,
-    cols: usize,
-    valences: [u32; 4],
-    triangles: &mut Vec<[u32; 3]>,
-) {
+fn split_quads(points: &[DVec3], ids: &[u32], rows: usize, cols: usize, valences: [u32; 4]) -> Vec<[u32; 3]> {
+    let mut triangles = Vec::new();
+    let id = |n: u32| ids[n as usize];
     let corners = [(0, 0), (cols - 2, 0), (cols - 2, rows - 2), (0, rows - 2)];
     for j in 0..rows - 1 {
         for i in 0..cols - 1 {
-            let at = |di: usize, dj: usize| ids[(j + dj) * cols + i + di];
+            let at = |di: usize, dj: usize| ((j + dj) * cols + i + di) as u32;
             let (a, b, c, d) = (at(0, 0), at(1, 0), at(1, 1), at(0, 1));
-            let length = |p: u32, q: u32| points[p as usize].distance_squared(points[q as usize]);
+            let length = |p: u32, q: u32| points[id(p) as usize].distance_squared(points[id(q) as usize]);
             let forced = (0..4).find(|&k| {
                 let away = corners[k].0.abs_diff(i) + corners[k].1.abs_diff(j);
                 valences[k] < 3 && away == 2 - valences[k] as usize
@@ -179,7 +224,9 @@ fn split_quads(
             let forced = forced.map(|k| k % 2 == 0);
             let rising = forced.unwrap_or_else(|| length(a, c) <= length(b, d));
             let halves = if rising { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
-            triangles.extend(halves.into_iter().filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]));
+            let is_whole = |t: &[u32; 3]| id(t[0]) != id(t[1]) && id(t[1]) != id(t[2]) && id(t[2]) != id(t[0]);
+            triangles.extend(halves.into_iter().filter(is_whole));
         }
     }
+    triangles
 }

@@ -24,12 +24,13 @@ const LADDER: [usize; 19] = [5, 6, 7, 8, 10, 12, 15, 19, 24, 30, 38, 48, 60, 75,
 pub enum Resolution {
     /// Control points along `u` and along `v` of every patch, each at least 4. A chord that runs along `u` in
     /// one patch and along `v` in another gets the larger number.
-    Control([usize; 2]),
+    Control(#[schemars(inner(range(min = 4, max = 8193)))] [usize; 2]),
     /// Control points along every curve of the network, each at least 4. A chord gets the largest number
     /// among its curves.
-    PerCurve(Vec<usize>),
+    PerCurve(#[schemars(inner(range(min = 4, max = 8193)))] Vec<usize>),
     /// Largest RMS of the parametric distance over a patch, as a fraction of the bounding-box diagonal.
-    Tolerance(f64),
+    #[schemars(description = "Largest RMS distance over a patch")]
+    Tolerance(#[schemars(extend("exclusiveMinimum" = 0.0, "tolerance" = "share"))] f64),
 }
 
 /// Control points along each curve for `resolution`; a tolerance gets at most `most`.

@@ -7,7 +7,7 @@ use planish::network::Network;
 use planish::surface::Surface;
 
 /// What the edges of the file are made of.
-pub(super) struct Topology {
+pub(crate) struct Topology {
     /// For each curve its spline, in the curve's own direction; none if no patch uses it.
     pub curves: Vec<Option<Row>>,
     /// For each corner its place; none if no patch uses it.
@@ -19,7 +19,8 @@ pub(super) struct Topology {
 }
 
 /// Patches joined by curves.
-pub(super) struct Component {
+pub(crate) struct Component {
+    /// Their numbers, rising.
     pub patches: Vec<usize>,
     /// True if every curve has two sides or is a point.
     pub closed: bool,
@@ -27,8 +28,10 @@ pub(super) struct Component {
 
 /// A boundary row of a surface: a clamped cubic spline.
 #[derive(Clone)]
-pub(super) struct Row {
+pub(crate) struct Row {
+    /// Control points, in its direction.
     pub control: Vec<DVec3>,
+    /// Knots, four more.
     pub knots: Vec<f64>,
     /// True if all of it is one point.
     pub collapsed: bool,
@@ -65,7 +68,7 @@ impl Row {
 }
 
 /// Whether opposite sides of a surface coincide, along `u` and along `v`.
-pub(super) fn closed(surface: &Surface) -> (bool, bool) {
+pub(crate) fn closed(surface: &Surface) -> (bool, bool) {
     let same = |a: usize, b: usize| Row::of(surface, a).control == Row::of(surface, b).reversed().control;
     (same(1, 3), same(0, 2))
 }
