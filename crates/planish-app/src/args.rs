@@ -1,20 +1,21 @@
 //! What the user can say: commands in the order of the pipeline, and their options.
 
 pub mod groups;
+pub mod stages;
 
 pub use groups::{Common, HoleArgs, Policy, ScanArgs};
+pub use stages::AllStages;
 
 use crate::failure::Failure;
-use crate::options::{StageOptions, StageParams};
+use crate::options::StageOptions;
+use crate::tolerance::Tolerance;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use planish::cloud::{CleanParams, ProjectParams};
 use planish::contour::ContourParams;
 use planish::field;
-use planish::grid::GridParams;
 use planish::layout::LayoutParams;
 use planish::mesh::{DecimateParams, SmoothParams};
-use planish::pipeline::{PipelineParams, RunParams, ScanParams};
-use planish::surface::{FitParams, StitchParams};
+use planish::pipeline::ScanParams;
 use planish::synthetic::ScannerParams;
 use planish_io::Up;
 use std::path::PathBuf;
@@ -59,7 +60,7 @@ pub enum Command {
     Fit(Fit),
     /// Model and script -> the model with curves, corners and feature curves edited
     Edit(Edit),
-    /// Model -> STEP, mesh, network or displacement maps; the format comes from the extension
+    /// Model -> STEP, IGES, USD, mesh, network or displacement maps; the format comes from the extension
     Export(Export),
     /// Distances and normal errors between any two meshes or models
     Compare(Compare),
@@ -325,14 +326,14 @@ pub struct Export {
     /// The model
     #[arg(value_name = "MODEL.planish")]
     pub model: PathBuf,
-    /// Where to: .step or .stp (surfaces), .ply, .obj, .stl or .glb (a mesh), .json (the network), or a folder
-    /// (displacement maps)
+    /// Where to: .step, .stp, .igs or .iges (surfaces), .usda (surfaces and a mesh), .ply, .obj, .stl or .glb (a mesh),
+    /// .json (the network), or a folder (displacement maps)
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// Which surface a mesh format gets
+    /// Which surface a mesh format gets, and the mesh of USD
     #[arg(long, value_name = "WORD", default_value = "displaced")]
-    pub surface: SurfaceWord,
-    /// Axis of the model that points up; GLB is turned accordingly
+    pub surface: ExportWord,
+    /// Axis of the model that points up; GLB is turned accordingly, USD told
     #[arg(long, value_name = "AXIS", default_value = "y")]
     pub up: UpWord,
     #[command(flatten)]
@@ -350,6 +351,19 @@ pub enum SurfaceWord {
     Mesh,
 }
 
+/// Which surface of a model is exported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ExportWord {
+    /// The smooth surfaces with their displacement: all detail
+    Displaced,
+    /// The smooth surfaces alone
+    Base,
+    /// The mesh that the model was fitted to
+    Mesh,
+    /// The smooth surfaces as B-splines, without triangles: in OBJ
+    Spline,
+}
+
 /// `planish compare`
 #[derive(Args, Debug)]
 pub struct Compare {
@@ -357,9 +371,10 @@ pub struct Compare {
     pub a: PathBuf,
     /// A mesh or a model
     pub b: PathBuf,
-    /// Largest distance that is accepted, in units of A; beyond it the exit status is 1
-    #[arg(long, value_name = "LENGTH", value_parser = positive)]
-    pub tolerance: Option<f64>,
+    /// Largest distance that is accepted: a length (0.05 in units of A, 0.05mm) or a share of A's diagonal (0.02%);
+    /// beyond it the exit status is 1
+    #[arg(long, value_name = "LENGTH|%", allow_negative_numbers = true)]
+    pub tolerance: Option<Tolerance>,
     /// Which surface of a model is compared
     #[arg(long, value_name = "WORD", default_value = "base")]
     pub surface: SurfaceWord,
@@ -370,139 +385,10 @@ pub struct Compare {
 /// `planish info`
 #[derive(Args, Debug)]
 pub struct Info {
-    /// A scan, a mesh or a model
+    /// Any file that planish reads or writes: scan, mesh, model, volume, script, network, report, STEP, EXR, folder of maps
     pub file: PathBuf,
     #[command(flatten)]
     pub common: Common,
-}
-
-/// Options of all stages.
-#[derive(Args, Clone, Debug)]
-pub struct AllStages {
-    #[command(flatten)]
-    layout: StageOptions<LayoutParams>,
-    #[command(flatten)]
-    grid: StageOptions<GridParams>,
-    #[command(flatten)]
-    fit: StageOptions<FitParams>,
-    #[command(flatten)]
-    stitch: StageOptions<StitchParams>,
-}
-
-impl AllStages {
-    /// The parameters of all stages: defaults with the given options in place.
-    pub fn params(&self, seed: Option<u64>) -> Result<PipelineParams, Failure> {
-        self.params_suiting(PipelineParams::default(), seed)
-    }
-
-    /// The parameters for a model that is there already: `stored` with the given options in place.
-    /// * `gridded` - it has grids, which are kept
-    /// # Errors
-    /// If an option is given for a stage that does not run again.
-    pub fn params_over(
-        &self,
-        stored: PipelineParams,
-        gridded: bool,
-        seed: Option<u64>,
-    ) -> Result<PipelineParams, Failure> {
-        let idle = self.layout.first_given().or_else(|| self.grid.first_given().filter(|_| gridded));
-        if let Some(flag) = idle {
-            let kept = if gridded { "network and grids are" } else { "network is" };
-            return Err(Failure::usage(flag, format!("does not go with this model, whose {kept} kept"))
-                .hint("fit its mesh: `planish export MODEL.planish --surface mesh -o MESH.ply`"));
-        }
-        Ok(PipelineParams { layout: stored.layout.clone(), ..self.params_suiting(stored, seed)? })
-    }
-
-    /// The parameters of all stages: `suited` with the given options in place.
-    pub fn params_suiting(&self, suited: PipelineParams, seed: Option<u64>) -> Result<PipelineParams, Failure> {
-        Ok(PipelineParams {
-            layout: self.layout.params_over(suited.layout, seed)?,
-            grid: self.grid.params_over(suited.grid, seed)?,
-            fit: self.fit.params_over(suited.fit, seed)?,
-            stitch: self.stitch.params_over(suited.stitch, seed)?,
-        })
-    }
-
-    /// The parameters of a run: those that suit the input, with the given options in place. That the stages accept these is
-    /// known from [`AllStages::params`]: no stage refuses a value for what stands beside it.
-    pub fn run_params(&self, scan: ScanParams, seed: Option<u64>) -> RunParams<'_> {
-        let stages = move |suited: PipelineParams| self.params_suiting(suited.clone(), seed).unwrap_or(suited);
-        RunParams { scan, stages: Box::new(stages) }
-    }
-
-    /// True if no option of any stage is given.
-    pub fn none_given(&self) -> bool {
-        self.layout.first_given().is_none()
-            && self.grid.first_given().is_none()
-            && self.fit.first_given().is_none()
-            && self.stitch.first_given().is_none()
-    }
-
-    /// The fit tolerance if the user demanded one, as a fraction of the diagonal.
-    pub fn demanded_tolerance(&self) -> Option<f64> {
-        self.fit.given("resolution", "tolerance")
-    }
-}
-
-impl StageParams for ContourParams {
-    const STAGE: &'static str = "contour";
-    const HEADING: &'static str = "Extraction";
-}
-
-impl StageParams for field::GridParams {
-    const STAGE: &'static str = "volume";
-    const HEADING: &'static str = "Volumes: how their numbers are read";
-}
-
-impl StageParams for SmoothParams {
-    const STAGE: &'static str = "smooth";
-    const HEADING: &'static str = "Smoothing";
-}
-
-impl StageParams for DecimateParams {
-    const STAGE: &'static str = "decimate";
-    const HEADING: &'static str = "Decimation: one target";
-}
-
-impl StageParams for CleanParams {
-    const STAGE: &'static str = "clean";
-    const HEADING: &'static str = "Samples of a scan";
-}
-
-impl StageParams for ScanParams {
-    const STAGE: &'static str = "scan";
-    const HEADING: &'static str = "Cells";
-}
-
-impl StageParams for ScannerParams {
-    const STAGE: &'static str = "scanner";
-    const HEADING: &'static str = "The synthetic scan; lengths as shares of the diagonal of the part";
-}
-
-impl StageParams for ProjectParams {
-    const STAGE: &'static str = "points";
-    const HEADING: &'static str = "Points that are written";
-}
-
-impl StageParams for LayoutParams {
-    const STAGE: &'static str = "layout";
-    const HEADING: &'static str = "Layout: the automatic network";
-}
-
-impl StageParams for GridParams {
-    const STAGE: &'static str = "grid";
-    const HEADING: &'static str = "Grids: patches resampled";
-}
-
-impl StageParams for FitParams {
-    const STAGE: &'static str = "fit";
-    const HEADING: &'static str = "Surfaces: give one of these";
-}
-
-impl StageParams for StitchParams {
-    const STAGE: &'static str = "stitch";
-    const HEADING: &'static str = "Seams between the surfaces";
 }
 
 fn positive(text: &str) -> Result<f64, String> {

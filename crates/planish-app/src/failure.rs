@@ -1,10 +1,10 @@
 //! Exit statuses and the one line that a user reads when something is wrong:
 //! `error: FILE: what is wrong (where) - hint: what to do`.
 
+use crate::words;
 use std::fmt;
 use std::io::Write;
 use std::path::Path;
-use std::process::ExitCode;
 
 /// How the program ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,12 +23,6 @@ pub enum Status {
     Interrupted = 130,
 }
 
-impl From<Status> for ExitCode {
-    fn from(status: Status) -> ExitCode {
-        ExitCode::from(status as u8)
-    }
-}
-
 /// A failure that ends the program.
 #[derive(Debug)]
 pub struct Failure {
@@ -41,9 +35,7 @@ pub struct Failure {
 
 impl Failure {
     fn new(status: Status, subject: impl fmt::Display, what: impl fmt::Display) -> Failure {
-        // One line: whatever a library put on several is joined.
-        let what = what.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-        Failure { status, subject: subject.to_string(), what, hint: None }
+        Failure { status, subject: subject.to_string(), what: what.to_string(), hint: None }
     }
 
     /// An input that cannot be used.
@@ -81,10 +73,10 @@ impl Failure {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "error: {}: {}", self.subject, self.what)?;
+        write!(f, "error: {}: {}", words::plain(&self.subject), words::message(&self.what))?;
         // Library errors may already end in their own way out.
         match &self.hint {
-            Some(hint) if !self.what.contains(" - hint: ") => write!(f, " - hint: {hint}"),
+            Some(hint) if !self.what.contains(" - hint: ") => write!(f, " - hint: {}", words::plain(hint)),
             _ => Ok(()),
         }
     }

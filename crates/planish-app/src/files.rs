@@ -15,10 +15,20 @@ pub enum Content {
     Model(Box<Model>),
 }
 
+/// Refuses what is a scan by its name.
+fn no_scan(path: &Path) -> Result<(), Failure> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    if planish_io::SCAN_EXTENSIONS.contains(&extension.as_str()) {
+        return Err(Failure::input(path, "is a scan, not a mesh").hint("make a mesh of it with `planish mesh` first"));
+    }
+    Ok(())
+}
+
 /// Reads a mesh.
 /// # Errors
 /// If the file is no usable mesh.
 pub fn mesh(path: &Path) -> Result<TriMesh, Failure> {
+    no_scan(path)?;
     if is_model(path) {
         return Err(
             Failure::input(path, "is a model, not a mesh").hint("export its mesh with `planish export --surface mesh`")
@@ -34,6 +44,7 @@ pub fn tagged_mesh(path: &Path) -> Result<(TriMesh, Option<FeatureTags>), Failur
     if is_model(path) {
         return mesh(path).map(|m| (m, None));
     }
+    no_scan(path)?;
     planish_io::read_tagged_mesh(path).map_err(|e| Failure::input(path, e))
 }
 

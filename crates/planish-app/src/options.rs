@@ -8,6 +8,8 @@
 
 use crate::args::groups::{Common, HoleArgs, ScanArgs};
 use crate::failure::Failure;
+use crate::tolerance::{self, Scale, Tolerance};
+use crate::words::{self, with_hint};
 use clap::builder::{PossibleValuesParser, ValueParser};
 use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
@@ -28,6 +30,13 @@ pub trait StageParams: Default + Serialize + DeserializeOwned + JsonSchema {
     const STAGE: &'static str;
     /// Heading of its options in the help.
     const HEADING: &'static str;
+
+    /// Checks what a range of one value alone cannot: values against each other.
+    /// # Errors
+    /// What does not go together.
+    fn validate(&self) -> Result<(), String> {
+        Ok(())
+    }
 }
 
 /// The options of one stage as the user gave them.
@@ -49,12 +58,32 @@ impl<P: StageParams> StageOptions<P> {
     /// # Errors
     /// If the stage refuses a value.
     pub fn params_over(&self, base: P, seed: Option<u64>) -> Result<P, Failure> {
-        self.merge(base, seed).map_err(|e| Failure::usage(format!("options of the {} stage", P::STAGE), e))
+        self.params_at(base, seed, Scale::UNKNOWN)
     }
 
-    /// The number given for `variant` of the field `name`, if the user gave one.
-    pub fn given(&self, name: &str, variant: &str) -> Option<f64> {
-        self.given.get(name)?.get(variant)?.as_f64()
+    /// As [`StageOptions::params_over`], with tolerances meant for an input of a known size.
+    /// # Errors
+    /// If the stage refuses a value.
+    pub fn params_at(&self, base: P, seed: Option<u64>, scale: Scale) -> Result<P, Failure> {
+        let wrong = |e: &dyn std::fmt::Display| Failure::usage(format!("options of the {} stage", P::STAGE), e);
+        let params = self.merge(base, seed, scale).map_err(|e| wrong(&e))?;
+        params.validate().map_err(|e| wrong(&with_hint(&e)))?;
+        Ok(params)
+    }
+
+    /// What the user gave for `variant` of the field `name`, if anything.
+    pub fn given(&self, name: &str, variant: &str) -> Option<&Value> {
+        self.given.get(name)?.get(variant)
+    }
+
+    /// The whole number given for the field `name`, if the user gave one.
+    pub fn asked(&self, name: &str) -> Option<u64> {
+        self.given.get(name)?.as_u64()
+    }
+
+    /// The tolerance that the user gave, if it is the field `name` that takes one.
+    pub fn given_tolerance(&self, name: &str) -> Option<Tolerance> {
+        self.given(name, "tolerance")?.as_str()?.parse().ok()
     }
 
     /// The first option that the user gave, as it is written on the command line.
@@ -63,10 +92,21 @@ impl<P: StageParams> StageOptions<P> {
         Some(format!("--{}", field.flag))
     }
 
-    fn merge(&self, base: P, seed: Option<u64>) -> Result<P, serde_json::Error> {
+    fn merge(&self, base: P, seed: Option<u64>, scale: Scale) -> Result<P, serde_json::Error> {
         let mut fields = serde_json::to_value(base)?;
         if let Value::Object(fields) = &mut fields {
             fields.extend(self.given.clone());
+            for field in self::fields::<P>() {
+                let (Kind::Tolerance(of), Some(variant)) = (&field.kind, &field.variant) else { continue };
+                let given = self.given(&field.name, variant).and_then(Value::as_str);
+                if let Some(tolerance) = given.and_then(|text| text.parse::<Tolerance>().ok()) {
+                    let x = match of {
+                        Of::Share => tolerance.share(scale),
+                        Of::Length => tolerance.length(scale),
+                    };
+                    fields.insert(field.name, Value::Object(Map::from_iter([(variant.clone(), x.into())])));
+                }
+            }
             if let (Some(seed), true) = (seed, fields.contains_key("seed")) {
                 fields.insert("seed".into(), seed.into());
             }
@@ -110,6 +150,26 @@ impl<P: StageParams> Args for StageOptions<P> {
     }
 }
 
+/// Checks parameters that did not come from the command line as those are checked: each in its range, then against each other.
+/// # Errors
+/// The first that the command line would refuse.
+pub fn check_stored<P: StageParams>(params: &P) -> Result<(), String> {
+    let json = serde_json::to_value(params).map_err(|e| e.to_string())?;
+    for field in fields::<P>() {
+        let value = match &field.variant {
+            Some(variant) => &json[&field.name][variant],
+            None => &json[&field.name],
+        };
+        let text = match value {
+            Value::Number(x) => x.to_string(),
+            Value::Array(list) => list.iter().map(Value::to_string).collect::<Vec<_>>().join(","),
+            _ => continue,
+        };
+        field.read(&text)?;
+    }
+    params.validate()
+}
+
 /// One field of a parameter struct, as its schema describes it.
 struct Field {
     name: String,
@@ -130,7 +190,15 @@ enum Kind {
     Whole { min: Option<f64>, max: Option<f64> },
     Real { min: Option<f64>, max: Option<f64>, above: Option<f64> },
     Choice(Vec<String>),
-    Wholes { count: Option<usize> },
+    Wholes { count: Option<usize>, min: Option<f64>, max: Option<f64> },
+    Tolerance(Of),
+}
+
+/// What the stage takes a tolerance as.
+#[derive(Clone, Copy)]
+enum Of {
+    Share,
+    Length,
 }
 
 impl Field {
@@ -146,6 +214,7 @@ impl Field {
             Kind::Real { .. } => "X",
             Kind::Choice(_) => "WORD",
             Kind::Wholes { .. } => "N,N",
+            Kind::Tolerance(_) => "LENGTH|%",
         };
         let arg = Arg::new(self.id.clone()).long(self.flag.clone()).help(self.help.clone()).value_name(value_name);
         let arg = arg.value_parser(parser).action(ArgAction::Set).allow_negative_numbers(true);
@@ -158,7 +227,8 @@ impl Field {
     }
 
     fn read(&self, text: &str) -> Result<Value, String> {
-        let wrong = |need: &str| Err(format!("invalid value '{text}' for '--{}': {need}\n", self.flag));
+        let wrong =
+            |need: &str| Err(format!("invalid value '{}' for '--{}': {need}\n", words::quoted(text), self.flag));
         let outside =
             |x: f64, min: &Option<f64>, max: &Option<f64>| min.is_some_and(|m| x < m) || max.is_some_and(|m| x > m);
         let range = |min: &Option<f64>, max: &Option<f64>| match (min, max) {
@@ -167,29 +237,42 @@ impl Field {
             (None, Some(b)) => format!("a number of at most {b} is needed"),
             _ => "a number is needed".into(),
         };
+        let open_range = |above: f64, max: &Option<f64>| match max {
+            Some(b) => format!("a number above {above} and up to {b} is needed"),
+            None => format!("a number above {above} is needed"),
+        };
         if self.optional && text == "none" {
             return Ok(Value::Null);
         }
         match &self.kind {
             Kind::Flag => Ok(Value::Bool(text == "true")),
             Kind::Choice(_) => Ok(Value::String(text.into())),
-            Kind::Wholes { count } => {
+            Kind::Wholes { count, min, max } => {
                 let numbers: Result<Vec<u64>, _> = text.split([',', 'x']).map(|n| n.trim().parse::<u64>()).collect();
+                let fits = |numbers: &[u64]| numbers.iter().all(|&n| !outside(n as f64, min, max));
                 match numbers {
-                    Ok(numbers) if count.is_none_or(|c| c == numbers.len()) => Ok(numbers.into()),
-                    _ => wrong(&match count {
-                        Some(c) => format!("{c} whole numbers with commas between are needed"),
-                        None => "whole numbers with commas between are needed".into(),
-                    }),
+                    Ok(numbers) if count.is_none_or(|c| c == numbers.len()) && fits(&numbers) => Ok(numbers.into()),
+                    _ => {
+                        let each = match (min, max) {
+                            (Some(a), Some(b)) => format!(" from {a} to {b}"),
+                            _ => String::new(),
+                        };
+                        let many = count.map_or(String::new(), |c| format!("{c} "));
+                        wrong(&format!("{many}whole numbers{each} with commas between are needed"))
+                    }
                 }
             }
+            Kind::Tolerance(_) => match text.parse::<Tolerance>() {
+                Ok(tolerance) => Ok(Value::String(tolerance.to_string())),
+                Err(_) => wrong(tolerance::WANTED),
+            },
             Kind::Whole { min, max } => match text.parse::<i64>() {
                 Ok(n) if !outside(n as f64, min, max) => Ok(n.into()),
                 _ => wrong(&range(min, max).replace("a number", "a whole number")),
             },
             Kind::Real { min, max, above } => match text.parse::<f64>() {
                 Ok(x) if x.is_finite() && !outside(x, min, max) && above.is_none_or(|a| x > a) => Ok(x.into()),
-                _ => wrong(&above.map_or_else(|| range(min, max), |a| format!("a number above {a} is needed"))),
+                _ => wrong(&above.map_or_else(|| range(min, max), |a| open_range(a, max))),
             },
         }
     }
@@ -210,7 +293,7 @@ fn fields<P: StageParams>() -> Vec<Field> {
         if let Some((kind, optional)) = kind_of(property, schema) {
             let dashed = name.replace('_', "-");
             let flag = if clashes.contains(name) { format!("{}-{dashed}", P::STAGE) } else { dashed };
-            let help = help_of(property, &defaults[name]);
+            let help = help_of(property, &defaults[name], &kind);
             let (variant, rivals) = (None, Vec::new());
             found.push(Field { name: name.clone(), variant, rivals, id, flag, help, kind, optional });
             continue;
@@ -223,7 +306,7 @@ fn fields<P: StageParams>() -> Vec<Field> {
                 rivals: others.map(|v| format!("{id}.{}", v.0)).collect(),
                 id: format!("{id}.{variant}"),
                 flag: variant.replace('_', "-"),
-                help: help_of(described, &defaults[name][variant]),
+                help: help_of(described, &defaults[name][variant], kind),
                 kind: kind.clone(),
                 optional: false,
             });
@@ -233,13 +316,19 @@ fn fields<P: StageParams>() -> Vec<Field> {
 }
 
 /// The help of a property: its doc comment, its default, its unit.
-fn help_of(property: &Value, default: &Value) -> String {
+fn help_of(property: &Value, default: &Value, kind: &Kind) -> String {
     let text = property["description"].as_str().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ");
     let mut help = text.trim_end_matches('.').to_owned();
-    match default {
-        Value::Null => {}
-        Value::String(word) => help += &format!(" [default: {word}]"),
-        value => help += &format!(" [default: {value}]"),
+    if let Kind::Tolerance(_) = kind {
+        help += ": a length (0.05 in units of the input, 0.05mm) or a share of the diagonal (0.02%)";
+    }
+    match (default, kind) {
+        (Value::Null, _) => {}
+        (value, Kind::Tolerance(Of::Share)) => {
+            help += &format!(" [default: {}%]", value.as_f64().unwrap_or(0.0) * 100.0);
+        }
+        (Value::String(word), _) => help += &format!(" [default: {word}]"),
+        (value, _) => help += &format!(" [default: {value}]"),
     }
     if let Some(unit) = property["unit"].as_str() {
         help += &format!(" [unit: {unit}]");
@@ -279,6 +368,11 @@ fn kind_of(property: &Value, schema: &Value) -> Option<(Kind, bool)> {
     if let Some(words) = choices(property) {
         return Some((Kind::Choice(words), false));
     }
+    match property["tolerance"].as_str() {
+        Some("share") => return Some((Kind::Tolerance(Of::Share), false)),
+        Some("length") => return Some((Kind::Tolerance(Of::Length), false)),
+        _ => {}
+    }
     let types: Vec<&str> = match &property["type"] {
         Value::String(t) => vec![t],
         Value::Array(many) => many.iter().filter_map(Value::as_str).collect(),
@@ -289,7 +383,8 @@ fn kind_of(property: &Value, schema: &Value) -> Option<(Kind, bool)> {
             return None;
         }
         let count = property["minItems"].as_u64().filter(|n| property["maxItems"].as_u64() == Some(*n));
-        return Some((Kind::Wholes { count: count.map(|n| n as usize) }, false));
+        let (min, max) = (property["items"]["minimum"].as_f64(), property["items"]["maximum"].as_f64());
+        return Some((Kind::Wholes { count: count.map(|n| n as usize), min, max }, false));
     }
     let nullable = types.contains(&"null");
     let (min, max) = (property["minimum"].as_f64(), property["maximum"].as_f64());
@@ -328,8 +423,18 @@ fn clashing_names() -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::args::Cli;
-    use clap::CommandFactory;
+    use crate::check;
+    use clap::{CommandFactory, Parser};
+    use planish::cloud::{CleanParams, ProjectParams};
+    use planish::contour::ContourParams;
+    use planish::grid::GridParams;
+    use planish::layout::LayoutParams;
+    use planish::mesh::{DecimateParams, SmoothParams};
+    use planish::pipeline::ScanParams;
+    use planish::surface::{FitParams, StitchParams};
+    use planish::synthetic::ScannerParams;
     use std::collections::BTreeSet;
 
     /// clap itself looks for this in debug builds alone.
@@ -346,5 +451,103 @@ mod tests {
             }
             assert!(names.contains("--report"), "{names:?}");
         }
+    }
+
+    /// Fields of all stages.
+    fn all_fields() -> Vec<Field> {
+        let mut all = fields::<LayoutParams>();
+        all.extend(fields::<GridParams>());
+        all.extend(fields::<FitParams>());
+        all.extend(fields::<StitchParams>());
+        all.extend(fields::<CleanParams>());
+        all.extend(fields::<ProjectParams>());
+        all.extend(fields::<ScanParams>());
+        all.extend(fields::<ContourParams>());
+        all.extend(fields::<planish::field::GridParams>());
+        all.extend(fields::<SmoothParams>());
+        all.extend(fields::<DecimateParams>());
+        all.extend(fields::<ScannerParams>());
+        all
+    }
+
+    /// Values just inside a range, and just outside.
+    fn ends(kind: &Kind) -> (Vec<String>, Vec<String>) {
+        let outside = |x: f64, way: f64| x + way * (x.abs() * 1e-3).max(1e-9);
+        match kind {
+            Kind::Whole { min, max } => {
+                let inside = [min, max].into_iter().flatten().map(|x| format!("{x}")).collect();
+                let outside = [min.map(|x| x - 1.0), max.map(|x| x + 1.0)].into_iter().flatten();
+                (inside, outside.map(|x| format!("{x}")).collect())
+            }
+            Kind::Real { min, max, above } => {
+                let inside = [min, max].into_iter().flatten().map(|x| format!("{x}")).collect();
+                let low = min.map(|x| outside(x, -1.0)).or(*above);
+                (inside, [low, max.map(|x| outside(x, 1.0))].into_iter().flatten().map(|x| format!("{x}")).collect())
+            }
+            Kind::Wholes { count, min, max } => {
+                let list = |x: f64| vec![format!("{x}"); count.unwrap_or(3)].join(",");
+                let inside = [min, max].into_iter().flatten().map(|&x| list(x)).collect();
+                let mut outside: Vec<String> =
+                    [min.map(|x| x - 1.0), max.map(|x| x + 1.0)].into_iter().flatten().map(list).collect();
+                outside.extend(count.map(|c| vec!["5"; c + 1].join("x")));
+                (inside, outside)
+            }
+            Kind::Tolerance(_) => {
+                (vec!["0.05mm".into(), "0.02%".into(), "1e-9".into()], vec!["0".into(), "-1%".into(), "5ft".into()])
+            }
+            Kind::Flag | Kind::Choice(_) => (Vec::new(), vec!["perhaps".into()]),
+        }
+    }
+
+    /// The command line with the least that each command needs.
+    fn least(command: &str) -> Vec<&str> {
+        let mut args = vec!["planish", command];
+        args.extend(match command {
+            "demo" => &[][..],
+            "info" => &["a.ply"],
+            "compare" => &["a.ply", "b.ply"],
+            "edit" => &["a.planish", "b.toml"],
+            _ => &["a.ply", "-o", "b"],
+        });
+        args
+    }
+
+    #[test]
+    fn no_option_of_any_command_takes_a_value_out_of_its_range_or_of_no_sense() {
+        let known = all_fields();
+        let mut tried = 0;
+        for command in Cli::command().get_subcommands().filter(|c| c.get_name() != "help") {
+            let parse = |arg: &Arg, value: &str| {
+                let option = format!("--{}={value}", arg.get_long().unwrap_or_default());
+                let mut args = least(command.get_name());
+                args.push(&option);
+                Cli::try_parse_from(args).map_err(|e| e.to_string())
+            };
+            for arg in command.get_arguments().filter(|a| a.get_long().is_some() && a.get_action().takes_values()) {
+                let field = known.iter().find(|f| arg.get_id() == f.id.as_str());
+                let name = arg.get_value_names().and_then(|n| n.first()).map_or("", |n| n.as_str());
+                let (inside, mut wrong) = field.map_or_else(Default::default, |f| ends(&f.kind));
+                if field.is_none() && !matches!(name, "N" | "GB" | "LENGTH|%" | "AXIS" | "WORD" | "UNITS") {
+                    assert!(["DIR", "FILE", "NAMES", ".json", ".planish"].iter().any(|n| name.contains(n)), "{name}");
+                    continue;
+                }
+                wrong.extend(
+                    ["nan", "inf", "-inf", "1e999", "0x10", "1_000", "five", "3,5 mm", "1;2", " "].map(String::from),
+                );
+                if name != "LENGTH|%" {
+                    wrong.push("5mm".into());
+                }
+                for value in inside {
+                    parse(arg, &value).unwrap_or_else(|e| panic!("{} --{}={value}: {e}", command.get_name(), name));
+                }
+                for value in wrong {
+                    let told = parse(arg, &value).and_then(|cli| check::check(&cli.command).map_err(|e| e.to_string()));
+                    let told = told.expect_err(&format!("planish {} {}={value}", command.get_name(), arg.get_id()));
+                    assert!(told.starts_with("error: "), "{told}");
+                    tried += 1;
+                }
+            }
+        }
+        assert!(tried > 1000, "{tried}");
     }
 }

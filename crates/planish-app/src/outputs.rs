@@ -6,6 +6,7 @@
 
 use crate::args::{Command, Common, Policy};
 use crate::failure::Failure;
+use planish_io::ExportKind;
 use std::fs;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -28,7 +29,16 @@ pub fn check(command: &Command) -> Result<(), Failure> {
     let (common, inputs, mut outputs) = files(command);
     outputs.extend(common.report.clone());
     let inputs: Vec<&Path> = inputs.iter().map(|p| p.as_path()).collect();
-    allow(&inputs, &outputs, common.policy())
+    allow(&inputs, &outputs, common.policy())?;
+    match command {
+        Command::Export(a) if is_folder_of_maps(&a.output) => allow_maps(&a.output, common.policy()),
+        _ => Ok(()),
+    }
+}
+
+/// True if the maps of a model go there, and no single file.
+fn is_folder_of_maps(output: &Path) -> bool {
+    planish_io::export_kind(output).is_ok_and(|kind| kind == ExportKind::Relief)
 }
 
 /// The common options of a command, what it reads and what it writes.
@@ -56,7 +66,7 @@ fn files(command: &Command) -> (&Common, Vec<PathBuf>, Vec<PathBuf>) {
         // Without -o the model is edited where it is, with its history: that is asked for by the command itself.
         Command::Edit(a) => (&a.common, vec![a.input.clone(), a.script.clone()], a.output.iter().cloned().collect()),
         Command::Export(a) => {
-            let is_folder = a.output.extension().is_none();
+            let is_folder = is_folder_of_maps(&a.output);
             (&a.common, vec![a.model.clone()], if is_folder { Vec::new() } else { vec![a.output.clone()] })
         }
         Command::Compare(a) => (&a.common, vec![a.a.clone(), a.b.clone()], Vec::new()),
@@ -83,7 +93,8 @@ pub fn allow(inputs: &[&Path], outputs: &[PathBuf], policy: Policy) -> Result<()
         let Ok(found) = fs::metadata(output) else { continue };
         let is_relief = output.file_name().is_some_and(|n| n == RELIEF);
         if found.is_dir() {
-            if is_relief && (policy.force || is_own_relief(output)) && !policy.no_clobber {
+            if is_relief && (policy.force || is_own_relief(output)) {
+                allow_maps(output, policy)?;
                 continue;
             }
             let what =
@@ -112,7 +123,33 @@ pub fn allow(inputs: &[&Path], outputs: &[PathBuf], policy: Policy) -> Result<()
 /// True if a folder of maps is empty or has the sidecar of this program.
 fn is_own_relief(folder: &Path) -> bool {
     let is_empty = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
-    is_empty || !planish_io::relief_names(folder).is_empty() || bears_mark(&folder.join("relief.json"))
+    is_empty || !planish_io::relief_names(folder).is_empty()
+}
+
+/// Checks a folder that maps go to: what bears the name of a map there must be named by the sidecar beside it.
+fn allow_maps(folder: &Path, policy: Policy) -> Result<(), Failure> {
+    let own = planish_io::relief_names(folder);
+    let names =
+        fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.file_name().to_string_lossy().into_owned());
+    let mut found: Vec<String> = names.filter(|name| planish_io::is_relief_name(name)).collect();
+    found.sort();
+    for name in found {
+        let path = folder.join(&name);
+        if path.is_dir() {
+            return Err(Failure::usage(path, "is a folder where a file is to go")
+                .hint("rename it, or name another place with -o"));
+        }
+        if policy.no_clobber {
+            return Err(
+                Failure::usage(path, "is there already").hint("name another folder, or leave --no-clobber away")
+            );
+        }
+        if !policy.force && !own.contains(&name) {
+            let what = "is there already and was not written by planish";
+            return Err(Failure::usage(path, what).hint("name another folder, or replace it with --force"));
+        }
+    }
+    Ok(())
 }
 
 /// True if this program wrote the file.

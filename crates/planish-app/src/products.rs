@@ -131,6 +131,9 @@ impl Staged {
         fs::create_dir_all(folder)?;
         let mut entries: Vec<_> = fs::read_dir(self.staging())?.collect::<Result<_, _>>()?;
         entries.sort_by_key(|e| e.file_name());
+        if entries.iter().any(|e| e.file_name() == planish_io::RELIEF_SIDECAR) {
+            remove_old_maps(folder)?;
+        }
         for entry in entries.into_iter().filter(|e| e.file_name() != LOCK) {
             let place = folder.join(entry.file_name());
             if entry.file_type()?.is_dir() {
@@ -143,15 +146,21 @@ impl Staged {
     }
 }
 
-/// Puts a folder of maps in its place. Of what is there only the maps that an older sidecar names go.
-fn replace_maps(from: &Path, to: &Path) -> io::Result<()> {
-    fs::create_dir_all(to)?;
-    for name in planish_io::relief_names(to) {
-        match fs::remove_file(to.join(name)) {
+/// Removes the maps that the sidecar in a folder names, and nothing else.
+fn remove_old_maps(folder: &Path) -> io::Result<()> {
+    for name in planish_io::relief_names(folder) {
+        match fs::remove_file(folder.join(name)) {
             Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
             _ => {}
         }
     }
+    Ok(())
+}
+
+/// Puts a folder of maps in its place. Of what is there only the maps that an older sidecar names go.
+fn replace_maps(from: &Path, to: &Path) -> io::Result<()> {
+    fs::create_dir_all(to)?;
+    remove_old_maps(to)?;
     for entry in fs::read_dir(from)? {
         let entry = entry?;
         fs::rename(entry.path(), to.join(entry.file_name()))?;
@@ -207,7 +216,8 @@ fn parent(target: &Path) -> &Path {
     }
 }
 
-fn unwritable(target: &Path, error: &io::Error) -> Failure {
+/// An output that the operating system refuses, with the way out.
+pub fn unwritable(target: &Path, error: &io::Error) -> Failure {
     let hint = match error.kind() {
         io::ErrorKind::NotFound => "make its folder first",
         io::ErrorKind::PermissionDenied => "choose a folder that you may write to",

@@ -1,5 +1,6 @@
 //! The one table that a command writes to stdout.
 
+use crate::words;
 use std::io::Write;
 
 /// Lines of a name and a value, in the order of adding.
@@ -21,7 +22,7 @@ impl Summary {
         let mut out = std::io::stdout().lock();
         for (name, value) in &self.rows {
             // Thin spaces are for pages; a terminal shows them as nothing.
-            let value = value.replace('\u{202f}', " ");
+            let value = words::plain(&value.replace('\u{202f}', " "));
             if writeln!(out, "{name:width$}  {value}").is_err() {
                 return;
             }

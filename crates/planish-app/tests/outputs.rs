@@ -159,3 +159,40 @@ fn sigterm_and_sighup_end_like_ctrl_c_with_nothing_left_and_a_line() {
         assert!(names(folder.path()).is_empty(), "{signal}: {:?}", names(folder.path()));
     }
 }
+
+#[test]
+fn export_of_maps_removes_those_of_an_older_export_and_no_map_of_somebody_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    write_box(&at("box.ply"), 4);
+    let output = planish(&["fit", "box.ply", "-q", "-o", "m.planish", "--patches", "6"], folder.path());
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    let export = |more: &[&str]| planish(&[&["export", "m.planish", "-q", "-o", "maps"], more].concat(), folder.path());
+    // An older export had more patches.
+    fs::create_dir(at("maps")).unwrap();
+    fs::write(at("maps/patch_0140.exr"), "old").unwrap();
+    fs::write(at("maps/notes.txt"), "mine").unwrap();
+    fs::write(at("maps/relief.json"), r#"{"planish_relief": 1, "patches": [{"file": "patch_0140.exr"}]}"#).unwrap();
+    let output = export(&[]);
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    let found = names(&at("maps"));
+    assert_eq!(found.iter().filter(|n| n.ends_with(".exr")).count(), 6, "{found:?}");
+    assert!(!at("maps/patch_0140.exr").exists() && at("maps/notes.txt").exists(), "{found:?}");
+    // A map that no sidecar of this program names is somebody else's, and so is a sidecar without its mark.
+    for (name, words) in
+        [("patch_0003.exr", "patch_0003.exr: is there already"), ("relief.json", "relief.json: is there already")]
+    {
+        fs::remove_dir_all(at("maps")).unwrap();
+        fs::create_dir(at("maps")).unwrap();
+        fs::write(at("maps").join(name), r#"{"by": "planish? no, by hand"}"#).unwrap();
+        let output = export(&[]);
+        assert_eq!(status(&output), 2, "{name}: {}", stderr(&output));
+        assert!(error_line(&output).contains(words), "{}", stderr(&output));
+        assert_eq!(names(&at("maps")), [name]);
+        assert_eq!(status(&export(&["--force"])), 0);
+        assert_eq!(names(&at("maps")).len(), 7);
+    }
+    let output = export(&["--no-clobber"]);
+    assert_eq!(status(&output), 2, "{}", stderr(&output));
+    assert_eq!(status(&export(&[])), 0);
+}

@@ -1,6 +1,6 @@
 //! `planish clean`: a scan to denoised, oriented points with flags.
 
-use super::{Session, commit_report};
+use super::{Session, commit_report, write_failure};
 use crate::args::{Clean, Policy};
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -10,8 +10,9 @@ use crate::progress;
 use crate::summary::Summary;
 use planish::cloud::{self, Cleaned, Cloud, Samples};
 use planish::mesh::Attribute;
-use planish::pipeline::{self, Figure, Warning};
-use planish_io::report::{Input, Report, count, distance, number};
+use planish::pipeline::{self, Figure};
+use planish_io::WriteError;
+use planish_io::report::{Input, Report, count, number};
 use std::path::{Path, PathBuf};
 
 /// The facts of a scan as an input.
@@ -25,15 +26,6 @@ pub fn scan_facts(path: &Path, scan: &Cloud, units: planish::model::Units) -> In
     }
 }
 
-/// What to tell of products that stay where the scan was moved to, if it was.
-pub fn moved(scan: &Cloud) -> Option<Warning> {
-    let [x, y, z] = scan.shift.to_array();
-    let text = format!(
-        "The coordinates are large against the scan: products lie near the origin. Add {x} {y} {z} to be back in place."
-    );
-    (scan.shift != planish::DVec3::ZERO).then(|| Warning::new("coordinates_moved", text, ""))
-}
-
 pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
     files::check_extension(&args.output, &planish_io::WRITTEN_SCANS)?;
     args.lines.as_deref().map_or(Ok(()), |path| files::check_extension(path, &["obj"]))?;
@@ -43,7 +35,10 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
     let params = args.clean.params(None)?;
     let project = args.project.params(None)?;
     let (scan, read) = session.step("read", || files::scan(&args.scan, &args.options))?;
-    let mut report = Report::new("clean", scan_facts(&args.scan, &scan, session.units()));
+    let units = session.units_of(&args.scan);
+    let mut report = Report::new("clean", scan_facts(&args.scan, &scan, units));
+    let far = scan.shift != planish::DVec3::ZERO;
+    report.warnings.extend(session.guessed_units(&args.scan, scan.bounds().diagonal(), far));
     let (made, fit) = session.bars.step("samples", |o| cloud::clean(&scan, &params, o));
     if progress::interrupted() {
         return Err(Failure::interrupted());
@@ -54,9 +49,9 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
         return Err(Failure::interrupted());
     }
     let cleaned = made.map_err(|e| Failure::input(&args.scan, super::with_hint(&e.to_string())))?;
-    let wrong = |path: &Path, e: &dyn std::fmt::Display| Failure::usage(path, e);
+    let wrong = |path: &Path, e: WriteError| write_failure(&args.scan, path, e);
     let (segments, write) = session.step("write", || {
-        planish_io::write_scan(staged.file_path(), &cleaned.cloud).map_err(|e| wrong(&args.output, &e))?;
+        planish_io::write_scan_in(staged.file_path(), &cleaned.cloud, units).map_err(|e| wrong(&args.output, e))?;
         if let Some(lines) = &lines {
             super::write_text(&lines.file_path(), &lines_obj(&cleaned))?;
         }
@@ -65,7 +60,7 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
         outputs::allow(&[&args.scan, &args.output], &paths, Policy { in_place: false, ..session.common.policy() })?;
         let one = |(path, part): (PathBuf, Cloud)| {
             let staged = Staged::file(&path)?;
-            planish_io::write_scan(staged.file_path(), &part).map_err(|e| wrong(&path, &e))?;
+            planish_io::write_scan_in(staged.file_path(), &part, units).map_err(|e| wrong(&path, e))?;
             Ok(staged)
         };
         parts.into_iter().map(one).collect::<Result<Vec<Staged>, Failure>>()
@@ -130,11 +125,10 @@ fn lines_obj(cleaned: &Cleaned) -> String {
 }
 
 fn table(args: &Clean, samples: &Samples, cleaned: &Cleaned, report: &Report) -> Summary {
-    let (unit, diagonal) = (report.input.units.as_str(), report.input.diagonal);
     let mut table = Summary::default();
     table.row("input", format!("{}: {} points", report.input.path, count(report.input.counts["points"])));
-    table.row("noise", distance(samples.noise, diagonal, unit));
-    table.row("spacing", distance(samples.spacing, diagonal, unit));
+    table.row("noise", report.length("scan.noise"));
+    table.row("spacing", report.length("scan.spacing"));
     table.row("samples", count(samples.samples.len() as u64));
     table.row("segments", count(samples.closed.len() as u64));
     table.row(

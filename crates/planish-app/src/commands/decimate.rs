@@ -1,13 +1,15 @@
 //! `planish decimate`: fewer triangles, features kept.
 
-use super::{Session, commit_report};
+use super::{Session, commit_report, write_failure};
 use crate::args::Decimate;
 use crate::failure::{Failure, Status};
 use crate::files;
+use crate::placed::{self, Placed};
 use crate::products::Staged;
 use crate::progress;
 use crate::summary::Summary;
-use planish::mesh::{DecimateError, DecimateTarget, decimate as decimate_mesh, diagnose};
+use crate::tolerance::Scale;
+use planish::mesh::{DecimateError, DecimateParams, DecimateTarget, decimate as decimate_mesh, diagnose};
 use planish::pipeline::{Figure, Warning};
 use planish_io::WriteOptions;
 use planish_io::report::{Report, count, number};
@@ -16,9 +18,11 @@ pub fn decimate(session: &Session, args: &Decimate) -> Result<Status, Failure> {
     files::check_extension(&args.output, &["ply", "obj", "stl", "glb"])?;
     let staged = Staged::file(&args.output)?;
     let own_report = session.stage_report()?;
-    let params = args.decimate.params(None)?;
-    let ((mesh, tags), read) = session.step("read", || files::tagged_mesh(&args.mesh))?;
-    let (made, record) = session.bars.step("decimate", |o| decimate_mesh(&mesh, tags.as_ref(), &params, o));
+    let (placed, read) = session.step("read", || Placed::read(&args.mesh))?;
+    let (mesh, tags, units) = (&placed.mesh, placed.tags.as_ref(), session.units_of(&args.mesh));
+    let scale = Scale { diagonal: mesh.bounds().diagonal(), units };
+    let params = args.decimate.params_at(DecimateParams::default(), None, scale)?;
+    let (made, record) = session.bars.step("decimate", |o| decimate_mesh(mesh, tags, &params, o));
     if progress::interrupted() {
         return Err(Failure::interrupted());
     }
@@ -28,10 +32,11 @@ pub fn decimate(session: &Session, args: &Decimate) -> Result<Status, Failure> {
         }
         Failure::input(&args.mesh, super::with_hint(&e.to_string())).hint("look for faults with `planish info`")
     })?;
-    let options = WriteOptions { units: session.units(), ..WriteOptions::default() };
-    planish_io::write_tagged_mesh(staged.file_path(), &made.mesh, &made.tags, &options)
-        .map_err(|e| Failure::usage(&args.output, e))?;
-    let mut report = Report::new("decimate", files::mesh_facts(&args.mesh, &mesh, session.units()));
+    let options = WriteOptions { units, ..WriteOptions::default() };
+    let moved = placed::write(&staged.file_path(), &made.mesh, &made.tags, placed.shift, &options)
+        .map_err(|e| write_failure(&args.mesh, &args.output, e))?;
+    let mut report = Report::new("decimate", files::mesh_facts(&args.mesh, mesh, units));
+    report.warnings.extend(placed.warning(units.symbol()).into_iter().chain(moved));
     report.stages = vec![read, record];
     let facts = diagnose(&made.mesh);
     report.quality.insert("mesh.triangles".into(), Figure::Count(facts.triangles as u64));

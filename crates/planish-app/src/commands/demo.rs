@@ -1,11 +1,11 @@
 //! `planish demo`: a synthetic part is scanned with all the faults of a scanner, and everything runs on the scan.
 
 use super::Session;
-use super::run::{Job, Truth, produce};
+use super::run::{From, Job, Truth, produce};
 use crate::args::Demo;
 use crate::failure::{Failure, Status};
 use crate::products::Staged;
-use planish::pipeline::{Input, RunParams};
+use planish::pipeline::RunParams;
 use planish::synthetic::{self, virtual_scan};
 use planish_io::{Up, WriteOptions};
 use std::path::Path;
@@ -30,17 +30,19 @@ pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
     let options = WriteOptions { units: session.units(), up: Up::Z, name: "demo".into() };
     let wrong = |name: &str, e: &dyn std::fmt::Display| Failure::usage(args.output.join(name), e);
     planish_io::write_mesh(staged.path(TRUTH), &truth, &options).map_err(|e| wrong(TRUTH, &e))?;
-    planish_io::write_scan(staged.path(SCAN), &scan.cloud).map_err(|e| wrong(SCAN, &e))?;
+    planish_io::write_scan_in(staged.path(SCAN), &scan.cloud, session.units()).map_err(|e| wrong(SCAN, &e))?;
     let truth = Truth { mesh: &truth, outliers: scan.stray.iter().filter(|&&s| s).count(), noise_rel: scanner.noise };
     let job = Job {
         command: "demo",
         path: Path::new(SCAN),
         network_path: None,
         params: RunParams { scan: scan_params, ..RunParams::default() },
+        units: session.units(),
         demanded: None,
+        wanted_patches: None,
         output: &args.output,
         up: Up::Z,
         truth: Some(truth),
     };
-    produce(session, job, Input::Scan(&scan.cloud), staged, vec![shape, shot])
+    produce(session, job, From::scan(&scan.cloud), staged, vec![shape, shot])
 }

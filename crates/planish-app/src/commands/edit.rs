@@ -1,14 +1,16 @@
 //! `planish edit`: a script of edits applied to a model, as one history.
 
 use super::run::{seam_rows, summary, verdict};
-use super::{Session, commit_report, pipeline_failure};
-use crate::args::Edit as EditArgs;
+use super::{Session, commit_report, missed, pipeline_failure};
+use crate::args::{AllStages, Edit as EditArgs};
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::outputs;
 use crate::pictures::{self, View};
+use crate::placed::Placed;
 use crate::products::Staged;
 use crate::summary::Summary;
+use crate::tolerance::Scale;
 use planish::edit::{self, ApplyError, Edit, Ground, Made, Redo, Undo};
 use planish::model::{Drawing, HistoryEntry, Model};
 use planish::network::{Diagnosis, diagnose};
@@ -67,6 +69,7 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
     let finished = found.is_finished() && !model.network.patches.is_empty();
     if finished && !args.no_fit && model.grids.is_empty() {
         let wrong = |e| pipeline_failure(&args.input, None, e);
+        args.stages.check_curves(&model.network)?;
         let made = pipeline::rework(&mut model, earlier.as_ref(), &params, &session.bars).map_err(wrong)?;
         report.stages.extend(made.stages);
         report.quality = made.quality;
@@ -91,7 +94,7 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
     }
     staged.commit()?;
     commit_report(own_report, &report)?;
-    let demanded = args.stages.demanded_tolerance();
+    let demanded = missed::share(args.stages.demanded_tolerance(), &report, model.units);
     if !session.common.quiet {
         session.tell_warnings(&report);
         let mut table = if model.surfaces.is_empty() { Summary::default() } else { summary(&report, demanded) };
@@ -120,7 +123,7 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
 }
 
 fn read_script(path: &Path) -> Result<Script, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| Failure::input(path, format!("cannot be read ({e})")))?;
+    let text = read_text(path)?;
     let line = |at: usize| text[..at.min(text.len())].matches('\n').count() + 1;
     let wrong = |message: &str, line: Option<usize>| {
         let place = line.map_or(String::new(), |n| format!(" (line {n})"));
@@ -141,6 +144,24 @@ fn read_script(path: &Path) -> Result<Script, Failure> {
     Ok(Script { steps, view: script.view })
 }
 
+/// Names of the edits of a script, in their order.
+/// # Errors
+/// If it is no script of edits.
+pub fn step_names(path: &Path) -> Result<Vec<String>, Failure> {
+    Ok(read_script(path)?.steps.iter().map(|(edit, _)| edit.name()).collect())
+}
+
+/// The text of a script.
+/// # Errors
+/// If it cannot be read, or is no text.
+pub fn read_text(path: &Path) -> Result<String, Failure> {
+    let bytes = planish_io::read_bytes(path).map_err(|e| Failure::input(path, e))?;
+    String::from_utf8(bytes).map_err(|e| {
+        let line = e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|&&b| b == b'\n').count() + 1;
+        Failure::input(path, format!("is no text in UTF-8 (line {line})")).hint("save it as UTF-8 in your editor")
+    })
+}
+
 /// The model to start from.
 fn start(session: &Session, args: &EditArgs) -> Result<Model, Failure> {
     if files::is_model(&args.input) {
@@ -150,20 +171,21 @@ fn start(session: &Session, args: &EditArgs) -> Result<Model, Failure> {
         }
         return Ok(model);
     }
-    let input = files::mesh(&args.input)?;
+    let placed = Placed::new(files::mesh(&args.input)?, None);
     let (mesh, _) =
-        planish::mend::repair(&input, &crate::progress::Interrupt).map_err(|e| Failure::input(&args.input, e))?;
-    Ok(Model { mesh, units: session.units(), ..Model::default() })
+        planish::mend::repair(&placed.mesh, &crate::progress::Interrupt).map_err(|e| Failure::input(&args.input, e))?;
+    Ok(Model { mesh, units: session.units_of(&args.input), shift: placed.shift, ..Model::default() })
 }
 
 /// The model's own parameters, with the options given in place.
 fn params(session: &Session, args: &EditArgs, model: &Model) -> Result<PipelineParams, Failure> {
-    let given = args.stages.params(session.common.seed)?;
+    let scale = Scale { diagonal: model.mesh.bounds().diagonal(), units: model.units };
+    let given = args.stages.params_suiting(PipelineParams::default(), session.common.seed, scale)?;
     match model.params.as_str() {
         "" => Ok(given),
-        json if args.stages.none_given() => serde_json::from_str(json).map_err(|e| {
-            Failure::input(&args.input, format!("has parameters of another version ({e})")).hint("give them as options")
-        }),
+        json if args.stages.none_given() => {
+            AllStages::stored(json).map_err(|e| Failure::input(&args.input, e).hint("give them as options"))
+        }
         _ => Ok(given),
     }
 }

@@ -1,15 +1,17 @@
 //! `planish fit`: mesh and network to a model; or the surfaces of a model, and its grids where it has none.
 
-use super::run::{Job, Made, fitted, seam_rows, summary, verdict};
-use super::{Session, commit_report, pipeline_failure};
-use crate::args::Fit;
+use super::run::{From, Job, Made, fitted, seam_rows, summary, verdict};
+use super::{Session, commit_report, missed, pipeline_failure};
+use crate::args::{AllStages, Fit};
 use crate::failure::{Failure, Status};
 use crate::files;
+use crate::placed::Placed;
 use crate::products::Staged;
+use crate::tolerance::Scale;
 use planish::mesh::Adjacency;
 use planish::model::{HistoryEntry, Model};
 use planish::network::diagnose;
-use planish::pipeline::{self, Input, PipelineParams, ScanParams};
+use planish::pipeline::{self, PipelineParams, ScanParams};
 use planish_io::Up;
 use planish_io::report::Report;
 use std::path::Path;
@@ -24,7 +26,7 @@ pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
     report.stages.push(record);
     staged.commit()?;
     commit_report(own_report, &report)?;
-    let demanded = args.stages.demanded_tolerance();
+    let demanded = missed::share(args.stages.demanded_tolerance(), &report, model.units);
     if !session.common.quiet {
         session.tell_warnings(&report);
         let mut table = summary(&report, demanded);
@@ -36,21 +38,24 @@ pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
 
 /// A model of a mesh.
 fn anew(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
-    args.stages.params(session.common.seed)?;
-    let ((mesh, tags), read) = session.step("read", || files::tagged_mesh(&args.input))?;
-    let network = files::optional_network(args.network.as_deref(), &mesh)?;
+    let (placed, read) = session.step("read", || Placed::read(&args.input))?;
+    let units = session.units_of(&args.input);
+    let network = files::optional_network(args.network.as_deref(), &placed.mesh)?;
+    network.as_ref().map_or(Ok(()), |network| args.stages.check_curves(network))?;
     let job = Job {
         command: "fit",
         path: &args.input,
         network_path: args.network.as_deref(),
-        params: args.stages.run_params(ScanParams::default(), session.common.seed),
+        params: args.stages.run_params(ScanParams::default(), session.common.seed, units),
+        units,
         demanded: args.stages.demanded_tolerance(),
+        wanted_patches: args.stages.wanted_patches(),
         output: &args.output,
         up: Up::default(),
         truth: None,
     };
-    let input = Input::Mesh { mesh: &mesh, tags: tags.as_ref(), network };
-    let Made { report, model, .. } = fitted(session, &job, input, vec![read])?;
+    let from = From { input: placed.input(network), shift: placed.shift, warning: placed.warning(units.symbol()) };
+    let Made { report, model, .. } = fitted(session, &job, from, vec![read])?;
     Ok((report, model))
 }
 
@@ -64,16 +69,16 @@ fn refit(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
     let gridded = !model.grids.is_empty();
     let stored = match model.params.as_str() {
         "" => PipelineParams::default(),
-        json => serde_json::from_str(json).map_err(|e| {
-            Failure::input(&args.input, format!("has parameters of another version ({e})")).hint("fit its mesh")
-        })?,
+        json => AllStages::stored(json).map_err(|e| Failure::input(&args.input, e).hint("fit its mesh"))?,
     };
-    let params = args.stages.params_over(stored, gridded, session.common.seed)?;
-    if !gridded {
-        finished(&args.input, &model)?;
-    }
     if let Some(units) = session.common.units {
         model.units = units.into();
+    }
+    let scale = Scale { diagonal: model.mesh.bounds().diagonal(), units: model.units };
+    let params = args.stages.params_over(stored, gridded, session.common.seed, scale)?;
+    args.stages.check_curves(&model.network)?;
+    if !gridded {
+        finished(&args.input, &model)?;
     }
     let mut report = Report::new("fit", files::model_facts(&args.input, &model, model.units));
     let wrong = |e| pipeline_failure(&args.input, None, e);
@@ -87,6 +92,8 @@ fn refit(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
     report.stages.extend(found.stages);
     report.quality = found.quality;
     report.warnings = found.warnings;
+    let share = args.stages.demanded_tolerance().map(|tolerance| tolerance.share(scale));
+    report.warnings.extend(missed::tolerance(&model, &params, share, scale));
     report.seams = seam_rows(&model, &found.seams);
     model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
     let command = if gridded { "refit" } else { "fit" };

@@ -1,14 +1,18 @@
 //! `planish info`: what is in a file, and what is wrong with it.
 
+use super::contents::{self, Contents};
 use super::{Session, commit_report};
 use crate::args::{Info, ScanArgs};
 use crate::failure::{Failure, Status};
 use crate::files::{self, Content};
+use crate::progress;
 use crate::summary::Summary;
-use planish::mesh::{Adjacency, Diagnosis, diagnose};
-use planish::model::Model;
+use planish::DVec3;
+use planish::mesh::{Adjacency, Diagnosis, TriMesh, diagnose, self_intersections};
+use planish::model::{Model, Units};
 use planish::pipeline::{Figure, Warning};
 use planish_io::report::{Report, count, number};
+use planish_io::{FileUnits, MeshFormat};
 
 pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
@@ -16,12 +20,30 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
         let report = scan_info(session, args)?;
         return commit_report(own_report, &report).map(|()| Status::Done);
     }
+    let units = session.common.units.map(Units::from);
+    let (other, read) = session.step("read", || contents::of(&args.file, units))?;
+    if let Some(Contents { input, table }) = other {
+        let report = Report { stages: vec![read], ..Report::new("info", input) };
+        if !session.common.quiet {
+            table.print();
+        }
+        return commit_report(own_report, &report).map(|()| Status::Done);
+    }
+    if !files::is_model(&args.file) && MeshFormat::of(&args.file).is_none() && args.file.exists() {
+        let scans = planish_io::SCAN_EXTENSIONS.map(|e| format!(".{e}")).join(", ");
+        let meshes = MeshFormat::ALL.map(|f| format!(".{}", f.extension())).join(", ");
+        return Err(Failure::input(&args.file, "is of no kind that planish knows").hint(format!(
+            "meshes are {meshes}; scans {scans}; models .planish; volumes .nrrd, .npy; scripts .toml; networks and reports \
+             .json; .step, .exr, folders of maps"
+        )));
+    }
     let (content, read) = session.step("read", || files::content(&args.file))?;
     let (mesh, model) = match &content {
         Content::Mesh(mesh) => (mesh, None),
         Content::Model(model) => (&model.mesh, Some(model.as_ref())),
     };
-    let units = session.common.units.map(Into::into).or(model.map(|m| m.units)).unwrap_or_default();
+    let units =
+        session.common.units.map(Into::into).or(model.map(|m| m.units)).unwrap_or_else(|| session.units_of(&args.file));
     let input = match model {
         Some(model) => files::model_facts(&args.file, model, units),
         None => files::mesh_facts(&args.file, mesh, units),
@@ -31,22 +53,32 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
     report.stages.push(read);
     report.warnings = faults(&facts);
     figures(&facts, &mut report);
+    let crossings = crossings(mesh, &mut report);
     if let Some(model) = model {
         report.quality.insert("patches.count".into(), Figure::Count(model.network.patches.len() as u64));
         let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
         report.quality.insert("surface.control_points".into(), Figure::Count(control as u64));
         report.warnings.extend(network_faults(model));
+        folds(model, &mut report);
     }
     commit_report(own_report, &report)?;
     if !session.common.quiet {
         session.tell_warnings(&report);
         let mut table = Summary::default();
-        mesh_rows(&mut table, &report, &facts);
+        mesh_rows(&mut table, &report, &facts, model.map_or(DVec3::ZERO, |m| m.shift));
+        table.row("crossings", crossings);
+        table.row("units", told_units(session, args, model.is_some(), &report));
+        let columns: Vec<&str> = mesh.attributes.iter().map(|a| a.name.as_str()).collect();
+        table.row("attributes", if columns.is_empty() { "none".into() } else { columns.join(", ") });
         if let Some(model) = model {
             model_rows(&mut table, model);
+            if let (Some(grids), Some(surfaces)) = (report.figure("grid.folds"), report.figure("surface.folds")) {
+                table.row("folds", format!("{grids} cells of grids, {surfaces} places of surfaces"));
+            }
         }
         let verdict = match report.warnings.len() {
             0 => "nothing".to_owned(),
+            1 => "one thing, told above; `planish run` repairs what it can of the mesh".to_owned(),
             n => format!("{n} things, told above; `planish run` repairs what it can of the mesh"),
         };
         table.row("wrong", verdict);
@@ -58,7 +90,7 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
 /// What is in a scan.
 fn scan_info(session: &Session, args: &Info) -> Result<Report, Failure> {
     let (scan, read) = session.step("read", || files::scan(&args.file, &ScanArgs::default()))?;
-    let mut report = Report::new("info", super::clean::scan_facts(&args.file, &scan, session.units()));
+    let mut report = Report::new("info", super::clean::scan_facts(&args.file, &scan, session.units_of(&args.file)));
     report.stages.push(read);
     let lost = scan.points.iter().filter(|p| !p.is_finite()).count();
     let mut places: Vec<[u64; 3]> =
@@ -88,7 +120,7 @@ fn scan_info(session: &Session, args: &Info) -> Result<Report, Failure> {
     session.tell_warnings(&report);
     let unit = report.input.units.as_str();
     let bounds = scan.bounds();
-    let corner = |p: planish::DVec3| (p + scan.shift).to_array().map(|x| x.to_string()).join(" ");
+    let corner = |p: DVec3| contents::corner(p + scan.shift, bounds.diagonal());
     let mut table = Summary::default();
     table.row("points", count(scan.points.len() as u64));
     table.row("from", format!("{} {unit}", corner(bounds.min)));
@@ -101,6 +133,7 @@ fn scan_info(session: &Session, args: &Info) -> Result<Report, Failure> {
         n => format!("{n} with known positions"),
     };
     table.row("scanners", scanners);
+    table.row("units", told_units(session, args, false, &report));
     table.print();
     Ok(report)
 }
@@ -148,7 +181,55 @@ fn faults(facts: &Diagnosis) -> Vec<Warning> {
     found.map(|(code, n, words)| Warning::new(code, format!("{n} {words}."), "")).collect()
 }
 
-fn mesh_rows(table: &mut Summary, report: &Report, facts: &Diagnosis) {
+/// Above so many triangles crossings are not looked for: `info` is to answer soon.
+const MOST_LOOKED_AT: usize = 2_000_000;
+
+/// Looks for triangles that cross others, and tells how many in words.
+fn crossings(mesh: &TriMesh, report: &mut Report) -> String {
+    if mesh.triangles.len() > MOST_LOOKED_AT {
+        return "not looked for: too many triangles".into();
+    }
+    let pairs = self_intersections(mesh).len();
+    report.quality.insert("mesh.self_intersections".into(), Figure::Count(pairs as u64));
+    if pairs > 0 {
+        let text = format!("{} pairs of triangles cross each other.", count(pairs as u64));
+        report.warnings.push(Warning::new("self_intersections", text, ""));
+    }
+    count(pairs as u64)
+}
+
+/// Counts folds of the grids and surfaces of a model.
+fn folds(model: &Model, report: &mut Report) {
+    let Ok(patches) = planish::network::imprint(&model.mesh, &model.network, &progress::Interrupt) else { return };
+    if model.grids.len() != patches.len() || model.surfaces.len() != patches.len() {
+        return;
+    }
+    let grids: usize = model.grids.iter().zip(&patches).map(|(g, p)| planish::grid::measure(g, p).folds).sum();
+    let surfaces: usize = model.surfaces.iter().zip(&model.grids).map(|(s, g)| planish::surface::folds(s, g)).sum();
+    for (key, n, words) in [
+        ("grid.folds", grids, "cells of grids are turned over"),
+        ("surface.folds", surfaces, "places of surfaces are turned over"),
+    ] {
+        report.quality.insert(key.into(), Figure::Count(n as u64));
+        if n > 0 {
+            report.warnings.push(Warning::new(&key.replace('.', "_"), format!("{} {words}.", count(n as u64)), ""));
+        }
+    }
+}
+
+/// The unit, and how sure it is.
+fn told_units(session: &Session, args: &Info, is_model: bool, report: &Report) -> String {
+    let unit = &report.input.units;
+    match planish_io::file_units(&args.file) {
+        _ if is_model || session.common.units.is_some() => unit.clone(),
+        FileUnits::Standard(_) => format!("{unit}, as the format has it"),
+        FileUnits::Usual(_) | FileUnits::Unknown => {
+            format!("{unit}, assumed: the file does not tell; --units says otherwise")
+        }
+    }
+}
+
+fn mesh_rows(table: &mut Summary, report: &Report, facts: &Diagnosis, shift: DVec3) {
     let unit = report.input.units.as_str();
     let yes = |yes: bool, a: &str, b: &str| if yes { a.to_owned() } else { b.to_owned() };
     let size = facts.bounds.size();
@@ -156,6 +237,8 @@ fn mesh_rows(table: &mut Summary, report: &Report, facts: &Diagnosis) {
     table.row("triangles", count(facts.triangles as u64));
     table.row("vertices", count(facts.vertices as u64));
     table.row("size", format!("{} x {} x {} {unit}", number(size.x), number(size.y), number(size.z)));
+    table.row("from", format!("{} {unit}", contents::corner(facts.bounds.min + shift, facts.diagonal)));
+    table.row("to", format!("{} {unit}", contents::corner(facts.bounds.max + shift, facts.diagonal)));
     table.row("diagonal", format!("{} {unit}", number(facts.diagonal)));
     table.row("pieces", count(facts.components as u64));
     table.row(

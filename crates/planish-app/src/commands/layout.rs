@@ -1,9 +1,10 @@
 //! `planish layout`: a network to start from.
 
-use super::{Session, commit_report};
+use super::{Session, commit_report, write_failure};
 use crate::args::Layout;
 use crate::failure::{Failure, Status};
 use crate::files;
+use crate::placed::Placed;
 use crate::products::Staged;
 use crate::summary::Summary;
 use planish::network::CurveKind;
@@ -15,15 +16,18 @@ pub fn layout(session: &Session, args: &Layout) -> Result<Status, Failure> {
     let staged = Staged::file(&args.output)?;
     let own_report = session.stage_report()?;
     let params = args.layout.params(session.common.seed)?;
-    let ((input, tags), read) = session.step("read", || files::tagged_mesh(&args.mesh))?;
-    let mut report = Report::new("layout", files::mesh_facts(&args.mesh, &input, session.units()));
-    let made = pipeline::layout(&input, tags.as_ref(), &params, &session.bars)
+    let (placed, read) = session.step("read", || Placed::read(&args.mesh))?;
+    let (input, tags, units) = (&placed.mesh, placed.tags.as_ref(), session.units_of(&args.mesh));
+    let mut report = Report::new("layout", files::mesh_facts(&args.mesh, input, units));
+    let made = pipeline::layout(input, tags, &params, &session.bars)
         .map_err(|e| super::pipeline_failure(&args.mesh, None, e))?;
     let network = &made.network;
-    planish_io::write_network(staged.file_path(), network, &made.mesh).map_err(|e| Failure::usage(&args.output, e))?;
+    planish_io::write_network(staged.file_path(), network, &made.mesh)
+        .map_err(|e| write_failure(&args.mesh, &args.output, e))?;
     report.stages.push(read);
     report.stages.extend(made.stages);
     report.warnings = made.warnings;
+    report.warnings.extend(placed.warning(units.symbol()));
     report.quality = made.quality;
     staged.commit()?;
     commit_report(own_report, &report)?;

@@ -1,12 +1,14 @@
 //! `planish mesh`: a mesh with sharp edges from a mesh, a solid script, a milling job or a volume.
 
-use super::{Session, commit_report};
+use super::{Session, commit_report, write_failure};
 use crate::args::Mesh;
 use crate::failure::{Failure, Status};
 use crate::files;
+use crate::placed::{self, Placed};
 use crate::products::Staged;
 use crate::progress;
 use crate::summary::Summary;
+use planish::DVec3;
 use planish::contour::{self, Meshed, MeshingError, Sampling};
 use planish::field::{Part, Spacing};
 use planish::mesh::{TriMesh, diagnose};
@@ -21,9 +23,20 @@ const RESOLUTION: usize = 129;
 /// What is to be meshed.
 enum Source {
     Scan(planish::cloud::Cloud),
-    Mesh(TriMesh),
+    Mesh(Placed),
     Script(Script),
     Grid(Box<planish::field::ScalarGrid>),
+}
+
+impl Source {
+    /// What brings the coordinates back to their place.
+    fn shift(&self) -> DVec3 {
+        match self {
+            Source::Scan(scan) => scan.shift,
+            Source::Mesh(placed) => placed.shift,
+            Source::Script(_) | Source::Grid(_) => DVec3::ZERO,
+        }
+    }
 }
 
 pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
@@ -48,7 +61,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let (made, record) = session.bars.step("mesh", |o| {
         Ok::<Made, Trouble>(match &source {
             Source::Scan(scan) => Made::OfScan(pipeline::mesh_scan(scan, &params, o)?),
-            Source::Mesh(mesh) => Made::Plain(contour::from_mesh(mesh, sampling, contour, o)?),
+            Source::Mesh(placed) => Made::Plain(contour::from_mesh(&placed.mesh, sampling, contour, o)?),
             Source::Script(Script::Part(part)) => Made::Plain(contour::from_part(part, sampling, contour, o)?),
             Source::Script(Script::Job(milling)) => Made::Plain(contour::from_field(milling, sampling, contour, o)?),
             Source::Grid(grid) => Made::Plain(contour::from_grid(grid, &grid_params, params.memory, contour, o)?),
@@ -65,27 +78,29 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
         Made::OfScan(scanned) => (&scanned.meshed, Some(scanned)),
         Made::Plain(made) => (made, None),
     };
-    let (mut mesh, tags) = (std::borrow::Cow::Borrowed(&made.extracted.mesh), &made.extracted.tags);
-    let scan = if let Source::Scan(scan) = &source { Some(scan) } else { None };
-    // Single precision would lose the detail far from the origin.
-    let exact = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply") || e.eq_ignore_ascii_case("obj"));
-    if let Some(scan) = scan.filter(|s| exact && s.shift != planish::DVec3::ZERO) {
-        mesh.to_mut().points.iter_mut().for_each(|p| *p += scan.shift);
-    }
+    let (mesh, tags) = (&made.extracted.mesh, &made.extracted.tags);
+    let shift = source.shift();
     let options = WriteOptions { units, ..WriteOptions::default() };
-    let (_, write) = session.step("write", || {
-        planish_io::write_tagged_mesh(staged.file_path(), &mesh, tags, &options)
-            .map_err(|e| Failure::usage(&args.output, e))
+    let (moved, write) = session.step("write", || {
+        placed::write(&staged.file_path(), mesh, tags, shift, &options)
+            .map_err(|e| write_failure(&args.input, &args.output, e))
     })?;
     let mut report = Report::new("mesh", input);
+    if let Source::Mesh(_) | Source::Scan(_) = &source {
+        let far = shift != DVec3::ZERO;
+        report.warnings.extend(session.guessed_units(&args.input, report.input.diagonal, far));
+    }
+    if let Source::Mesh(placed) = &source {
+        report.warnings.extend(placed.warning(units.symbol()));
+    }
+    report.warnings.extend(moved);
     report.stages = vec![read, record, write];
     figures(made, &mut report);
     if let Source::Mesh(input) = &source {
-        thin_walls(made, input, &mut report);
+        thin_walls(made, &input.mesh, &mut report);
     }
     if let Some(scanned) = scanned {
         pipeline::scan_figures(scanned, &mut report.quality, &mut report.warnings);
-        report.warnings.extend(scan.filter(|_| !exact).and_then(super::clean::moved));
     }
     staged.commit()?;
     commit_report(own_report, &report)?;
@@ -171,8 +186,9 @@ fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Sourc
     }
     if planish_io::is_scan(path) {
         let scan = files::scan(path, &args.scan)?;
-        let input = super::clean::scan_facts(path, &scan, session.units());
-        return Ok((Source::Scan(scan), input, session.units()));
+        let units = session.units_of(path);
+        let input = super::clean::scan_facts(path, &scan, units);
+        return Ok((Source::Scan(scan), input, units));
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     if !files::is_model(path) && MeshFormat::ALL.iter().all(|f| f.extension() != extension) {
@@ -184,9 +200,10 @@ fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Sourc
         );
         return Err(Failure::input(path, format!("unknown extension \"{extension}\"")).hint(known));
     }
-    let mesh = files::mesh(path)?;
-    let input = files::mesh_facts(path, &mesh, session.units());
-    Ok((Source::Mesh(mesh), input, session.units()))
+    let placed = Placed::new(files::mesh(path)?, None);
+    let units = session.units_of(path);
+    let input = files::mesh_facts(path, &placed.mesh, units);
+    Ok((Source::Mesh(placed), input, units))
 }
 
 fn failure(args: &Mesh, source: &Source, error: MeshingError) -> Failure {
@@ -276,8 +293,8 @@ fn table(args: &Mesh, made: &Meshed, report: &Report) -> Summary {
     let [x, y, z] = made.lattice.cells;
     table.row("input", format!("{}: {}", report.input.path, report.input.kind));
     table.row("voxel", format!("{} {unit} ({x} x {y} x {z} cells)", number(made.lattice.step.x)));
-    if let Some(noise) = report.figure("scan.noise") {
-        table.row("noise", planish_io::report::distance(noise, report.input.diagonal, unit));
+    if report.figure("scan.noise").is_some() {
+        table.row("noise", report.length("scan.noise"));
     }
     if let Some(lids) = report.figure("scan.lids").filter(|&n| n > 0.0) {
         table.row("holes", format!("{} small ones closed", count(lids as u64)));

@@ -2,6 +2,7 @@
 
 mod clean;
 mod compare;
+mod contents;
 mod decimate;
 mod demo;
 mod edit;
@@ -10,20 +11,24 @@ mod fit;
 mod info;
 mod layout;
 mod mesh;
+mod missed;
 mod run;
 mod smooth;
 
 use crate::args::{Cli, Command, Common};
+use crate::check;
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::outputs;
-use crate::products::Staged;
+use crate::products::{self, Staged};
 use crate::progress::{self, Bars};
+use crate::words;
+pub use crate::words::with_hint;
 use planish::model::{Model, Units};
 use planish::observe::Cancelled;
-use planish::pipeline::{Figure, PipelineError, Quality, StageRecord};
-use planish_io::WriteError;
-use planish_io::report::Report;
+use planish::pipeline::{Figure, PipelineError, Quality, StageRecord, Warning};
+use planish_io::report::{Report, number};
+use planish_io::{FileUnits, WriteError};
 use std::io::Write;
 use std::path::Path;
 
@@ -32,6 +37,7 @@ use std::path::Path;
 /// What the user is to be told.
 pub fn run(cli: Cli) -> Result<Status, Failure> {
     progress::watch_interrupts();
+    check::check(&cli.command)?;
     outputs::check(&cli.command)?;
     match cli.command {
         Command::Demo(args) => demo::demo(&Session::new(&args.common)?, &args),
@@ -49,6 +55,8 @@ pub fn run(cli: Cli) -> Result<Status, Failure> {
     }
 }
 
+/// A shape that is smaller than this in millimetres is rather one in metres.
+const TINY: f64 = 1.0;
 /// Threads for each core of the machine, at most.
 const THREADS_PER_CORE: usize = 4;
 
@@ -70,9 +78,39 @@ impl Session {
         Ok(Session { common: common.clone(), bars: Bars::new(common.quiet, common.verbose) })
     }
 
-    /// Units of the input: the user's, else millimetres.
+    /// Units of something made here: the user's, else millimetres.
     fn units(&self) -> Units {
         self.common.units.map_or(Units::default(), Units::from)
+    }
+
+    /// Units of an input: the user's, else its format's, else millimetres.
+    fn units_of(&self, input: &Path) -> Units {
+        match (self.common.units, planish_io::file_units(input)) {
+            (Some(units), _) => units.into(),
+            (None, FileUnits::Standard(units) | FileUnits::Usual(units)) => units,
+            (None, FileUnits::Unknown) => Units::default(),
+        }
+    }
+
+    /// What to tell of the unit of an input, where it is a guess that may be wrong.
+    /// * `diagonal` - of the input's box
+    /// * `far` - it has the coordinates of a map
+    fn guessed_units(&self, input: &Path, diagonal: f64, far: bool) -> Option<Warning> {
+        let text = match (self.common.units, planish_io::file_units(input)) {
+            (Some(_), _) | (None, FileUnits::Standard(_)) => return None,
+            (None, FileUnits::Usual(units)) => {
+                format!(
+                    "The file does not tell its unit; {units} is taken, as usual in its format. --units says otherwise."
+                )
+            }
+            (None, FileUnits::Unknown) if far || diagonal < TINY => format!(
+                "The file does not tell its unit; mm is taken, which makes it {} mm across{}. If it is in metres, say --units m.",
+                number(diagonal),
+                if far { ", with the coordinates of a map" } else { "" }
+            ),
+            _ => return None,
+        };
+        Some(Warning::new("units_guessed", text, ""))
     }
 
     /// Where `--report` goes, claimed before the work so that a wrong place is told at once.
@@ -87,7 +125,8 @@ impl Session {
         }
         for warning in &report.warnings {
             let place = if warning.place.is_empty() { String::new() } else { format!(" ({})", warning.place) };
-            let _ = writeln!(std::io::stderr(), "warning: {}{place}", warning.message.trim_end_matches('.'));
+            let text = words::message(&warning.message.replace('\u{202f}', " "));
+            let _ = writeln!(std::io::stderr(), "warning: {}{}", text.trim_end_matches('.'), words::plain(&place));
         }
     }
 
@@ -126,7 +165,7 @@ fn commit_report(staged: Option<Staged>, report: &Report) -> Result<(), Failure>
 
 /// Writes a text file.
 fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text).map_err(|e| Failure::usage(path, format!("cannot be written ({e})")))
+    std::fs::write(path, text).map_err(|e| products::unwritable(path, &e))
 }
 
 /// What a failed pipeline is to the user: mostly a fault of the input.
@@ -140,10 +179,12 @@ fn pipeline_failure(input: &Path, network: Option<&Path>, error: PipelineError) 
     }
 }
 
-/// The way out that a library error ends with, as a hint.
-fn with_hint(text: &str) -> String {
-    match text.rsplit_once("; ") {
-        Some((what, hint)) if !text.contains(" - hint: ") => format!("{what} - hint: {hint}"),
-        _ => text.to_owned(),
+/// What a failed writer is to the user: a fault of the input, but where the operating system refuses the output.
+fn write_failure(input: &Path, output: &Path, error: WriteError) -> Failure {
+    match error {
+        WriteError::Io(_) | WriteError::Image(_) | WriteError::UnknownExtension { .. } => Failure::usage(output, error),
+        WriteError::Nothing(_) | WriteError::Value { .. } | WriteError::Inconsistent { .. } => {
+            Failure::input(input, error)
+        }
     }
 }

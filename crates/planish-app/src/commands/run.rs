@@ -1,47 +1,69 @@
 //! `planish run`: everything, from a scan or a mesh to all products.
 
-use super::{Session, commit_report, pipeline_failure, write_relief, write_text};
+use super::{Session, commit_report, missed, pipeline_failure, write_failure, write_relief, write_text};
 use crate::args::Run;
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::pictures;
+use crate::placed::{self, Placed};
 use crate::products::Staged;
 use crate::summary::Summary;
+use crate::tolerance::{Scale, Tolerance};
 use planish::DVec3;
-use planish::mesh::TriMesh;
-use planish::model::{HistoryEntry, Model};
+use planish::mesh::{FeatureTags, TriMesh};
+use planish::model::{HistoryEntry, Model, Units};
 use planish::pipeline::{self, Figure, Fitted, Input, RunParams, ScanParams, Scanned, StageRecord};
 use planish_io::report::{self, Report, SeamRow, count, distance, number, percent};
-use planish_io::{StepInput, Up, WriteOptions};
+use planish_io::{StepInput, Up, WriteError, WriteOptions};
 use std::path::Path;
 
 pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
     let staged = Staged::folder(&args.output)?;
-    // Options that cannot be are told before the file is read.
-    args.stages.params(session.common.seed)?;
     let scan = ScanParams { points: args.points.params(None)?, ..args.meshing.params()? };
-    let params = args.stages.run_params(scan, session.common.seed);
+    let units = session.units_of(&args.input);
+    let params = args.stages.run_params(scan, session.common.seed, units);
     let job = Job {
         command: "run",
         path: &args.input,
         network_path: args.network.as_deref(),
         params,
+        units,
         demanded: args.stages.demanded_tolerance(),
+        wanted_patches: args.stages.wanted_patches(),
         output: &args.output,
         up: args.up.into(),
         truth: None,
     };
     if planish_io::is_scan(&args.input) {
         let (scan, read) = session.step("read", || files::scan(&args.input, &args.scan))?;
-        return produce(session, job, Input::Scan(&scan), staged, vec![read]);
+        return produce(session, job, From::scan(&scan), staged, vec![read]);
     }
     args.meshing.refuse("use `planish mesh` first")?;
     if let Some(flag) = args.points.first_given() {
         return Err(Failure::usage(flag, "is for scans, and the input is none").hint("leave it out"));
     }
-    let ((mesh, tags), read) = session.step("read", || files::tagged_mesh(&args.input))?;
-    let network = files::optional_network(args.network.as_deref(), &mesh)?;
-    produce(session, job, Input::Mesh { mesh: &mesh, tags: tags.as_ref(), network }, staged, vec![read])
+    let (placed, read) = session.step("read", || Placed::read(&args.input))?;
+    let network = files::optional_network(args.network.as_deref(), &placed.mesh)?;
+    network.as_ref().map_or(Ok(()), |network| args.stages.check_curves(network))?;
+    let from = From { input: placed.input(network), shift: placed.shift, warning: placed.warning(units.symbol()) };
+    produce(session, job, from, staged, vec![read])
+}
+
+/// What a model is made of.
+pub struct From<'a> {
+    /// The input, near the origin.
+    pub input: Input<'a>,
+    /// What brings it back to its place.
+    pub shift: DVec3,
+    /// What is to be told of it.
+    pub warning: Option<pipeline::Warning>,
+}
+
+impl<'a> From<'a> {
+    /// A scan.
+    pub fn scan(scan: &'a planish::cloud::Cloud) -> From<'a> {
+        From { input: Input::Scan(scan), shift: scan.shift, warning: None }
+    }
 }
 
 /// A shape on its way to a model.
@@ -54,8 +76,12 @@ pub struct Job<'a> {
     pub network_path: Option<&'a Path>,
     /// Parameters of all stages.
     pub params: RunParams<'a>,
-    /// Tolerance that the user demanded, as a fraction of the diagonal.
-    pub demanded: Option<f64>,
+    /// What one unit of the input is.
+    pub units: Units,
+    /// Tolerance that the user demanded.
+    pub demanded: Option<Tolerance>,
+    /// Number of patches that the user asked for.
+    pub wanted_patches: Option<u64>,
     /// Where the products go.
     pub output: &'a Path,
     /// Axis that points up.
@@ -78,19 +104,19 @@ pub struct Truth<'a> {
 pub fn produce(
     session: &Session,
     job: Job,
-    input: Input,
+    from: From,
     staged: Staged,
     before: Vec<StageRecord>,
 ) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
-    let cloud = if let Input::Scan(cloud) = input { Some(cloud) } else { None };
-    let Made { mut report, model, scan } = fitted(session, &job, input, before)?;
+    let demanded = job.demanded;
+    let cloud = if let Input::Scan(cloud) = from.input { Some(cloud) } else { None };
+    let Made { mut report, model, scan } = fitted(session, &job, from, before)?;
+    report.warnings.extend(placed::moved(model.shift, "preview.glb lies"));
     let raw = match (cloud, scan) {
-        (Some(cloud), Some(Scanned { mut points, .. })) => {
-            // All products lie in one place.
-            points.cloud.shift = DVec3::ZERO;
+        (Some(cloud), Some(Scanned { points, .. })) => {
             planish_io::write_scan(staged.path("points.ply"), &points.cloud)
-                .map_err(|e| Failure::usage(job.path, e))?;
+                .map_err(|e| write_failure(job.path, &job.output.join("points.ply"), e))?;
             let mut raw: [Vec<DVec3>; 2] = Default::default();
             cloud.points.iter().zip(&points.strays).for_each(|(p, &off)| raw[usize::from(off)].push(*p));
             Some(raw)
@@ -99,17 +125,18 @@ pub fn produce(
     };
     let name = job.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let options = WriteOptions { units: model.units, up: job.up, name };
-    let ((), write) = session.step("write", || write_products(&staged, job.output, &model, &options, &mut report))?;
+    let ((), write) = session.step("write", || write_products(&staged, &job, &model, &options, &mut report))?;
     let (pictures, draw) = session.step("pictures", || pictures::pictures(&model, raw.as_ref(), &report, job.up))?;
     report.stages.extend([write, draw]);
     write_text(&staged.path("report.json"), &report.to_json())?;
     write_text(&staged.path("report.html"), &report::html(&report, &pictures))?;
     staged.commit()?;
     commit_report(own_report, &report)?;
-    let status = verdict(&report, job.demanded);
+    let share = missed::share(demanded, &report, model.units);
+    let status = verdict(&report, share);
     if !session.common.quiet {
         session.tell_warnings(&report);
-        let mut summary = summary(&report, job.demanded);
+        let mut summary = summary(&report, share);
         summary.row("products", job.output.display().to_string());
         summary.row("look at", job.output.join("report.html").display().to_string());
         summary.print();
@@ -128,13 +155,13 @@ pub struct Made {
 }
 
 /// Runs the pipeline on an input.
-pub fn fitted(session: &Session, job: &Job, input: Input, before: Vec<StageRecord>) -> Result<Made, Failure> {
-    let units = session.units();
+pub fn fitted(session: &Session, job: &Job, from: From, before: Vec<StageRecord>) -> Result<Made, Failure> {
+    let (units, From { input, shift, warning }) = (job.units, from);
     let facts = match &input {
         Input::Scan(scan) => super::clean::scan_facts(job.path, scan, units),
         Input::Mesh { mesh, .. } => files::mesh_facts(job.path, mesh, units),
     };
-    let moved = if let Input::Scan(scan) = &input { super::clean::moved(scan) } else { None };
+    let guessed = session.guessed_units(job.path, facts.diagonal, shift != DVec3::ZERO).filter(|_| job.truth.is_none());
     let mut report = Report::new(job.command, facts);
     let run = pipeline::run(input, &job.params, &session.bars)
         .map_err(|e| pipeline_failure(job.path, job.network_path, e))?;
@@ -143,7 +170,7 @@ pub fn fitted(session: &Session, job: &Job, input: Input, before: Vec<StageRecor
     report.stages.extend(stages);
     report.quality = quality;
     report.warnings = warnings;
-    report.warnings.extend(moved);
+    report.warnings.extend(guessed.into_iter().chain(warning));
     report.seams = seam_rows(&model, &seams);
     let meshed = run.scan.as_ref().map(|s| &s.meshed.meshed.extracted.mesh);
     if let Some(meshed) = meshed {
@@ -164,13 +191,17 @@ pub fn fitted(session: &Session, job: &Job, input: Input, before: Vec<StageRecor
         report.quality.extend(found.map_err(Failure::fault)?);
         report.stages.push(record);
     }
-    model.units = units;
+    let scale = Scale { diagonal: report.input.diagonal, units };
+    let share = job.demanded.map(|tolerance| tolerance.share(scale));
+    report.warnings.extend(missed::tolerance(&model, &run.params, share, scale));
+    report.warnings.extend(missed::patches(&model, job.wanted_patches));
+    (model.units, model.shift) = (units, shift);
     model.params = serde_json::to_string(&run.params).map_err(Failure::fault)?;
     model.history.push(HistoryEntry { command: "fit".into(), parameters: model.params.clone() });
     Ok(Made { report, model, scan: run.scan })
 }
 
-/// Done, or the demanded tolerance is missed.
+/// Done, or the demanded tolerance (a share of the diagonal) is missed.
 pub fn verdict(report: &Report, demanded: Option<f64>) -> Status {
     match (demanded, report.figure("surface.patch_rms_max_rel")) {
         (Some(wanted), Some(reached)) if reached > wanted => Status::Missed,
@@ -189,7 +220,7 @@ pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
     match report.input.counts.get("points") {
         Some(&points) => {
             table.row("input", format!("{}: {} points", report.input.path, count(points)));
-            table.row("noise", length("scan.noise"));
+            table.row("noise", report.length("scan.noise"));
             table.row("orientation", format!("{} of the evidence agrees", percent(figure("scan.confidence"))));
             table.row("points to mesh", format!("{} RMS", length("scan.to_mesh_rms")));
             if figure("scan.lids") > 0.0 {
@@ -220,7 +251,8 @@ pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
     if let Some(wanted) = demanded {
         let reached = figure("surface.patch_rms_max_rel");
         let word = if reached > wanted { "missed" } else { "kept" };
-        table.row("tolerance", format!("{word}: {} for {} of the diagonal", number(reached), number(wanted)));
+        let lengths = [reached, wanted].map(|share| distance(share * diagonal, diagonal, unit));
+        table.row("tolerance", format!("{word}: {} where {} is demanded", lengths[0], lengths[1]));
     }
     if report.figure("truth.displaced_rms").is_some() {
         table.row("to the truth", format!("{} RMS", length("truth.displaced_rms")));
@@ -260,25 +292,24 @@ pub fn seam_rows(model: &Model, seams: &[planish::surface::SeamQuality]) -> Vec<
 
 fn write_products(
     staged: &Staged,
-    output: &Path,
+    job: &Job,
     model: &Model,
     options: &WriteOptions,
     report: &mut Report,
 ) -> Result<(), Failure> {
-    let wrong = |name: &str, e: &dyn std::fmt::Display| Failure::usage(output.join(name), e);
+    let wrong = |name: &str, e: WriteError| write_failure(job.path, &job.output.join(name), e);
     let mesh = |name: &str, mesh: &TriMesh| {
-        planish_io::write_mesh(staged.path(name), mesh, options).map_err(|e| wrong(name, &e))
+        placed::write(&staged.path(name), mesh, &FeatureTags::default(), model.shift, options)
+            .map_err(|e| wrong(name, e))
     };
-    let step = StepInput {
-        network: &model.network,
-        surfaces: &model.surfaces,
-        units: model.units,
-        name: &options.name,
-        time: None,
-    };
+    let surfaces = placed::surfaces(model);
+    let step =
+        StepInput { network: &model.network, surfaces: &surfaces, units: model.units, name: &options.name, time: None };
     mesh("mesh.ply", &model.mesh)?;
-    planish_io::write_model(staged.path("model.planish"), model).map_err(|e| wrong("model.planish", &e))?;
-    planish_io::write_step(staged.path("surface.step"), &step).map_err(|e| wrong("surface.step", &e))?;
-    write_relief(&staged.path("relief"), model, &mut report.quality).map_err(|e| wrong("relief", &e))?;
+    planish_io::write_model(staged.path("model.planish"), model)
+        .map_err(|e| Failure::usage(job.output.join("model.planish"), e))?;
+    planish_io::write_step(staged.path("surface.step"), &step).map_err(|e| wrong("surface.step", e))?;
+    write_relief(&staged.path("relief"), model, &mut report.quality).map_err(|e| wrong("relief", e))?;
     mesh("preview.glb", &pipeline::displaced_mesh(model, &crate::progress::Interrupt).map_err(Failure::fault)?)
+        .map(drop)
 }

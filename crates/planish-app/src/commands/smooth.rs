@@ -1,9 +1,10 @@
 //! `planish smooth`: noise off a mesh, features kept.
 
-use super::{Session, commit_report};
+use super::{Session, commit_report, write_failure};
 use crate::args::Smooth;
 use crate::failure::{Failure, Status};
 use crate::files;
+use crate::placed::{self, Placed};
 use crate::products::Staged;
 use crate::progress;
 use crate::summary::Summary;
@@ -17,19 +18,21 @@ pub fn smooth(session: &Session, args: &Smooth) -> Result<Status, Failure> {
     let staged = Staged::file(&args.output)?;
     let own_report = session.stage_report()?;
     let params = args.smooth.params(None)?;
-    let ((mesh, tags), read) = session.step("read", || files::tagged_mesh(&args.mesh))?;
-    let (made, record) = session.bars.step("smooth", |o| smooth_mesh(&mesh, tags.as_ref(), &params, o));
+    let (placed, read) = session.step("read", || Placed::read(&args.mesh))?;
+    let (mesh, tags, units) = (&placed.mesh, placed.tags.clone(), session.units_of(&args.mesh));
+    let (made, record) = session.bars.step("smooth", |o| smooth_mesh(mesh, tags.as_ref(), &params, o));
     if progress::interrupted() {
         return Err(Failure::interrupted());
     }
     let made = made.map_err(|e| {
         Failure::input(&args.mesh, super::with_hint(&e.to_string())).hint("look for faults with `planish info`")
     })?;
-    let options = WriteOptions { units: session.units(), ..WriteOptions::default() };
+    let options = WriteOptions { units, ..WriteOptions::default() };
     let tags = tags.unwrap_or_default();
-    planish_io::write_tagged_mesh(staged.file_path(), &made.mesh, &tags, &options)
-        .map_err(|e| Failure::usage(&args.output, e))?;
-    let mut report = Report::new("smooth", files::mesh_facts(&args.mesh, &mesh, session.units()));
+    let moved = placed::write(&staged.file_path(), &made.mesh, &tags, placed.shift, &options)
+        .map_err(|e| write_failure(&args.mesh, &args.output, e))?;
+    let mut report = Report::new("smooth", files::mesh_facts(&args.mesh, mesh, units));
+    report.warnings.extend(placed.warning(units.symbol()).into_iter().chain(moved));
     report.stages = vec![read, record];
     report.quality.insert("mesh.triangles".into(), Figure::Count(made.mesh.triangles.len() as u64));
     report.quality.insert("mesh.noise".into(), Figure::Number(made.noise));

@@ -1,0 +1,73 @@
+//! What was asked for and not reached: by how much, which limit it met, and the option that moves that limit.
+
+use crate::tolerance::{Scale, Tolerance};
+use planish::model::{Model, Units};
+use planish::network::CurveKind;
+use planish::pipeline::{PipelineParams, Warning};
+use planish::surface::deviation_of;
+use planish_io::report::{Report, count, number};
+
+/// Patches beyond this many times the number that was asked for, or below its inverse, are told.
+const PATCHES_OFF: f64 = 1.5;
+
+/// A demanded tolerance as a share of the diagonal of the input.
+pub fn share(demanded: Option<Tolerance>, report: &Report, units: Units) -> Option<f64> {
+    demanded.map(|tolerance| tolerance.share(Scale { diagonal: report.input.diagonal, units }))
+}
+
+/// Which limit kept the surfaces from a demanded tolerance.
+/// * `share` - the tolerance, of the diagonal
+pub fn tolerance(model: &Model, params: &PipelineParams, share: Option<f64>, scale: Scale) -> Option<Warning> {
+    let wanted = share? * scale.diagonal;
+    let rms: Vec<f64> = model.surfaces.iter().zip(&model.grids).map(|(s, g)| deviation_of(s, g).rms).collect();
+    let over: Vec<usize> = (0..rms.len()).filter(|&p| rms[p] > wanted).collect();
+    let worst = *over.iter().max_by(|&&a, &&b| rms[a].total_cmp(&rms[b]))?;
+    let (surface, grid) = (&model.surfaces[worst], &model.grids[worst]);
+    let cells = params.fit.cells_per_span;
+    // As many control points as the spans that the grid has room for.
+    let most = |points: usize| ((points - 1) as f64 / cells) as usize + 3;
+    let is_full = surface.cols >= most(grid.cols) || surface.rows >= most(grid.rows);
+    let limit = match is_full {
+        true if cells > 1.0 => format!(
+            "its {} x {} grid points carry no more control points with --cells-per-span {cells}: lower that, or raise --density",
+            grid.cols, grid.rows
+        ),
+        true => format!("its {} x {} grid points carry no more control points: raise --density", grid.cols, grid.rows),
+        false if params.fit.smoothing > 0.0 => format!(
+            "its {} x {} control points are held back by --fit-smoothing {}: lower that, or give more with --control",
+            surface.cols, surface.rows, params.fit.smoothing
+        ),
+        false => format!("it has {} x {} control points: give more with --control", surface.cols, surface.rows),
+    };
+    let unit = scale.units.symbol();
+    let text = format!(
+        "{} of {} patches miss the tolerance of {} {unit}, patch {worst} by most with {} {unit} RMS: {limit}.",
+        count(over.len() as u64),
+        count(rms.len() as u64),
+        number(wanted),
+        number(rms[worst])
+    );
+    Some(Warning::new("tolerance_missed", text, format!("patch {worst}")))
+}
+
+/// Why there are far more or fewer patches than were asked for.
+pub fn patches(model: &Model, wanted: Option<u64>) -> Option<Warning> {
+    let (wanted, found) = (wanted?, model.network.patches.len() as u64);
+    let ratio = found as f64 / wanted as f64;
+    if (1.0 / PATCHES_OFF..=PATCHES_OFF).contains(&ratio) {
+        return None;
+    }
+    let sharp = model.network.curves.iter().filter(|c| c.kind == CurveKind::Feature).count() as u64;
+    let reason = if ratio < 1.0 {
+        "the mesh has no room for more: give a finer one".to_owned()
+    } else if sharp > found / 4 {
+        format!(
+            "{} curves follow sharp edges, which bound patches: a greater --sharp-angle-deg or --feature-length leaves edges out",
+            count(sharp)
+        )
+    } else {
+        "limbs, tips and handles need patches of their own: draw a coarser network with `planish edit`".to_owned()
+    };
+    let text = format!("{} patches where {} were asked for: {reason}.", count(found), count(wanted));
+    Some(Warning::new("patches_missed", text, ""))
+}

@@ -1,0 +1,113 @@
+//! Options are checked before the work: each in its range, and against each other.
+
+mod common;
+
+use common::*;
+use std::fs;
+use std::time::{Duration, Instant};
+
+#[test]
+fn options_that_cannot_be_are_told_in_one_line_of_status_2_within_a_second() {
+    let folder = tempfile::tempdir().unwrap();
+    // Computing on it would take minutes.
+    write_box(&folder.path().join("box.ply"), 24);
+    for (args, words) in [
+        ("run box.ply -o out --control 3x3", "2 whole numbers from 4 to 8193"),
+        ("run box.ply -o out --control 1000000x1000000", "2 whole numbers from 4 to 8193"),
+        ("run box.ply -o out --control 12", "2 whole numbers"),
+        ("run box.ply -o out --control 2000x4", "lower it, or raise --max-side"),
+        ("run box.ply -o out --tolerance -1", "a number above 0"),
+        ("run box.ply -o out --tolerance 0", "a number above 0"),
+        ("run box.ply -o out --tolerance nan", "a number above 0"),
+        ("run box.ply -o out --tolerance 1e999mm", "a number above 0"),
+        ("run box.ply -o out --tolerance 0.02 --control 8x8", "cannot be used with"),
+        ("run box.ply -o out --per-curve 4", "give it with --network"),
+        ("run box.ply -o out --min-side 1000 --max-side 10", "lower the first or raise the second"),
+        ("run box.ply -o out --patches 100001", "from 0 to 100000"),
+        ("run box.ply -o out --patches 5mm", "a whole number"),
+        ("run box.ply -o out --density inf", "a number from"),
+        ("run box.ply -o out --units furlong", "use one of mm, cm, m, in"),
+        ("run box.ply -o out --memory 0", "a number above 0"),
+        ("run box.ply -o out --threads 0", "--threads"),
+        ("fit box.ply -o m.planish --per-curve 4,4", "give it with --network"),
+        ("fit box.ply -o m.planish --cells-per-span nan", "a number from"),
+        ("layout box.ply -o n.json --sharp-angle-deg 181", "from 1 to 180"),
+        ("decimate box.ply -o d.ply --ratio 0", "above 0 and up to 1"),
+        ("decimate box.ply -o d.ply --ratio 1.5", "above 0 and up to 1"),
+        ("decimate box.ply -o d.ply --tolerance 5ft", "a number above 0"),
+        ("compare box.ply box.ply --tolerance -0.1", "a number above 0"),
+        ("smooth box.ply -o s.ply --strength 11", "from 0 to 10"),
+        ("mesh box.ply -o s.ply --voxel 0", "a number above 0"),
+        ("demo --stations 0 -o demo", "from 1 to 160"),
+        ("demo --no-such-option", "unexpected argument"),
+        ("run", "required arguments were not provided"),
+    ] {
+        let since = Instant::now();
+        let output = planish(&args.split_whitespace().collect::<Vec<_>>(), folder.path());
+        assert_eq!(status(&output), 2, "{args}: {}", stderr(&output));
+        let line = error_line(&output);
+        assert!(line.contains(words) && line.contains(" - hint: ") && line.len() < 400, "{args}: {line}");
+        assert!(since.elapsed() < Duration::from_secs(1), "{args}: {:?}", since.elapsed());
+        assert_eq!(names(folder.path()), ["box.ply"], "{args}");
+    }
+}
+
+#[test]
+fn counts_for_each_curve_are_held_against_the_network_before_the_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    write_box(&folder.path().join("box.ply"), 6);
+    let layout = planish(&["layout", "box.ply", "-q", "-o", "n.json", "--patches", "6"], folder.path());
+    assert_eq!(status(&layout), 0, "{}", stderr(&layout));
+    let fit = |counts: &str| {
+        let args = ["fit", "box.ply", "--network", "n.json", "-v", "-o", "m.planish", "--per-curve", counts];
+        planish(&args, folder.path())
+    };
+    let output = fit("5,5,5");
+    assert_eq!(status(&output), 2, "{}", stderr(&output));
+    let told = stderr(&output);
+    assert!(told.contains("--per-curve: has 3 numbers for the 12 curves") && !told.contains("surfaces"), "{told}");
+    let output = fit(&["5"; 12].join(","));
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+}
+
+#[test]
+fn a_missed_tolerance_and_a_missed_number_of_patches_name_the_limit_and_the_option_that_moves_it() {
+    let folder = tempfile::tempdir().unwrap();
+    // A wave that few control points cannot follow.
+    let (n, mut text) = (30, String::new());
+    let wave = |i: usize| (i as f64 * 1.9).sin() * 0.05;
+    for j in 0..=n {
+        for i in 0..=n {
+            text += &format!("v {} {} {}\n", i as f64 / n as f64, j as f64 / n as f64, wave(i) * wave(j) * 20.0);
+        }
+    }
+    for j in 0..n {
+        for i in 0..n {
+            let a = j * (n + 1) + i + 1;
+            text += &format!("f {} {} {} {}\n", a, a + 1, a + n + 2, a + n + 1);
+        }
+    }
+    fs::write(folder.path().join("wave.obj"), text).unwrap();
+    let fit = |tolerance: &str, more: &[&str]| {
+        let args = ["fit", "wave.obj", "-o", "m.planish", "--sharp-angle-deg", "170", "--tolerance", tolerance];
+        planish(&[&args, more].concat(), folder.path())
+    };
+    let output = fit("1e-7", &["--patches", "4"]);
+    assert_eq!(status(&output), 1, "{}", stderr(&output));
+    assert!(stderr(&output).contains("--cells-per-span 4: lower that, or raise --density"), "{}", stderr(&output));
+    assert!(stdout(&output).contains("missed: "), "{}", stdout(&output));
+    // One share of the diagonal and the lengths that it is (the box is 1 x 1 x 0.1): the same bytes.
+    let bytes = |tolerance: &str| {
+        let output = fit(tolerance, &["--patches", "4", "-q"]);
+        assert!(status(&output) < 2, "{}", stderr(&output));
+        fs::read(folder.path().join("m.planish")).unwrap().len()
+    };
+    assert_ne!(bytes("20%"), bytes("0.001%"));
+    assert_eq!(bytes("0.02"), bytes("0.002cm"));
+    write_box(&folder.path().join("box.ply"), 6);
+    let output = planish(&["fit", "box.ply", "-o", "b.planish", "--patches", "1"], folder.path());
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    let told = stderr(&output);
+    assert!(told.contains("patches where 1 were asked for: 12 curves follow sharp edges"), "{told}");
+    assert!(told.contains("a greater --sharp-angle-deg"), "{told}");
+}
