@@ -1,0 +1,190 @@
+//! Networks of four-sided patches, and grids of them.
+
+use crate::error::{told, told_of};
+use crate::objects::{Body, PyMesh, PyModel, PyNetwork};
+use crate::params::{Given, pipeline_params};
+use crate::surface::PyGrid;
+use crate::{array, json, watch};
+use numpy::{PyArray1, PyArray2};
+use planish::curve::SurfaceCurve;
+use planish::network::{CurveKind, Network, diagnose, imprint};
+use planish::pipeline::{self, PipelineError, PipelineParams};
+use planish::{DVec3, grid};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use serde_json::json;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What is left to do until a network is finished, as a dict: `finished`, and `faults` as texts.
+pub fn told_faults<'py>(py: Python<'py>, body: &Body, network: &Network) -> PyResult<Bound<'py, PyAny>> {
+    let found = watch::sure(py, "network", |_| diagnose(&body.mesh, body.adjacency(), network))?;
+    let faults: Vec<String> = found.faults.iter().map(|f| f.to_string()).collect();
+    let finished = found.is_finished() && !network.patches.is_empty();
+    json::to(py, &json!({ "finished": finished, "faults": faults, "patches": network.patches.len() }))
+}
+
+#[pymethods]
+impl PyNetwork {
+    /// Reads a network (.json) that was made for `mesh`, as repair leaves it. Raises FileError.
+    #[staticmethod]
+    fn read(py: Python, path: PathBuf, mesh: &PyMesh) -> PyResult<PyNetwork> {
+        let body = repaired(py, mesh)?;
+        let network = planish_io::read_network(&path, &body.mesh).map_err(|e| told_of(py, &path, &e))?;
+        Ok(PyNetwork::new(body, network, json!({})))
+    }
+
+    /// Reads the text that `to_json` writes; the mesh as `read`. Raises FileError.
+    #[staticmethod]
+    fn from_json(py: Python, text: &str, mesh: &PyMesh) -> PyResult<PyNetwork> {
+        let body = repaired(py, mesh)?;
+        let network = planish_io::parse_network(text.as_bytes(), &body.mesh).map_err(|e| told(py, &e))?;
+        Ok(PyNetwork::new(body, network, json!({})))
+    }
+
+    /// The text of its file.
+    fn to_json(&self) -> String {
+        planish_io::network_json(&self.network, &self.body.mesh)
+    }
+
+    /// Writes it as .json. Raises FileError.
+    fn write(&self, py: Python, path: PathBuf) -> PyResult<()> {
+        planish_io::write_network(&path, &self.network, &self.body.mesh).map_err(|e| told_of(py, &path, &e))
+    }
+
+    /// The mesh that it lies on: the repaired one.
+    #[getter]
+    fn mesh(&self) -> PyMesh {
+        PyMesh::shared(self.body.clone())
+    }
+
+    /// Positions of the corners, (n, 3), world units.
+    #[getter]
+    fn corners<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let at: Vec<DVec3> = self.network.corners.iter().map(|c| c.place.position(&self.body.mesh)).collect();
+        array::vectors(py, at)
+    }
+
+    /// The curves: positions from corner to corner, (k, 3) each, world units.
+    #[getter]
+    fn curves<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        let course = |c: &planish::network::Curve| SurfaceCurve::open(c.points.clone()).positions(&self.body.mesh);
+        self.network.curves.iter().map(|c| array::vectors(py, course(c))).collect()
+    }
+
+    /// Corners at the start and the end of each curve, (curves, 2) uint32.
+    #[getter]
+    fn curve_corners<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        array::rows(py, self.network.curves.iter().map(|c| c.corners).collect())
+    }
+
+    /// What each curve follows: "smooth" surface, a sharp "feature", or the "boundary".
+    #[getter]
+    fn curve_kinds(&self) -> Vec<&'static str> {
+        let word = |kind| match kind {
+            CurveKind::Smooth => "smooth",
+            CurveKind::Feature => "feature",
+            CurveKind::Boundary => "boundary",
+        };
+        self.network.curves.iter().map(|c| word(c.kind)).collect()
+    }
+
+    /// The four curves of each patch, (patches, 4) uint32, counter-clockwise seen from outside.
+    #[getter]
+    fn patches<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        array::rows(py, self.network.patches.iter().map(|p| p.sides.map(|s| s.curve)).collect())
+    }
+
+    /// The four corners of each patch, (patches, 4) uint32, counter-clockwise seen from outside.
+    #[getter]
+    fn patch_corners<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let four = |p: usize| [0, 1, 2, 3].map(|k| self.network.corner(p, k));
+        array::rows(py, (0..self.network.patches.len()).map(four).collect())
+    }
+
+    /// The chord of each curve, (curves,) uint32: curves on opposite sides of a patch share one, and their counts.
+    #[getter]
+    fn chords<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        PyArray1::from_vec(py, self.network.chords())
+    }
+
+    /// What the layout tells of itself.
+    #[getter]
+    fn facts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        json::to(py, &self.facts)
+    }
+
+    /// What is left to do until every part of the mesh is a patch: a dict of `finished`, `patches`, `faults`.
+    fn diagnose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        told_faults(py, &self.body, &self.network)
+    }
+
+    /// The patches resampled to regular grids, one each. Raises NetworkError, GridError.
+    ///
+    /// Source: Krishnamurthy 1998, chapter 5.
+    #[pyo3(signature = (*, progress=None, **parameters))]
+    fn grids(
+        &self,
+        py: Python,
+        progress: Option<&Bound<PyAny>>,
+        parameters: Option<&Bound<PyDict>>,
+    ) -> PyResult<Vec<PyGrid>> {
+        let mut given = Given::new("Network.grids", parameters)?;
+        let params = given.take()?;
+        given.done()?;
+        let (mesh, network) = (&self.body.mesh, &self.network);
+        let grids = watch::run(py, "grids", progress, |o| -> Result<_, PipelineError> {
+            let patches = imprint(mesh, network, o.one())?;
+            Ok(grid::resample(mesh, network, &patches, (&[], &[]), &params, o.one())?)
+        })?;
+        Ok(grids.into_iter().map(PyGrid::new).collect())
+    }
+
+    /// Grids, surfaces, seams and reliefs on this network: a model. Raises the error of the first stage that fails.
+    ///
+    /// * tolerance, control, per_curve: how fine the surfaces are; one of them
+    #[pyo3(signature = (*, units="mm", progress=None, **parameters))]
+    fn fit(
+        &self,
+        py: Python,
+        units: &str,
+        progress: Option<&Bound<PyAny>>,
+        parameters: Option<&Bound<PyDict>>,
+    ) -> PyResult<PyModel> {
+        let params = pipeline_params("Network.fit", PipelineParams::default(), parameters)?;
+        let units = crate::words::units(units)?;
+        let network = self.network.clone();
+        let fit = |o: &dyn watch::Both| pipeline::fit(&self.body.mesh, None, Some(network), &params, o.run());
+        PyModel::fitted(watch::run(py, "fit", progress, fit)?, &params, units)
+    }
+
+    fn __repr__(&self) -> String {
+        let Network { corners, curves, patches } = &self.network;
+        format!("<planish.Network: {} patches, {} curves, {} corners>", patches.len(), curves.len(), corners.len())
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        crate::neighbour::of(slf.as_any(), "planish._picture", "html")
+    }
+
+    /// A picture of the curves on the mesh, (height, width, 4) uint8; see `Mesh.picture`. Raises RenderError.
+    #[pyo3(signature = (width=640, height=480, *, eye=None, up=None))]
+    fn picture<'py>(
+        &self,
+        py: Python<'py>,
+        width: usize,
+        height: usize,
+        eye: Option<&Bound<PyAny>>,
+        up: Option<&Bound<PyAny>>,
+    ) -> PyResult<Bound<'py, numpy::PyArray3<u8>>> {
+        let view = crate::picture::View::of(eye, up)?;
+        let lines = crate::picture::lines(&self.body.mesh, &self.network);
+        crate::picture::draw(py, &self.body.mesh, lines, &view, [width, height])
+    }
+}
+
+/// The mesh as repair leaves it: networks lie on that.
+fn repaired(py: Python, mesh: &PyMesh) -> PyResult<Arc<Body>> {
+    let (made, _) = watch::run(py, "repair", None, |o| planish::mend::repair(&mesh.body.mesh, o.one()))?;
+    Ok(if made == mesh.body.mesh { mesh.body.clone() } else { Body::new(made, None) })
+}
