@@ -1,7 +1,8 @@
 # planish - one line per errand.
 #
 #   make demo    build the program and run everything on a synthetic part: products in out/demo
-#   make test    all tests: the library, the program, and files read back by other programs' libraries
+#   make test    all tests: the library, the program, files read back by other programs' libraries
+#   make wheel   the Python package with the program inside: out/wheels
 #   make lint    formatting and clippy, warnings are errors
 #   make bench   time every stage: bench/runs/<date>-<machine>.json
 #   make figures headline figures of parts and measured meshes: bench/runs/<date>-<machine>-figures.json
@@ -16,7 +17,7 @@ PYTHON  := .venv/bin/python
 DATA    := $(or $(PLANISH_DATA),../shared/data)
 
 .NOTPARALLEL:
-.PHONY: build demo test test-rust test-readers lint bench figures docs clean
+.PHONY: build demo wheel test test-rust test-readers test-python lint bench figures docs clean
 .DELETE_ON_ERROR:
 
 build: .stamp/packages
@@ -37,6 +38,15 @@ test-rust: .stamp/packages .stamp/readers
 test-readers: .stamp/packages .stamp/readers
 	$(CARGO) test --release --locked --workspace --no-run --quiet
 	$(PYTHON) -m pytest -q -rs tests/readers
+
+wheel: .stamp/packages .stamp/python
+	rm -rf out/wheels
+	.venv/bin/maturin build --locked --quiet --out out/wheels
+
+# On the wheel as users install it. It shares what the tests above have compiled; PyO3 alone is compiled for it.
+test-python: wheel
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall out/wheels/*.whl
+	$(PYTHON) -m pytest crates/planish-py/tests
 
 lint: .stamp/packages
 	$(CARGO) fmt --all --check
@@ -73,6 +83,14 @@ clean:
 .stamp/readers: tests/readers/requirements.txt .ci/packages
 	@mkdir -p .stamp
 	.ci/packages readers
+	test -x $(PYTHON) || python3 -m venv .venv
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check -r $<
+	@touch $@
+
+# What builds the wheel and tests it.
+.stamp/python: crates/planish-py/tests/requirements.txt .ci/packages
+	@mkdir -p .stamp
+	.ci/packages python
 	test -x $(PYTHON) || python3 -m venv .venv
 	$(PYTHON) -m pip install --quiet --disable-pip-version-check -r $<
 	@touch $@

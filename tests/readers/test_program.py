@@ -40,7 +40,7 @@ def test_the_demonstration_is_near_its_truth_and_finds_its_sharp_edges(report):
     quality = report["quality"]
     # A third of the points of the real one: half a noise level away on the average.
     assert quality["truth.mesh_rms_rel"] < 0.0003 and quality["truth.displaced_rms_rel"] < 0.0003
-    assert quality["scan.noise_rel"] == pytest.approx(quality["truth.noise_rel"], rel=0.25)
+    assert quality["scan.noise_rel"] == pytest.approx(quality["truth.noise_rel"], rel=0.3)
     assert quality["truth.outliers"] * 0.6 < quality["scan.outliers"] < quality["truth.outliers"] * 3
     assert quality["truth.sharp_found"] > 0.89 and quality["truth.sharp_met"] > 0.7
     assert quality["scan.confidence"] > 0.999 and quality["truth.mesh_topology"] is True

@@ -39,13 +39,24 @@ def static(owner, name):
     return getattr(owner, name + "_s", None) or getattr(owner, name)
 
 
-@pytest.fixture(scope="module")
-def shape(demo):
+def read(path, unit="MM"):
+    """The shape of a STEP file, in a unit."""
     reader = STEPControl_Reader()
-    static(Interface_Static, "SetCVal")("xstep.cascade.unit", "MM")
-    assert reader.ReadFile(str(demo / "surface.step")) == IFSelect_RetDone
+    static(Interface_Static, "SetCVal")("xstep.cascade.unit", unit)
+    assert reader.ReadFile(str(path)) == IFSelect_RetDone
     reader.TransferRoots()
     return reader.OneShape()
+
+
+def faces_of(path, unit="MM"):
+    """The surfaces of the faces of a STEP file."""
+    surface = static(BRep_Tool, "Surface")
+    return [surface(cast("Face", face)) for face in parts(read(path, unit), TopAbs_FACE)]
+
+
+@pytest.fixture(scope="module")
+def shape(demo):
+    return read(demo / "surface.step")
 
 
 @pytest.fixture(scope="module")
