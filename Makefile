@@ -32,7 +32,7 @@ test: test-rust test-readers
 # PLANISH_PYTHON: tests of the file formats read their files back with other libraries, too.
 test-rust: .stamp/packages .stamp/readers
 	@test -d "$(DATA)" || echo "skipped: the tests on measured meshes; there is no $(DATA), and PLANISH_DATA names none"
-	PLANISH_PYTHON=$(abspath $(PYTHON)) $(CARGO) test --release --locked --workspace
+	PLANISH_PYTHON=$(abspath $(PYTHON)) $(CARGO) test --release --locked --workspace --no-fail-fast
 
 # The program as the tests above have built it; `build` would compile what depends on test-only features again.
 test-readers: .stamp/packages .stamp/readers
