@@ -182,7 +182,7 @@ fn a_project_of_schema_1_is_read_without_a_sketch_and_steps_and_written_as_schem
         let database = rusqlite::Connection::open(p).unwrap();
         database.pragma_query_value(None, "user_version", |row| row.get(0)).unwrap()
     };
-    assert_eq!(version(&path), 2);
+    assert_eq!(version(&path), 3);
 }
 
 #[test]
@@ -208,7 +208,7 @@ fn newer_schema_other_programs_truncated_and_damaged_files_are_refused_with_a_hi
         let message = read_model(file(&folder, "b.planish", bytes)).map(|_| wanted).unwrap_err().to_string();
         assert!(message.contains(wanted) && message.contains(" - hint: ") && !message.contains('\n'), "{message}");
     };
-    refused(&|b| b[63] = 7, "its schema is version 7, newer than 2 that this planish knows - hint: update planish");
+    refused(&|b| b[63] = 7, "its schema is version 7, newer than 3 that this planish knows - hint: update planish");
     refused(&|b| b[68..72].fill(0), "it is a database of another program (application id 0x00000000)");
     refused(&|b| b.clear(), "it is not a planish project");
     refused(&|b| b[0] = b'X', "it is not a planish project");
