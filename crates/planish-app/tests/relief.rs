@@ -145,7 +145,7 @@ fn a_model_is_parted_leveled_and_gets_detail_from_another() {
     for (args, words) in [
         (&["relief", "transfer", "box.planish", "-o", "x.planish"][..], "needs FROM.planish"),
         (&["relief", "transfer", "box.planish", "-o", "x.planish", "--pairs", "0:99"], "no patch 99 among"),
-        (&["relief", "transfer", "box.planish", "-o", "x.planish", "--pairs", "0-1"], "no list of pairs"),
+        (&["relief", "transfer", "box.planish", "-o", "x.planish", "--pairs", "0-1"], "two patches are needed"),
     ] {
         let output = planish(args, at);
         assert_eq!(status(&output), 2);

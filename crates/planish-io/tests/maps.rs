@@ -9,7 +9,7 @@ use planish::relief::maps::{self, AxisOrder, MapFrame, MapKind, MapParams, Patch
 use planish::relief::{Displaced, Relief};
 use planish::surface::{Surface, fit};
 use planish::{DVec3, Silent, Units};
-use planish_io::maps::{MapFile, MapOptions, as_read, materialx, read_maps, read_picture, write_maps};
+use planish_io::maps::{MapFile, MapOptions, as_read, materialx, other_ways, read_maps, read_picture, write_maps};
 
 /// Two patches side by side on a bent sheet, with a relief of waves.
 struct Pair {
@@ -142,6 +142,12 @@ fn rounding_stays_within_the_bound_and_makes_files_smaller() {
     };
     let sizes = [None, Some(1e-5), Some(1e-4), Some(1e-3)].map(size);
     assert!(sizes.windows(2).all(|w| w[1] < w[0]), "{sizes:?}");
+    let [(half, half_error), (dwa, dwa_error)] = other_ways(&all, &sheet).unwrap();
+    assert!(half < sizes[0] && dwa < sizes[0], "{half} {dwa} {sizes:?}");
+    assert!(
+        half_error > 0.0 && half_error < 1e-4 && dwa_error > half_error && dwa_error < 2e-2,
+        "{half_error} {dwa_error}"
+    );
 }
 
 #[test]

@@ -235,6 +235,27 @@ pub struct ReliefLevel {
     pub stages: AllStages,
 }
 
+/// A patch and where its detail goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pair {
+    /// The patch.
+    pub from: u32,
+    /// The patch that gets its detail.
+    pub to: u32,
+    /// Quarters by which it is turned against the clock.
+    pub turns: u32,
+}
+
+fn pair(text: &str) -> Result<Pair, String> {
+    let parts = || {
+        let (from, to) = text.trim().split_once(':')?;
+        let (to, turns) = to.split_once('@').unwrap_or((to, "0"));
+        let turns = turns.trim().parse().ok().filter(|t| *t < 4)?;
+        Some(Pair { from: from.trim().parse().ok()?, to: to.trim().parse().ok()?, turns })
+    };
+    parts().ok_or_else(|| "two patches are needed, 3:7, and turned by quarters 3:7@1".into())
+}
+
 /// `planish relief transfer`
 #[derive(Args, Debug)]
 pub struct ReliefTransfer {
@@ -249,8 +270,8 @@ pub struct ReliefTransfer {
     pub output: PathBuf,
     /// Patches and where their detail goes, instead of the closest points in space: 3:7,3:8@1 puts that of patch 3 on 7, and
     /// on 8 turned by a quarter
-    #[arg(long, value_name = "PAIRS")]
-    pub pairs: Option<String>,
+    #[arg(long, value_name = "PAIRS", value_parser = pair, value_delimiter = ',')]
+    pub pairs: Vec<Pair>,
     /// Take nothing over from further away than this: a length or a share of the diagonal
     #[arg(long, value_name = "LENGTH|%", default_value = "2%", allow_negative_numbers = true)]
     pub reach: Tolerance,

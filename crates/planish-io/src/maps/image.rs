@@ -106,7 +106,28 @@ fn names(channels: usize) -> Vec<String> {
     }
 }
 
+/// Bytes of an image with half floats, in lossless ZIP or in DWA as studios use it, and its largest error in a pixel.
+pub(super) fn lossy(raster: &Raster, dwa: bool) -> Result<(u64, f64), WriteError> {
+    let mut bytes = Cursor::new(Vec::new());
+    let compression = if dwa { Compression::DWAA(None) } else { Compression::ZIP16 };
+    let failed = |e: &dyn std::fmt::Display| WriteError::Image(e.to_string());
+    write_exr_as(&mut bytes, raster, (true, compression), "").map_err(|e| failed(&e))?;
+    let back = read_exr(bytes.get_ref()).map_err(|e| failed(&e))?;
+    let pixels = raster.values.chunks_exact(raster.channels).zip(back.values.chunks_exact(back.channels));
+    let far = |(a, b): (&[f32], &[f32])| a.iter().zip(b).map(|(x, y)| (*x as f64 - *y as f64).powi(2)).sum::<f64>();
+    Ok((bytes.get_ref().len() as u64, pixels.map(far).fold(0.0, f64::max).sqrt()))
+}
+
 fn write_exr(out: &mut Cursor<Vec<u8>>, raster: &Raster, half: bool, note: &str) -> exr::error::UnitResult {
+    write_exr_as(out, raster, (half, Compression::ZIP16), note)
+}
+
+fn write_exr_as(
+    out: &mut Cursor<Vec<u8>>,
+    raster: &Raster,
+    (half, compression): (bool, Compression),
+    note: &str,
+) -> exr::error::UnitResult {
     let channel = |k: usize| raster.values.iter().skip(k).step_by(raster.channels).copied();
     let list = names(raster.channels).into_iter().enumerate().map(|(k, name)| {
         let samples = if half {
@@ -116,11 +137,7 @@ fn write_exr(out: &mut Cursor<Vec<u8>>, raster: &Raster, half: bool, note: &str)
         };
         AnyChannel::new(name.as_str(), samples)
     });
-    let encoding = Encoding {
-        compression: Compression::ZIP16,
-        blocks: exr::image::Blocks::ScanLines,
-        line_order: LineOrder::Increasing,
-    };
+    let encoding = Encoding { compression, blocks: exr::image::Blocks::ScanLines, line_order: LineOrder::Increasing };
     let attributes = LayerAttributes { comments: Some(Text::from(note)), ..LayerAttributes::default() };
     let channels = AnyChannels::sort(list.collect());
     let layer = Layer::new((raster.width, raster.height), attributes, encoding, channels);

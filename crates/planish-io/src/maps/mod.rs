@@ -61,9 +61,7 @@ impl Coding {
             (true, Some(MapKind::Length) | None) => (0.0, most),
             (true, Some(_)) => (0.5, 2.0 * most),
         };
-        let channels = kind.map_or(1, MapKind::channels) as f64;
-        // A power of two, so that its multiples end in zeros and compress. Half a step in each channel is the error.
-        let step = max_error.map_or(0.0, |e| (2.0 * e / channels.sqrt()).log2().floor().exp2());
+        let step = max_error.map_or(0.0, |e| step_of(e, kind.map_or(1, MapKind::channels)));
         Coding { file, mid_level, scale, step }
     }
 
@@ -77,6 +75,14 @@ impl Coding {
     fn meant(&self, held: f32) -> f32 {
         ((held as f64 - self.mid_level) * self.scale) as f32
     }
+}
+
+/// The step whose multiples are at most `error` from any vector of `channels` numbers: half a step in each. It has three binary
+/// digits, so that its multiples end in zeros and compress.
+fn step_of(error: f64, channels: usize) -> f64 {
+    let most = 2.0 * error / (channels as f64).sqrt();
+    let power = most.log2().floor().exp2();
+    (most / power * 4.0).floor() / 4.0 * power
 }
 
 /// A sum over the control points, to tell maps of another model.
@@ -215,6 +221,20 @@ fn painted(maps: &[PatchMap], sheet: &Sheet, image: usize, coding: &Coding) -> R
     Raster { width, height, channels, values }
 }
 
+/// What other ways to write the same maps take: bytes of all images and the largest error, as half floats in lossless ZIP and in DWA.
+/// # Errors
+/// `WriteError::Image` if the image library refuses.
+pub fn other_ways(maps: &[PatchMap], sheet: &Sheet) -> Result<[(u64, f64); 2], WriteError> {
+    let coding = Coding { file: MapFile::Exr, mid_level: 0.0, scale: 1.0, step: 0.0 };
+    let way = |dwa: bool| -> Result<(u64, f64), WriteError> {
+        let one = |k: usize| image::lossy(&painted(maps, sheet, k, &coding), dwa);
+        let each: Vec<(u64, f64)> =
+            (0..sheet.images.len()).into_par_iter().map(one).collect::<Result<_, WriteError>>()?;
+        Ok((each.iter().map(|e| e.0).sum(), each.iter().map(|e| e.1).fold(0.0, f64::max)))
+    };
+    Ok([way(false)?, way(true)?])
+}
+
 fn turn(raster: &mut Raster) {
     let row = raster.width * raster.channels;
     let turned = raster.values.chunks_exact(row).rev().flatten().copied().collect();
@@ -291,8 +311,7 @@ fn coding_of(sidecar: &Sidecar) -> Coding {
 
 /// The numbers of maps as they come back from files: what was written of them with the scale of `sidecar`.
 pub fn as_read(maps: Vec<PatchMap>, sidecar: &Sidecar) -> Vec<PatchMap> {
-    let channels = sidecar.params.kind.channels() as f64;
-    let step = sidecar.max_error.map_or(0.0, |e| (2.0 * e / channels.sqrt()).log2().floor().exp2());
+    let step = sidecar.max_error.map_or(0.0, |e| step_of(e, sidecar.params.kind.channels()));
     let coding = Coding { step, ..coding_of(sidecar) };
     let again = |mut map: PatchMap| {
         map.values.iter_mut().for_each(|x| *x = coding.meant(coding.coded(*x)));

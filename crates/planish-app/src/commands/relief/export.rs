@@ -13,7 +13,7 @@ use crate::tolerance::Scale;
 use planish::model::Model;
 use planish::pipeline::{Figure, Warning};
 use planish::relief::maps::{self, MapKind, MapParams, PatchMap, Preset, Sheet};
-use planish_io::maps::{MapFile, MapOptions, as_read, materialx, read_maps, write_maps};
+use planish_io::maps::{MapFile, MapOptions, as_read, materialx, other_ways, read_maps, write_maps};
 use planish_io::report::{Report, count, number};
 use planish_io::{MappedMesh, WriteOptions};
 use std::path::Path;
@@ -81,6 +81,15 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
     let (bytes, error) = measured(&folder, &made, &args.output)?;
     report.quality.insert("relief.map_bytes".into(), Figure::Count(bytes));
     report.quality.insert("relief.map_error_max".into(), Figure::Number(error));
+    let mut others = Vec::new();
+    if max_error.is_some() {
+        let ways = other_ways(&made, &sheet).map_err(failed)?;
+        for ((name, key), (bytes, error)) in [("half EXR", "half"), ("DWA EXR", "dwa")].into_iter().zip(ways) {
+            report.quality.insert(format!("relief.{key}_bytes"), Figure::Count(bytes));
+            report.quality.insert(format!("relief.{key}_error_max"), Figure::Number(error));
+            others.push((name, format!("{} bytes, error {} {}", count(bytes), number(error), model.units)));
+        }
+    }
     folds(&model, &mut report, &args.model)?;
     staged.commit()?;
     report.stages = vec![read, bake, write];
@@ -93,6 +102,9 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         table.row("images", format!("{} in {}", sidecar.images.len(), args.output.display()));
         table.row("bytes", count(bytes));
         table.row("largest", format!("{} {}", number(sidecar.largest), model.units));
+        for (name, value) in others {
+            table.row(format!("as {name}"), value);
+        }
         table.row("error", format!("{} {} at most, of what was written", number(error), model.units));
         table.print();
     }

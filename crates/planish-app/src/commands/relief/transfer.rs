@@ -2,7 +2,7 @@
 
 use super::super::Session;
 use super::{displaced, finish, open, wrong};
-use crate::args::relief::ReliefTransfer;
+use crate::args::relief::{Pair, ReliefTransfer};
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::progress::Interrupt;
@@ -14,50 +14,29 @@ use planish_io::report::{Report, count};
 
 pub fn transfer(session: &Session, args: &ReliefTransfer) -> Result<Status, Failure> {
     files::check_extension(&args.output, &["planish"])?;
-    let pairs = args.pairs.as_deref().map(pairs).transpose()?;
-    if pairs.is_none() && args.from.is_none() {
+    if args.pairs.is_empty() && args.from.is_none() {
         let what = "needs FROM.planish, the model that has the detail";
         return Err(Failure::usage("relief transfer", what).hint("name it, or name patches with --pairs"));
     }
     let (mut model, read) = open(session, &args.model)?;
     let from = args.from.as_ref().map(|path| open(session, path)).transpose()?.map(|(model, _)| model);
     let mut report = Report::new("relief transfer", files::model_facts(&args.model, &model, model.units));
-    let ((maps, told), record) = session.step("transfer", || carried(&model, from.as_ref(), pairs.as_deref(), args))?;
+    let ((maps, told), record) = session.step("transfer", || carried(&model, from.as_ref(), args))?;
     model.layers.begin(&model.reliefs);
     let stack = model.layers.with("transfer", maps);
-    let parameters = serde_json::json!({ "from": args.from, "pairs": args.pairs }).to_string();
+    let pairs: Vec<[u32; 3]> = args.pairs.iter().map(|p| [p.from, p.to, p.turns]).collect();
+    let parameters = serde_json::json!({ "from": args.from, "pairs": pairs }).to_string();
     model.record_relief(HistoryEntry { command: "relief transfer".into(), parameters }, stack);
     report.stages = vec![read, record];
     finish(session, &args.output, &model, report, vec![("transferred".into(), told)])
 }
 
-/// A patch with where its detail goes and by how many quarters it is turned.
-type Pair = (u32, u32, u32);
-
-fn pairs(text: &str) -> Result<Vec<Pair>, Failure> {
-    let one = |pair: &str| {
-        let (from, to) = pair.trim().split_once(':')?;
-        let (to, turns) = to.split_once('@').unwrap_or((to, "0"));
-        Some((from.trim().parse().ok()?, to.trim().parse().ok()?, turns.trim().parse().ok().filter(|t| *t < 4)?))
-    };
-    let all: Option<Vec<Pair>> = text.split(',').map(one).collect();
-    all.ok_or_else(|| {
-        let what = format!("'{text}' is no list of pairs of patches");
-        Failure::usage("--pairs", what).hint("write 3:7 or 3:7,3:8@1")
-    })
-}
-
-fn carried(
-    model: &Model,
-    from: Option<&Model>,
-    pairs: Option<&[Pair]>,
-    args: &ReliefTransfer,
-) -> Result<(Vec<Relief>, String), Failure> {
+fn carried(model: &Model, from: Option<&Model>, args: &ReliefTransfer) -> Result<(Vec<Relief>, String), Failure> {
     let failed = |e| wrong(&args.model, e);
     let shapes: Vec<[usize; 2]> = model.reliefs.iter().map(|r| [r.rows, r.cols]).collect();
     let ground = Ground::new(&model.network, &model.surfaces, shapes).map_err(failed)?;
     let source = from.unwrap_or(model);
-    let Some(pairs) = pairs else {
+    if args.pairs.is_empty() {
         let scale = Scale { diagonal: model.mesh.bounds().diagonal(), units: model.units };
         let reach = args.reach.length(scale);
         let (maps, missed) = layers::transfer(&ground, &displaced(source), reach, &Interrupt).map_err(failed)?;
@@ -66,9 +45,9 @@ fn carried(
             maps,
             format!("{} texels, {} too far away", count((texels - missed) as u64), count(missed as u64)),
         ));
-    };
+    }
     let mut maps: Vec<Relief> = model.reliefs.iter().map(|r| Relief { vectors: Vec::new(), ..*r }).collect();
-    for &(a, b, turns) in pairs {
+    for &Pair { from: a, to: b, turns } in &args.pairs {
         for (patch, count) in [(a, source.reliefs.len()), (b, model.reliefs.len())] {
             if patch as usize >= count {
                 return Err(Failure::usage("--pairs", format!("there is no patch {patch} among {count}"))
@@ -84,5 +63,5 @@ fn carried(
             }
         }
     }
-    Ok((maps, format!("{} pairs of patches", pairs.len())))
+    Ok((maps, format!("{} pairs of patches", args.pairs.len())))
 }

@@ -445,7 +445,7 @@ fn limited(ground: &Ground, now: &Displaced, limit: &Limit) -> Result<Made, Reli
             let over: Vec<(usize, f64)> = (0..relief.vectors.len())
                 .filter_map(|k| {
                     let (z, most) = (relief.vectors[k].z, allowed(k)?);
-                    (z.abs() > most.abs()).then(|| (k, most - z))
+                    (z.abs() > most.abs()).then_some((k, most - z))
                 })
                 .collect();
             if !over.is_empty() {

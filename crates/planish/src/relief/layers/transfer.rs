@@ -85,6 +85,7 @@ pub fn tile(ground: &Ground, source: &Relief, patches: &[u32], times: [u32; 2]) 
 /// The relief of another model at the closest points of its base surface, meant in space: both models have the same shape.
 ///
 /// * `reach` - further away than this nothing is taken over, units of the model
+///
 /// Returns the maps and the number of texels that found nothing.
 /// # Errors
 /// If the parts of the other model do not fit together; [`ReliefError::Cancelled`].

@@ -86,12 +86,12 @@ fn vectors(
     let world = |s: &Surface, r: &Relief, shape| spread(&world_vectors(s, r), [r.rows, r.cols], shape);
     if params.frame == MapFrame::Tangent {
         let frames = mesh_frames(displaced, shapes, observer)?;
-        let one = |(((s, r), &shape), frames): (((&Surface, &Relief), &[usize; 2]), &Vec<Frame>)| {
-            let fine = world(s, r, shape);
+        let one = |(p, frames): (usize, &Vec<Frame>)| {
+            let fine = world(&surfaces[p], &reliefs[p], shapes[p]);
             let vectors: Vec<DVec3> = fine.iter().zip(frames).map(|(d, f)| f.local_from_world(*d)).collect();
-            packed(shape, &vectors, params)
+            packed(shapes[p], &vectors, params)
         };
-        return Ok(surfaces.par_iter().zip(reliefs).zip(shapes).zip(&frames).map(one).collect());
+        return Ok(frames.par_iter().enumerate().map(one).collect());
     }
     let one = |((s, r), &shape): ((&Surface, &Relief), &[usize; 2])| {
         observer.check()?;
