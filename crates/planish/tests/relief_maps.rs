@@ -84,11 +84,11 @@ fn resampled_reliefs_open_no_crack_above_1e_14() {
     let displaced = Displaced { network: &work.network, surfaces: &surfaces, reliefs: &reliefs };
     assert!(relief::widest_crack(&displaced).unwrap() < 1e-14);
     for n in [9, 23, 64] {
-        let fine = relief::resample_all(&displaced, &vec![[n; 2]; 6]).unwrap();
+        let fine = relief::resample_all(&displaced, &[[n; 2]; 6]).unwrap();
         let crack = relief::widest_crack(&Displaced { reliefs: &fine, ..displaced }).unwrap();
         assert!(crack < 1e-14, "{n}: {crack:e}");
     }
-    let same = relief::resample_all(&displaced, &vec![[17; 2]; 6]).unwrap();
+    let same = relief::resample_all(&displaced, &[[17; 2]; 6]).unwrap();
     assert_eq!(same, reliefs);
 }
 
@@ -185,7 +185,7 @@ fn attributes_that_are_linear_on_the_mesh_are_linear_in_the_map() {
     let values = vec![0.0, 1.0, 1.0, 1.0, 1.0, 3.0, 0.0, 3.0];
     mesh.attributes.push(Attribute { name: "heat".into(), width: 2, values });
     // u on the first number, 1 + 2 v on the second... at the corners of a square.
-    let mut grid = grid(5, 5, |u, v| corner(u, v));
+    let mut grid = grid(5, 5, corner);
     let place = |k: usize| {
         let (u, v) = ((k % 5) as f64 / 4.0, (k / 5) as f64 / 4.0);
         if u >= v {
