@@ -1,6 +1,7 @@
 //! What the user can say: commands in the order of the pipeline, and their options.
 
 pub mod groups;
+pub mod relief;
 pub mod stages;
 
 pub use groups::{Common, HoleArgs, Policy, ScanArgs};
@@ -60,6 +61,10 @@ pub enum Command {
     Fit(Fit),
     /// Model and script -> the model with curves, corners and feature curves edited
     Edit(Edit),
+    /// Control points moved or loaded; the relief goes along
+    Deform(relief::Deform),
+    /// Displacement maps: export, import, edit, part, level, transfer
+    Relief(relief::Relief),
     /// Model -> STEP, IGES, USD, mesh, network or displacement maps; the format comes from the extension
     Export(Export),
     /// Distances and normal errors between any two meshes or models

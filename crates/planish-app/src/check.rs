@@ -1,5 +1,6 @@
 //! Options are checked before anything is read: each in its range by the parser, then against each other here.
 
+use crate::args::relief::ReliefCommand;
 use crate::args::{Command, Export, ExportWord, ScanArgs};
 use crate::failure::Failure;
 use crate::files;
@@ -39,8 +40,13 @@ pub fn check(command: &Command) -> Result<(), Failure> {
             a.stages.check_curves_known(a.network.is_some() || files::is_model(&a.input))
         }
         Command::Edit(a) => a.stages.params(None).map(drop),
+        Command::Relief(a) => match &a.command {
+            ReliefCommand::Export(a) => a.maps.params(None).map(drop),
+            ReliefCommand::Level(a) => a.stages.params(None).map(drop),
+            _ => Ok(()),
+        },
         Command::Export(a) => splines(a),
-        Command::Compare(_) | Command::Info(_) => Ok(()),
+        Command::Deform(_) | Command::Compare(_) | Command::Info(_) => Ok(()),
     }
 }
 

@@ -4,6 +4,7 @@
 //! A file bears the mark of the program if its head or its tail names it; every writer leaves that mark. What does not
 //! bear it belongs to somebody else.
 
+use crate::args::relief::ReliefCommand;
 use crate::args::{Command, Common, Policy};
 use crate::failure::Failure;
 use planish_io::ExportKind;
@@ -32,6 +33,10 @@ pub fn check(command: &Command) -> Result<(), Failure> {
     allow(&inputs, &outputs, common.policy())?;
     match command {
         Command::Export(a) if is_folder_of_maps(&a.output) => allow_maps(&a.output, common.policy()),
+        Command::Relief(a) => match &a.command {
+            ReliefCommand::Export(a) => allow_maps(&a.output, common.policy()),
+            _ => Ok(()),
+        },
         _ => Ok(()),
     }
 }
@@ -65,12 +70,34 @@ fn files(command: &Command) -> (&Common, Vec<PathBuf>, Vec<PathBuf>) {
         ),
         // Without -o the model is edited where it is, with its history: that is asked for by the command itself.
         Command::Edit(a) => (&a.common, vec![a.input.clone(), a.script.clone()], a.output.iter().cloned().collect()),
+        Command::Deform(a) => (&a.common, vec![a.model.clone(), a.to.clone()], vec![a.output.clone()]),
+        Command::Relief(a) => {
+            let (inputs, outputs) = relief_files(&a.command);
+            (a.command.common(), inputs, outputs)
+        }
         Command::Export(a) => {
             let is_folder = is_folder_of_maps(&a.output);
             (&a.common, vec![a.model.clone()], if is_folder { Vec::new() } else { vec![a.output.clone()] })
         }
         Command::Compare(a) => (&a.common, vec![a.a.clone(), a.b.clone()], Vec::new()),
         Command::Info(a) => (&a.common, vec![a.file.clone()], Vec::new()),
+    }
+}
+
+/// What a command of reliefs reads, and the files that it writes.
+fn relief_files(command: &ReliefCommand) -> (Vec<PathBuf>, Vec<PathBuf>) {
+    match command {
+        ReliefCommand::Export(a) => (vec![a.model.clone()], Vec::new()),
+        ReliefCommand::Import(a) => (vec![a.model.clone()], vec![a.output.clone()]),
+        ReliefCommand::Edit(a) => (
+            vec![a.model.clone(), a.script.clone()],
+            std::iter::once(a.output.clone()).chain(a.picture.clone()).collect(),
+        ),
+        ReliefCommand::Part(a) => (vec![a.model.clone()], vec![a.output.clone()]),
+        ReliefCommand::Level(a) => (vec![a.model.clone()], vec![a.output.clone()]),
+        ReliefCommand::Transfer(a) => {
+            (std::iter::once(a.model.clone()).chain(a.from.clone()).collect(), vec![a.output.clone()])
+        }
     }
 }
 

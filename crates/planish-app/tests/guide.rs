@@ -16,19 +16,39 @@ fn help(args: &[&str]) -> String {
 
 /// The options of every command, as its help has them.
 fn options() -> BTreeMap<String, BTreeSet<String>> {
-    let commands: Vec<String> = help(&["--help"])
-        .lines()
-        .skip_while(|l| !l.starts_with("Commands:"))
-        .skip(1)
-        .map_while(|l| l.split_whitespace().next().map(str::to_owned))
-        .filter(|c| c != "help")
-        .collect();
+    let commands = commands(&["--help"]);
     let of = |command: &str| {
         let told = help(&[command, "--help"]);
         let lines = told.lines().map(str::trim_start).filter(|l| l.starts_with('-'));
         lines.flat_map(|l| named(l.split("  ").next().unwrap_or_default())).collect()
     };
-    commands.into_iter().map(|c| (c.clone(), of(&c))).collect()
+    // Those of a family stand together: `planish relief export`.
+    let inner = |command: &str, word: &str| {
+        let told = help(&[command, word, "--help"]);
+        let lines = told.lines().map(str::trim_start).filter(|l| l.starts_with('-'));
+        lines.flat_map(|l| named(l.split("  ").next().unwrap_or_default())).collect::<Vec<String>>()
+    };
+    let all = |c: &String| {
+        let mut own: BTreeSet<String> = of(c);
+        commands_of(c).iter().for_each(|word| own.extend(inner(c, word)));
+        own
+    };
+    commands.iter().map(|c| (c.clone(), all(c))).collect()
+}
+
+fn commands_of(command: &str) -> Vec<String> {
+    commands(&[command, "--help"])
+}
+
+/// The commands that a help lists.
+fn commands(args: &[&str]) -> Vec<String> {
+    help(args)
+        .lines()
+        .skip_while(|l| !l.starts_with("Commands:"))
+        .skip(1)
+        .map_while(|l| l.split_whitespace().next().map(str::to_owned))
+        .filter(|c| c != "help")
+        .collect()
 }
 
 /// The options in a piece of text.

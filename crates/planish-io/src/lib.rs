@@ -12,6 +12,7 @@ mod gltf;
 mod grid_file;
 mod iges;
 mod mapped;
+pub mod maps;
 mod mesh_file;
 mod network_file;
 mod obj;
@@ -42,7 +43,7 @@ pub use mesh_file::{
     write_tagged_mesh,
 };
 pub use network_file::{NetworkFileError, network_json, parse_network, read_network, write_network};
-pub use obj_surface::write_obj_surfaces;
+pub use obj_surface::{read_obj_surfaces, write_obj_surfaces};
 pub use place::Place;
 pub use project::{ProjectError, read_model, write_model};
 pub use relief_files::{

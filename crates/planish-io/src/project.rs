@@ -9,6 +9,7 @@
 //! removed with it, since SQLite would play it into the new one.
 
 mod array;
+mod layers;
 mod schema;
 mod steps;
 
@@ -21,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// `plan` in ASCII: marks a SQLite database as a planish project.
 pub const APPLICATION_ID: u32 = 0x706C_616E;
 /// Version of the schema that is written, and the newest that is read.
-pub const SCHEMA_VERSION: u32 = 2;
+pub const SCHEMA_VERSION: u32 = 3;
 
 /// Why a project file could not be read or written. Shown as `what is wrong (where) - hint: what to do`.
 #[derive(Debug, thiserror::Error)]

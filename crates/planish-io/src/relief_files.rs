@@ -134,8 +134,12 @@ fn write_image(path: &Path, relief: &Relief) -> Result<(), WriteError> {
 
 /// True for the name of a map that [`write_relief`] may write, and for that of the sidecar.
 pub fn is_relief_name(name: &str) -> bool {
-    let number = name.strip_prefix("patch_").and_then(|n| n.strip_suffix(".exr"));
-    name == SIDECAR || number.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()))
+    let Some((stem, extension)) = name.rsplit_once('.') else { return false };
+    if !["exr", "png", "tif"].contains(&extension) {
+        return name == SIDECAR;
+    }
+    let number = stem.strip_prefix("patch_").or_else(|| stem.strip_prefix("relief."));
+    stem == "atlas" || number.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// Names of the maps that the sidecar in a folder lists, and its own; none where there is no sidecar of this program.
@@ -145,16 +149,31 @@ pub fn relief_names(folder: impl AsRef<Path>) -> Vec<String> {
         #[serde(rename = "planish_relief")]
         _version: u32,
         patches: Vec<Name>,
+        #[serde(default)]
+        images: Vec<Name>,
+        #[serde(default)]
+        attributes: Vec<Files>,
+        #[serde(default)]
+        companions: Vec<String>,
     }
+    /// A patch of the first version, an image of the second.
     #[derive(Deserialize)]
     struct Name {
+        #[serde(default)]
         file: String,
+    }
+    #[derive(Deserialize)]
+    struct Files {
+        #[serde(default)]
+        files: Vec<String>,
     }
     let Ok(text) = crate::mesh_file::bytes_of(&folder.as_ref().join(SIDECAR)) else { return Vec::new() };
     let Ok(names) = serde_json::from_slice::<Names>(&text) else { return Vec::new() };
     // A name with a folder in it would lead elsewhere.
     let is_plain = |name: &String| Path::new(name).file_name().is_some_and(|n| n == name.as_str());
-    names.patches.into_iter().map(|p| p.file).filter(is_plain).chain([SIDECAR.into()]).collect()
+    let files = names.patches.into_iter().chain(names.images).map(|n| n.file);
+    let files = files.chain(names.attributes.into_iter().flat_map(|a| a.files)).chain(names.companions);
+    files.filter(|name| !name.is_empty() && is_plain(name)).chain([SIDECAR.into()]).collect()
 }
 
 /// Reads what [`write_relief`] wrote; returns the reliefs in the order of the patches, and their unit.

@@ -58,6 +58,36 @@ fn model_comes_back_bit_for_bit_from_a_single_file_and_twice_the_same_bytes() {
 }
 
 #[test]
+fn layers_come_back_with_what_can_be_undone_and_damaged_ones_are_told() {
+    let folder = folder();
+    let path = folder.path().join("a.planish");
+    let mut model = model(9);
+    model.layers.begin(&model.reliefs);
+    let some = |p: usize, r: &Relief| Relief { vectors: if p == 3 { r.vectors.clone() } else { Vec::new() }, ..*r };
+    let maps = model.reliefs.iter().enumerate().map(|(p, r)| some(p, r)).collect();
+    let entry = HistoryEntry { command: "stroke".into(), parameters: "{}".into() };
+    let stack = model.layers.with("stroke", maps);
+    model.record_relief(entry.clone(), stack);
+    let stack = model.layers.stack[..1].to_vec();
+    model.record_relief(HistoryEntry { command: "remove".into(), ..entry }, stack);
+    assert!(model.undo_relief());
+    assert_eq!(model.reliefs[3].vectors[5], model.layers.pool[0][3].vectors[5] * 2.0);
+    write_model(&path, &model).unwrap();
+    let mut back = read_model(&path).unwrap();
+    assert_eq!(back, model);
+    assert!(back.redo_relief() && back.undo_relief() && back.undo_relief() && !back.undo_relief());
+    let damage = |sql: &str| {
+        let other = folder.path().join("b.planish");
+        std::fs::copy(&path, &other).unwrap();
+        rusqlite::Connection::open(&other).unwrap().execute(sql, []).unwrap();
+        read_model(&other).unwrap_err().to_string()
+    };
+    assert!(damage("UPDATE layer_map SET rows = 7 WHERE id = 3").contains("do not fit the patches"));
+    assert!(damage("DELETE FROM layer_map WHERE id = 20").contains("stand where others should"));
+    assert!(damage("UPDATE meta SET value = '{}' WHERE key = 'layers'").contains("missing field"));
+}
+
+#[test]
 fn a_model_with_feature_curves_and_7_steps_comes_back_and_shares_the_chains_of_its_steps() {
     use planish::curve::symmetry::Plane;
     use planish::grid::{Family, FeatureCurve, Sections};
@@ -182,7 +212,7 @@ fn a_project_of_schema_1_is_read_without_a_sketch_and_steps_and_written_as_schem
         let database = rusqlite::Connection::open(p).unwrap();
         database.pragma_query_value(None, "user_version", |row| row.get(0)).unwrap()
     };
-    assert_eq!(version(&path), 2);
+    assert_eq!(version(&path), 3);
 }
 
 #[test]
@@ -208,7 +238,7 @@ fn newer_schema_other_programs_truncated_and_damaged_files_are_refused_with_a_hi
         let message = read_model(file(&folder, "b.planish", bytes)).map(|_| wanted).unwrap_err().to_string();
         assert!(message.contains(wanted) && message.contains(" - hint: ") && !message.contains('\n'), "{message}");
     };
-    refused(&|b| b[63] = 7, "its schema is version 7, newer than 2 that this planish knows - hint: update planish");
+    refused(&|b| b[63] = 7, "its schema is version 7, newer than 3 that this planish knows - hint: update planish");
     refused(&|b| b[68..72].fill(0), "it is a database of another program (application id 0x00000000)");
     refused(&|b| b.clear(), "it is not a planish project");
     refused(&|b| b[0] = b'X', "it is not a planish project");

@@ -4,7 +4,8 @@ use crate::curve::symmetry::Plane;
 use crate::grid::{FeatureCurve, Grid, Sections};
 use crate::mesh::TriMesh;
 use crate::network::Network;
-use crate::relief::Relief;
+use crate::relief::layers::{Layer, Layers};
+use crate::relief::{self, Displaced, Relief, ReliefError};
 use crate::surface::Surface;
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -24,8 +25,10 @@ pub struct Model {
     pub grids: Vec<Grid>,
     /// One B-spline surface per patch.
     pub surfaces: Vec<Surface>,
-    /// One displacement map per patch.
+    /// One displacement map per patch: the sum of the layers, where there are any.
     pub reliefs: Vec<Relief>,
+    /// Edits of the relief.
+    pub layers: Layers,
     /// What one unit of a coordinate is.
     pub units: Units,
     /// What brings the coordinates back to their place: a model that is far from the origin lies near it here.
@@ -82,6 +85,7 @@ impl Model {
     fn exchange(&mut self, drawing: Drawing) -> Drawing {
         // Whatever was made from the network is no longer of it.
         (self.grids, self.surfaces, self.reliefs) = Default::default();
+        self.layers = Layers::default();
         let network = std::mem::replace(&mut self.network, drawing.network);
         Drawing { network, sketch: std::mem::replace(&mut self.sketch, drawing.sketch) }
     }
@@ -93,6 +97,51 @@ impl Model {
         self.history.push(entry.clone());
         self.undo.push(Step { entry, other });
         self.redo.clear();
+    }
+
+    /// Takes over surfaces with the reliefs that were baked on them. Edits of the relief stay, on the shapes that they have;
+    /// what was taken back before belongs to the older surfaces and is forgotten.
+    /// # Errors
+    /// If surfaces and reliefs do not fit together.
+    pub fn set_baked(&mut self, surfaces: Vec<Surface>, baked: Vec<Relief>) -> Result<(), ReliefError> {
+        if self.layers.stack.is_empty() {
+            (self.surfaces, self.reliefs) = (surfaces, baked);
+            return Ok(());
+        }
+        let shapes: Vec<[usize; 2]> = self.reliefs.iter().map(|r| [r.rows, r.cols]).collect();
+        let displaced = Displaced { network: &self.network, surfaces: &surfaces, reliefs: &baked };
+        self.layers.rebake(relief::resample_all(&displaced, &shapes)?);
+        self.reliefs = self.layers.sum().unwrap_or_default();
+        self.surfaces = surfaces;
+        Ok(())
+    }
+
+    /// Takes over an edited stack of layers as one entry of the history.
+    pub fn record_relief(&mut self, entry: HistoryEntry, stack: Vec<Layer>) {
+        self.layers.record(&entry.command, &entry.parameters, stack);
+        self.reliefs = self.layers.sum().unwrap_or_default();
+        self.history.push(entry);
+    }
+
+    /// Takes back the last edit of the relief. False if there is none.
+    pub fn undo_relief(&mut self) -> bool {
+        let Some(past) = self.layers.undo.last() else { return false };
+        let is_it = |h: &HistoryEntry| (&h.command, &h.parameters) == (&past.command, &past.parameters);
+        if let Some(at) = self.history.iter().rposition(is_it) {
+            self.history.remove(at);
+        }
+        self.layers.undo();
+        self.reliefs = self.layers.sum().unwrap_or_default();
+        true
+    }
+
+    /// Makes the last edit of the relief that was taken back again. False if there is none.
+    pub fn redo_relief(&mut self) -> bool {
+        let Some(past) = self.layers.redo.last() else { return false };
+        self.history.push(HistoryEntry { command: past.command.clone(), parameters: past.parameters.clone() });
+        self.layers.redo();
+        self.reliefs = self.layers.sum().unwrap_or_default();
+        true
     }
 
     /// Takes back the last edit. False if there is none.

@@ -13,11 +13,13 @@
 //! A [`PipelineObserver`] hears which stage runs and how far the run is, and may stop it; [`StageRecord`] keeps what each
 //! took and made, [`Quality`] what came of it.
 
+mod deform;
 mod quality;
 mod record;
 mod scan;
 mod truth;
 
+pub use deform::{Move, deform, join, moved};
 pub use quality::{
     SEAM_ANGLE_WARNING_DEG, displaced_mesh, displaced_patches, span_count, surface_mesh, surface_mesh_cut,
     surface_patches, worst_seams,
@@ -326,6 +328,74 @@ pub fn refit(
     Ok(clock.records)
 }
 
+/// Parts a model at a wavelength (units of the model): what is longer goes to new surfaces, what is shorter to the relief, so
+/// that a bump sits wholly in the map.
+///
+/// A first surface is fitted with knot spans no shorter than the wavelength, which is too stiff to take part in shorter waves;
+/// what it misses is filtered over all patches, and the surfaces are fitted to the first with the long waves of the rest. Edits
+/// of the relief stay as they are. On an error the model is what it was.
+/// # Errors
+/// As [`fit`].
+///
+/// Source: [K98] §7.5 and fig. 7.2: a least-squares surface takes part of what seems detail.
+pub fn part_at(
+    model: &mut Model,
+    wavelength: f64,
+    params: &PipelineParams,
+    observer: &dyn PipelineObserver,
+) -> Result<Vec<StageRecord>, PipelineError> {
+    let mut clock = Clock::new(observer, &WEIGHTS);
+    let stiff = FitParams { resolution: stiff_counts(model, wavelength), ..params.fit.clone() };
+    let long = clock.stage(
+        "waves",
+        |o| -> Result<_, PipelineError> {
+            let first = surface::fit_network(&model.network, &model.grids, &stiff, o)?;
+            Ok(relief::long_waves(&model.network, &model.grids, &first, wavelength, o)?)
+        },
+        |grids: &Vec<Grid>| [("points", grids.iter().map(|g| g.points.len()).sum())],
+    )?;
+    let grids = std::mem::take(&mut model.grids);
+    let made = surfaces_through(model, (&long, &grids), params, &mut clock);
+    model.grids = grids;
+    made.map(|()| clock.records)
+}
+
+/// Control points along each curve with knot spans of `length` or more.
+fn stiff_counts(model: &Model, length: f64) -> surface::Resolution {
+    let spans = |curve: &network::Curve| {
+        let along = crate::geom::polyline::length(curve.points.iter().map(|p| p.position(&model.mesh)));
+        (along / length).floor().max(1.0) as usize
+    };
+    surface::Resolution::PerCurve(model.network.curves.iter().map(|c| spans(c) + surface::FEWEST_CONTROL - 1).collect())
+}
+
+/// Fits surfaces of another resolution to the displaced ones: the same shape with its edits on another level of control points.
+///
+/// The relief becomes one layer, since layers were meant above other surfaces. On an error the model is what it was.
+/// # Errors
+/// As [`fit`].
+///
+/// Source: [K98] §7.6, fig. 7.4.
+pub fn relevel(
+    model: &mut Model,
+    params: &PipelineParams,
+    observer: &dyn PipelineObserver,
+) -> Result<Vec<StageRecord>, PipelineError> {
+    let mut clock = Clock::new(observer, &WEIGHTS);
+    let displaced: Vec<Grid> = (model.surfaces.iter().zip(&model.reliefs))
+        .map(|(s, r)| Ok(Grid { rows: r.rows, cols: r.cols, points: relief::displace(s, r)?, places: Vec::new() }))
+        .collect::<Result<_, ReliefError>>()?;
+    let layers = std::mem::take(&mut model.layers);
+    let made = surfaces_through(model, (&displaced, &displaced), params, &mut clock);
+    if made.is_err() {
+        model.layers = layers;
+    } else {
+        // What is no longer baked from the grids is a layer of its own, so that it outlives the next fit.
+        model.layers.begin(&model.reliefs);
+    }
+    made.map(|()| clock.records)
+}
+
 /// What a model was before an edit, as far as its grids can be made from it.
 #[derive(Clone, Debug)]
 pub struct Earlier {
@@ -475,7 +545,20 @@ fn draw(
 
 /// The stages from the grids to the reliefs.
 fn surfaces(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Result<(), PipelineError> {
-    let (network, grids) = (&model.network, &model.grids);
+    let grids = std::mem::take(&mut model.grids);
+    let made = surfaces_through(model, (&grids, &grids), params, clock);
+    model.grids = grids;
+    made
+}
+
+/// As [`surfaces`], fitted to the grids `form` with the relief that leads to the grids `target`.
+fn surfaces_through(
+    model: &mut Model,
+    (form, target): (&[Grid], &[Grid]),
+    params: &PipelineParams,
+    clock: &mut Clock,
+) -> Result<(), PipelineError> {
+    let (network, grids) = (&model.network, form);
     let control = |s: &Vec<surface::Surface>| [("control_points", s.iter().map(|s| s.control.len()).sum())];
     let symmetric = |leveled: bool, surfaces: &mut Vec<surface::Surface>| {
         if let Some(plane) = &model.sketch.symmetry {
@@ -493,9 +576,8 @@ fn surfaces(model: &mut Model, params: &PipelineParams, clock: &mut Clock) -> Re
     symmetric(false, &mut smooth);
     let reliefs = clock.stage(
         "relief",
-        |o| relief::bake_network(grids, &smooth, o),
+        |o| relief::bake_network(target, &smooth, o),
         |reliefs| [("texels", reliefs.iter().map(|r| r.vectors.len()).sum())],
     )?;
-    (model.surfaces, model.reliefs) = (smooth, reliefs);
-    Ok(())
+    Ok(model.set_baked(smooth, reliefs)?)
 }

@@ -12,6 +12,7 @@ mod info;
 mod layout;
 mod mesh;
 mod missed;
+mod relief;
 mod run;
 mod smooth;
 
@@ -24,9 +25,12 @@ use crate::products::{self, Staged};
 use crate::progress::{self, Bars};
 use crate::words;
 pub use crate::words::with_hint;
+use planish::grid::Grid;
 use planish::model::{Model, Units};
 use planish::observe::Cancelled;
 use planish::pipeline::{Figure, PipelineError, Quality, StageRecord, Warning};
+use planish::relief::{Relief, ReliefError};
+use planish::surface::Surface;
 use planish_io::report::{Report, number};
 use planish_io::{FileUnits, WriteError};
 use std::io::Write;
@@ -49,6 +53,8 @@ pub fn run(cli: Cli) -> Result<Status, Failure> {
         Command::Layout(args) => layout::layout(&Session::new(&args.common)?, &args),
         Command::Fit(args) => fit::fit(&Session::new(&args.common)?, &args),
         Command::Edit(args) => edit::edit(&Session::new(&args.common)?, &args),
+        Command::Deform(args) => relief::deform(&Session::new(&args.common)?, &args),
+        Command::Relief(args) => relief::relief(&args),
         Command::Export(args) => export::export(&Session::new(&args.common)?, &args),
         Command::Compare(args) => compare::compare(&Session::new(&args.common)?, &args),
         Command::Info(args) => info::info(&Session::new(&args.common)?, &args),
@@ -148,12 +154,24 @@ impl Session {
 /// they are read back.
 fn write_relief(folder: &Path, model: &Model, quality: &mut Quality) -> Result<(), WriteError> {
     planish_io::write_relief(folder, &model.reliefs, model.units)?;
-    let read = planish_io::relief_roundtrip(folder, &model.surfaces, &model.grids);
+    let edited = displaced_grids(model).map_err(|e| WriteError::Image(e.to_string()))?;
+    let read = planish_io::relief_roundtrip(folder, &model.surfaces, edited.as_ref().unwrap_or(&model.grids));
     let away = read.map_err(|e| WriteError::Image(format!("the maps do not read back: {e}")))?;
     let diagonal = model.mesh.bounds().diagonal();
     quality.insert("relief.roundtrip_max".into(), Figure::Number(away));
     quality.insert("relief.roundtrip_max_rel".into(), Figure::Number(away / diagonal));
     Ok(())
+}
+
+/// The nodes that an edited relief leads to; none for one that leads to the grids.
+fn displaced_grids(model: &Model) -> Result<Option<Vec<Grid>>, ReliefError> {
+    if model.layers.stack.is_empty() {
+        return Ok(None);
+    }
+    let one = |(s, r): (&Surface, &Relief)| {
+        Ok(Grid { rows: r.rows, cols: r.cols, points: planish::relief::displace(s, r)?, places: Vec::new() })
+    };
+    model.surfaces.iter().zip(&model.reliefs).map(one).collect::<Result<_, _>>().map(Some)
 }
 
 /// Writes the report into its staged file and moves it to its place.

@@ -1,8 +1,9 @@
-//! Schema version 2: tables of a project, and a model to and from them. Version 1 had no sketch and no steps.
+//! Schema version 3: tables of a project, and a model to and from them. Version 1 had no sketch and no steps, version 2 no
+//! layers of the relief.
 
 use super::ProjectError;
 use super::array::{Array, Arrays, Loaded, add_places, damaged, places};
-use super::steps;
+use super::{layers, steps};
 use planish::grid::Grid;
 use planish::mesh::{Attribute, TriMesh};
 use planish::network::{Corner, Curve, CurveKind, Network, Patch};
@@ -25,6 +26,8 @@ CREATE TABLE grid (patch INTEGER PRIMARY KEY, rows INTEGER NOT NULL, cols INTEGE
 CREATE TABLE surface (patch INTEGER PRIMARY KEY, rows INTEGER NOT NULL, cols INTEGER NOT NULL,
     control INTEGER NOT NULL, knots_u INTEGER NOT NULL, knots_v INTEGER NOT NULL);
 CREATE TABLE relief (patch INTEGER PRIMARY KEY, rows INTEGER NOT NULL, cols INTEGER NOT NULL, vectors INTEGER NOT NULL);
+CREATE TABLE layer_map (id INTEGER PRIMARY KEY, maps INTEGER NOT NULL, patch INTEGER NOT NULL, rows INTEGER NOT NULL,
+    cols INTEGER NOT NULL, vectors INTEGER NOT NULL);
 CREATE TABLE history (sequence INTEGER PRIMARY KEY, parent INTEGER REFERENCES history, command TEXT NOT NULL,
     parameters TEXT NOT NULL);
 CREATE TABLE pool (id INTEGER PRIMARY KEY, lengths INTEGER NOT NULL, faces INTEGER NOT NULL, weights INTEGER NOT NULL);
@@ -54,10 +57,12 @@ pub(super) fn write(transaction: &Transaction, model: &Model) -> Result<(), Proj
     transaction.execute_batch(TABLES)?;
     let mut arrays = Arrays::default();
     let sketch = serde_json::to_string(&model.sketch).map_err(std::io::Error::other)?;
+    let layers = layers::stacks_json(&model.layers)?;
     let shift = serde_json::to_string(&model.shift.to_array()).map_err(std::io::Error::other)?;
     for (key, value) in [
         ("generator", concat!("planish ", env!("CARGO_PKG_VERSION"))),
         ("params", &model.params),
+        ("layers", &layers),
         ("sketch", &sketch),
         ("shift", &shift),
         ("units", model.units.symbol()),
@@ -92,6 +97,7 @@ pub(super) fn write(transaction: &Transaction, model: &Model) -> Result<(), Proj
         let row = params![p as i64, relief.rows as i64, relief.cols as i64, vectors];
         transaction.prepare_cached("INSERT INTO relief VALUES (?1, ?2, ?3, ?4)")?.execute(row)?;
     }
+    layers::write(transaction, &model.layers, &mut arrays)?;
     for (k, entry) in model.history.iter().enumerate() {
         // Undo makes branches; what a model holds is one line of them.
         let parent = (k > 0).then_some(k as i64);
@@ -185,6 +191,9 @@ pub(super) fn read(connection: &Connection, version: u32, bytes: u64) -> Result<
         model.sketch = serde_json::from_str(&meta("sketch")?).map_err(|e| damaged(e.to_string(), "meta", 0))?;
         steps::check_sketch(&model.sketch, faces).map_err(|what| damaged(what, "meta", 0))?;
         steps::read(connection, &mut arrays, &mut model)?;
+    }
+    if version >= 3 {
+        model.layers = layers::read(connection, &mut arrays, &meta("layers")?, patches)?;
     }
     Ok(model)
 }

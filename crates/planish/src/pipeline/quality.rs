@@ -340,7 +340,9 @@ fn relief_figures(
 ) -> Result<(), PipelineError> {
     let each = model.surfaces.par_iter().zip(&model.reliefs).zip(&model.grids).map(|((surface, relief), grid)| {
         observer.check()?;
-        let back = relief::displace(surface, relief)?;
+        // Of an edited relief that what was baked is what counts.
+        let baked = if model.layers.stack.is_empty() { None } else { Some(relief::bake(grid, surface)?) };
+        let back = relief::displace(surface, baked.as_ref().unwrap_or(relief))?;
         let miss = back.iter().zip(&grid.points).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
         let most = relief.vectors.iter().map(|d| d.length()).fold(0.0, f64::max);
         Ok((miss, most, relief::fold_over(surface, relief)?.len()))

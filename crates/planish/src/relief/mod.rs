@@ -3,24 +3,35 @@
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, ch. 7 and §8.2.
 //! 1. a frame at every node - `frame`      2. bake and displace - `bake`, eq. 7.1
 //! 3. maps of one number, folds - `scalar`      4. one mesh of all patches - `weld`
+//! 5. images of any size and kind - `maps`, `resample`      6. one sample on both sides of a seam - `seam`, §8.2
+//! 7. edits as layers - `layers`, §7.6
 //!
 //! Departs from [K98]: its frame `(S_u, S_v, N)` with dot products (eq. 7.1) is exact only where `S_u` and `S_v` are
 //! orthogonal; an orthonormal frame is exact everywhere.
 
 mod bake;
 mod frame;
+pub mod layers;
+pub mod maps;
+mod resample;
 mod scalar;
+mod seam;
+mod waves;
 mod weld;
 
 pub use bake::{bake, bake_network, displace};
 pub use frame::{Frame, frame_at, frames};
+pub use resample::{resample, resample_all};
 pub use scalar::{fold_over, length, normal_component};
+pub use seam::{Agreement, agree, seam_nodes, widest_crack};
+pub use waves::long_waves;
 pub use weld::{
     PatchNodes, PatchedMesh, displaced_mesh, displaced_patches, patch_mesh, span_shapes, surface_mesh, surface_patches,
 };
 
+use crate::network::Network;
 use crate::observe::Cancelled;
-use crate::surface::FitError;
+use crate::surface::{FitError, Surface};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +47,37 @@ pub struct Relief {
     pub cols: usize,
     /// Displacements `(t, b, n)`, world units.
     pub vectors: Vec<DVec3>,
+}
+
+/// A network with its surfaces and reliefs, one of each per patch.
+#[derive(Clone, Copy, Debug)]
+pub struct Displaced<'a> {
+    /// Which patches meet where.
+    pub network: &'a Network,
+    /// The surfaces.
+    pub surfaces: &'a [Surface],
+    /// The displacements.
+    pub reliefs: &'a [Relief],
+}
+
+impl Displaced<'_> {
+    /// Checks that there is one sound surface and one relief per patch.
+    /// # Errors
+    /// [`ReliefError::Count`], [`ReliefError::Shape`], [`ReliefError::Surface`].
+    pub fn check(&self) -> Result<(), ReliefError> {
+        let wanted = self.network.patches.len();
+        for (what, found) in [("surfaces", self.surfaces.len()), ("reliefs", self.reliefs.len())] {
+            if found != wanted {
+                return Err(ReliefError::Count { what, found, wanted });
+            }
+        }
+        for (patch, r) in self.reliefs.iter().enumerate() {
+            if r.rows < 2 || r.cols < 2 || r.vectors.len() != r.rows * r.cols {
+                return Err(ReliefError::Shape { patch, rows: r.rows, cols: r.cols, found: r.vectors.len() });
+            }
+        }
+        Ok(self.surfaces.iter().try_for_each(Surface::check)?)
+    }
 }
 
 /// Errors of the relief stage.
@@ -81,6 +123,15 @@ pub enum ReliefError {
     Network {
         /// The patch.
         patch: usize,
+    },
+    /// A map of normals.
+    #[error("a map of normals holds no displacements; read back a vector, scalar, length or height map")]
+    NoHeights,
+    /// An edit that cannot be made.
+    #[error("{what}")]
+    Edit {
+        /// What is wrong with it.
+        what: String,
     },
     /// The observer no longer wanted the result.
     #[error("cancelled")]

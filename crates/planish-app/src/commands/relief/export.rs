@@ -1,0 +1,184 @@
+//! `planish relief export`: maps as images.
+
+use super::super::{Session, commit_report, write_failure};
+use super::{displaced, open, wrong};
+use crate::args::relief::ReliefExport;
+use crate::failure::{Failure, Status};
+use crate::files;
+use crate::placed;
+use crate::products::Staged;
+use crate::progress::Interrupt;
+use crate::summary::Summary;
+use crate::tolerance::Scale;
+use planish::model::Model;
+use planish::pipeline::{Figure, Warning};
+use planish::relief::maps::{self, MapKind, MapParams, PatchMap, Preset, Sheet};
+use planish_io::maps::{MapFile, MapOptions, as_read, materialx, other_ways, read_maps, write_maps};
+use planish_io::report::{Report, count, number};
+use planish_io::{MappedMesh, WriteOptions};
+use std::path::Path;
+
+/// The base mesh beside the maps.
+const BASE: &str = "base.obj";
+/// The wiring beside the maps.
+const WIRING: &str = "relief.mtlx";
+
+pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure> {
+    let own_report = session.stage_report()?;
+    let preset = args.preset.and_then(|p| maps::preset(p.name()));
+    let params = params(args, preset)?;
+    let file = match (args.file, preset) {
+        (Some(word), _) => word.into(),
+        (None, Some(p)) => MapFile::of_word(p.file).unwrap_or_default(),
+        (None, None) => MapFile::default(),
+    };
+    let staged = Staged::folder(&args.output)?;
+    let (model, read) = open(session, &args.model)?;
+    let mut report = Report::new("relief export", files::model_facts(&args.model, &model, model.units));
+    let scale = Scale { diagonal: model.mesh.bounds().diagonal(), units: model.units };
+    let max_error = args.max_error.map(|t| t.length(scale));
+    if let (Some(e), true) = (max_error, params.kind == MapKind::Normal || file.is_whole()) {
+        let what = format!("{} does not go with normals or whole numbers", number(e));
+        return Err(Failure::usage("--max-error", what).hint("write vectors or scalars as EXR"));
+    }
+    let (made, bake) = session.step("bake", || {
+        maps::render(&displaced(&model), &model.mesh, &params, &Interrupt).map_err(|e| wrong(&args.model, e))
+    })?;
+    let shapes: Vec<[usize; 2]> = made.iter().map(|m| [m.rows, m.cols]).collect();
+    let sheet = maps::pack(&shapes, params.sheets, params.gutter, params.tile).map_err(|p| {
+        let [rows, cols] = shapes[p];
+        let what =
+            format!("patch {p} of {cols} x {rows} texels and its gutter do not fit on a tile of {}", params.tile);
+        Failure::usage("--tile", what).hint("raise it, or lower --texels")
+    })?;
+    let attributes = if args.attributes { attributes(&model, &shapes, &args.model)? } else { Vec::new() };
+    let companions = [(args.base, BASE), (args.materialx, WIRING)];
+    let options = MapOptions {
+        params: params.clone(),
+        file,
+        upside_down: preset.is_some_and(|p| p.upside_down),
+        max_error,
+        wiring: preset.map_or(String::new(), |p| p.wiring.split_whitespace().collect::<Vec<_>>().join(" ")),
+        units: model.units,
+        companions: companions.iter().filter(|(asked, _)| *asked).map(|(_, name)| name.to_string()).collect(),
+    };
+    let folder = staged.path("");
+    let failed = |e| write_failure(&args.model, &args.output, e);
+    let (sidecar, write) = session
+        .step("write", || write_maps(&folder, &made, &attributes, &sheet, &model.surfaces, &options).map_err(failed))?;
+    if args.base {
+        base(&model, &params, &sheet, &folder.join(BASE), args)?;
+    }
+    if args.materialx {
+        match materialx(&sidecar) {
+            Some(text) => super::super::write_text(&folder.join(WIRING), &text)?,
+            None => {
+                let what = "wires vectors in tangent space in the order tbn, scalars and normals";
+                return Err(Failure::usage("--materialx", what).hint("leave --frame object and --order tnb away"));
+            }
+        }
+    }
+    let (bytes, error) = measured(&folder, &made, &args.output)?;
+    report.quality.insert("relief.map_bytes".into(), Figure::Count(bytes));
+    report.quality.insert("relief.map_error_max".into(), Figure::Number(error));
+    let mut others = Vec::new();
+    if max_error.is_some() {
+        let ways = other_ways(&made, &sheet).map_err(failed)?;
+        for ((name, key), (bytes, error)) in [("half EXR", "half"), ("DWA EXR", "dwa")].into_iter().zip(ways) {
+            report.quality.insert(format!("relief.{key}_bytes"), Figure::Count(bytes));
+            report.quality.insert(format!("relief.{key}_error_max"), Figure::Number(error));
+            others.push((name, format!("{} bytes, error {} {}", count(bytes), number(error), model.units)));
+        }
+    }
+    folds(&model, &mut report, &args.model)?;
+    staged.commit()?;
+    report.stages = vec![read, bake, write];
+    commit_report(own_report, &report)?;
+    if !session.common.quiet {
+        session.tell_warnings(&report);
+        let mut table = Summary::default();
+        table.row("model", args.model.display().to_string());
+        table.row("maps", format!("{} of {} patches", params.kind.word(), made.len()));
+        table.row("images", format!("{} in {}", sidecar.images.len(), args.output.display()));
+        table.row("bytes", count(bytes));
+        table.row("largest", format!("{} {}", number(sidecar.largest), model.units));
+        for (name, value) in others {
+            table.row(format!("as {name}"), value);
+        }
+        table.row("error", format!("{} {} at most, of what was written", number(error), model.units));
+        table.print();
+    }
+    Ok(Status::Done)
+}
+
+/// The preset with the given options in place.
+fn params(args: &ReliefExport, preset: Option<&Preset>) -> Result<MapParams, Failure> {
+    let base = preset.map_or_else(MapParams::default, |p| MapParams {
+        kind: p.kind,
+        frame: p.frame,
+        order: p.order,
+        sheets: p.sheets,
+        ..MapParams::default()
+    });
+    let params = args.maps.params_over(base, None)?;
+    if params.texels == 1 {
+        return Err(Failure::usage("--texels", "a map needs two texels along a side").hint("give 0, or 2 or more"));
+    }
+    Ok(params)
+}
+
+fn attributes(model: &Model, shapes: &[[usize; 2]], path: &Path) -> Result<Vec<(String, Vec<PatchMap>)>, Failure> {
+    let mut all = Vec::new();
+    for attribute in model.mesh.attributes.iter().filter(|a| (1..=4).contains(&a.width) && a.width != 2) {
+        let maps =
+            maps::attribute_maps(&model.mesh, &model.grids, &attribute.name, shapes).map_err(|e| wrong(path, e))?;
+        all.extend(maps.map(|maps| (attribute.name.clone(), maps)));
+    }
+    Ok(all)
+}
+
+/// Writes the base mesh with a vertex for each texel.
+fn base(model: &Model, params: &MapParams, sheet: &Sheet, path: &Path, args: &ReliefExport) -> Result<(), Failure> {
+    let (patched, normals) =
+        maps::base_mesh(&displaced(model), params, &Interrupt).map_err(|e| wrong(&args.model, e))?;
+    let nodes = |(p, n): (usize, &planish::relief::PatchNodes)| {
+        (0..n.rows * n.cols).map(|k| sheet.uv(p, k % n.cols, k / n.cols)).collect::<Vec<[f32; 2]>>()
+    };
+    let uvs = patched.patches.iter().enumerate().map(nodes).collect();
+    let options = WriteOptions { units: model.units, name: "base".into(), ..WriteOptions::default() };
+    placed::write_patches(path, MappedMesh { patched, uvs, normals }, model.shift, &options)
+        .map(drop)
+        .map_err(|e| write_failure(&args.model, &args.output, e))
+}
+
+/// Bytes of the images, and the largest distance of what they hold from what was made.
+fn measured(folder: &Path, made: &[PatchMap], output: &Path) -> Result<(u64, f64), Failure> {
+    let back = read_maps(folder).map_err(|e| Failure::usage(output, format!("the maps do not read back: {e}")))?;
+    let size = |name: &String| std::fs::metadata(folder.join(name)).map_or(0, |m| m.len());
+    let bytes = back.sidecar.images.iter().map(|i| size(&i.file)).sum();
+    debug_assert_eq!(as_read(made.to_vec(), &back.sidecar), back.maps);
+    let far = |(a, b): (&PatchMap, &PatchMap)| {
+        let texel =
+            |(x, y): (&[f32], &[f32])| x.iter().zip(y).map(|(x, y)| (*x as f64 - *y as f64).powi(2)).sum::<f64>();
+        a.values.chunks_exact(a.channels).zip(b.values.chunks_exact(b.channels)).map(texel).fold(0.0, f64::max)
+    };
+    Ok((bytes, made.iter().zip(&back.maps).map(far).fold(0.0, f64::max).sqrt()))
+}
+
+/// Tells where the relief folds the surface over.
+fn folds(model: &Model, report: &mut Report, path: &Path) -> Result<(), Failure> {
+    let mut found: Vec<(usize, usize)> = Vec::new();
+    for (p, (s, r)) in model.surfaces.iter().zip(&model.reliefs).enumerate() {
+        let here = planish::relief::fold_over(s, r).map_err(|e| wrong(path, e))?.len();
+        found.extend((here > 0).then_some((p, here)));
+    }
+    if found.is_empty() {
+        return Ok(());
+    }
+    let texels: usize = found.iter().map(|f| f.1).sum();
+    let text =
+        format!("{texels} texels displace the surface beyond its focal radius. The edit `limit` brings them back.");
+    let places: Vec<String> = found.iter().take(8).map(|f| f.0.to_string()).collect();
+    report.warnings.push(Warning::new("relief_folds", text, format!("patches {}", places.join(", "))));
+    Ok(())
+}

@@ -1,0 +1,67 @@
+//! `planish relief transfer`: detail from another model, or from other patches, as a layer.
+
+use super::super::Session;
+use super::{displaced, finish, open, wrong};
+use crate::args::relief::{Pair, ReliefTransfer};
+use crate::failure::{Failure, Status};
+use crate::files;
+use crate::progress::Interrupt;
+use crate::tolerance::Scale;
+use planish::model::{HistoryEntry, Model};
+use planish::relief::Relief;
+use planish::relief::layers::{self, Ground};
+use planish_io::report::{Report, count};
+
+pub fn transfer(session: &Session, args: &ReliefTransfer) -> Result<Status, Failure> {
+    files::check_extension(&args.output, &["planish"])?;
+    if args.pairs.is_empty() && args.from.is_none() {
+        let what = "needs FROM.planish, the model that has the detail";
+        return Err(Failure::usage("relief transfer", what).hint("name it, or name patches with --pairs"));
+    }
+    let (mut model, read) = open(session, &args.model)?;
+    let from = args.from.as_ref().map(|path| open(session, path)).transpose()?.map(|(model, _)| model);
+    let mut report = Report::new("relief transfer", files::model_facts(&args.model, &model, model.units));
+    let ((maps, told), record) = session.step("transfer", || carried(&model, from.as_ref(), args))?;
+    model.layers.begin(&model.reliefs);
+    let stack = model.layers.with("transfer", maps);
+    let pairs: Vec<[u32; 3]> = args.pairs.iter().map(|p| [p.from, p.to, p.turns]).collect();
+    let parameters = serde_json::json!({ "from": args.from, "pairs": pairs }).to_string();
+    model.record_relief(HistoryEntry { command: "relief transfer".into(), parameters }, stack);
+    report.stages = vec![read, record];
+    finish(session, &args.output, &model, report, vec![("transferred".into(), told)])
+}
+
+fn carried(model: &Model, from: Option<&Model>, args: &ReliefTransfer) -> Result<(Vec<Relief>, String), Failure> {
+    let failed = |e| wrong(&args.model, e);
+    let shapes: Vec<[usize; 2]> = model.reliefs.iter().map(|r| [r.rows, r.cols]).collect();
+    let ground = Ground::new(&model.network, &model.surfaces, shapes).map_err(failed)?;
+    let source = from.unwrap_or(model);
+    if args.pairs.is_empty() {
+        let scale = Scale { diagonal: model.mesh.bounds().diagonal(), units: model.units };
+        let reach = args.reach.length(scale);
+        let (maps, missed) = layers::transfer(&ground, &displaced(source), reach, &Interrupt).map_err(failed)?;
+        let texels: usize = maps.iter().map(|m| m.vectors.len()).sum();
+        return Ok((
+            maps,
+            format!("{} texels, {} too far away", count((texels - missed) as u64), count(missed as u64)),
+        ));
+    }
+    let mut maps: Vec<Relief> = model.reliefs.iter().map(|r| Relief { vectors: Vec::new(), ..*r }).collect();
+    for &Pair { from: a, to: b, turns } in &args.pairs {
+        for (patch, count) in [(a, source.reliefs.len()), (b, model.reliefs.len())] {
+            if patch as usize >= count {
+                return Err(Failure::usage("--pairs", format!("there is no patch {patch} among {count}"))
+                    .hint("see `planish info`"));
+            }
+        }
+        let one = layers::paste(&ground, &source.reliefs[a as usize], &[(turns, b)]);
+        for (sum, more) in maps.iter_mut().zip(one) {
+            match (sum.vectors.is_empty(), more.vectors.is_empty()) {
+                (_, true) => {}
+                (true, false) => sum.vectors = more.vectors,
+                _ => sum.vectors.iter_mut().zip(more.vectors).for_each(|(a, b)| *a += b),
+            }
+        }
+    }
+    Ok((maps, format!("{} pairs of patches", args.pairs.len())))
+}

@@ -1,0 +1,195 @@
+//! `planish relief`: the whole way of a map through files, and what garbage is told.
+
+mod common;
+
+use common::*;
+use std::fs;
+use std::path::Path;
+
+/// A model of a small box with a dent, made once per test.
+fn model(folder: &Path) {
+    write_box(&folder.join("box.ply"), 8);
+    let output = planish(&["fit", "box.ply", "-q", "-o", "box.planish", "--control", "5x5"], folder);
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+}
+
+fn ok(args: &[&str], folder: &Path) -> String {
+    let output = planish(args, folder);
+    assert_eq!(status(&output), 0, "{args:?}: {}", stderr(&output));
+    stdout(&output)
+}
+
+fn script(folder: &Path, text: &str) {
+    fs::write(folder.join("edits.toml"), text).unwrap();
+}
+
+#[test]
+fn strokes_become_layers_that_are_undone_after_a_restart() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    model(at);
+    script(
+        at,
+        "[[step]]\nedit = \"stroke\"\npath = [{ patch = 0, u = 0.5, v = 0.5 }, { patch = 1, u = 0.5, v = 0.5 }]\nradius = 0.2\n\
+         height = 0.05\n\n[[step]]\nedit = \"scale\"\nlayer = \"stroke\"\nfactor = -0.5\n",
+    );
+    let told = ok(&["relief", "edit", "box.planish", "edits.toml", "-o", "a.planish"], at);
+    assert!(told.contains("baked, stroke x -0.5") && told.contains("2 to take back"), "{told}");
+    assert!(ok(&["info", "a.planish"], at).contains("stroke, scale"));
+    script(at, "[[step]]\nedit = \"undo\"\ncount = 2\n");
+    let told = ok(&["relief", "edit", "a.planish", "edits.toml", "-o", "b.planish"], at);
+    assert!(told.contains("0 to take back, 2 to make again"), "{told}");
+    ok(&["export", "box.planish", "-q", "-o", "before.ply"], at);
+    ok(&["export", "b.planish", "-q", "-o", "after.ply"], at);
+    assert_eq!(fs::read(at.join("before.ply")).unwrap(), fs::read(at.join("after.ply")).unwrap());
+    ok(&["export", "a.planish", "-q", "-o", "edited.ply"], at);
+    assert_ne!(fs::read(at.join("before.ply")).unwrap(), fs::read(at.join("edited.ply")).unwrap());
+    // Maps of an edited model read back, too.
+    ok(&["export", "a.planish", "-q", "-o", "maps"], at);
+    for (text, words) in [
+        ("[[step]]\nedit = \"undo\"\ncount = 9\n", "step 1 (line 1): there is nothing left to take back"),
+        ("[[step]]\nedit = \"erase\"\n[[step]]\nedit = \"hair\"\n", "step 2: unknown variant `hair`"),
+        (
+            "[[step]]\nedit = \"stroke\"\npath = []\nradius = 1\nheight = 1\n",
+            "step 1 (stroke, line 1): a stroke needs places",
+        ),
+        (
+            "[[step]]\nedit = \"stamp\"\nimage = \"no.png\"\nat = [0, 0, 0]\nup = [0, 1, 0]\nwidth = 1\nheight = 1\n",
+            "no.png",
+        ),
+    ] {
+        script(at, text);
+        let output = planish(&["relief", "edit", "a.planish", "edits.toml", "-o", "c.planish"], at);
+        assert_eq!(status(&output), 3);
+        assert!(error_line(&output).contains(words), "{}", stderr(&output));
+        assert!(!at.join("c.planish").exists());
+    }
+}
+
+#[test]
+fn maps_go_out_and_come_back_as_a_layer_and_wrong_ones_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    model(at);
+    for (maps, options) in [
+        ("plain", &[][..]),
+        ("png", &["--kind", "scalar", "--file", "png", "--sheets", "atlas"]),
+        (
+            "udim",
+            &["--frame", "tangent", "--order", "tnb", "--sheets", "udim", "--tile", "64", "--texels", "20", "--base"],
+        ),
+        ("arnold", &["--preset", "arnold", "--tile", "128"]),
+        ("wired", &["--materialx", "--attributes", "--max-error", "0.01%"]),
+    ] {
+        ok(&[&["relief", "export", "box.planish", "-o", maps], options].concat(), at);
+        let told = ok(&["relief", "import", "box.planish", maps, "-o", "same.planish"], at);
+        assert!(told.contains("nothing was changed"), "{maps}: {told}");
+    }
+    assert!(at.join("udim/relief.1001.exr").exists() && at.join("udim/base.obj").exists());
+    assert!(fs::read_to_string(at.join("wired/relief.mtlx")).unwrap().contains("patch_0000.exr"));
+    assert!(fs::read_to_string(at.join("arnold/relief.json")).unwrap().contains("order XZY"));
+    // A stroke goes through the files of a second export into the first model.
+    script(at, "[[step]]\nedit = \"stroke\"\npath = [{ patch = 0, u = 0.5, v = 0.5 }]\nradius = 0.3\nheight = 0.05\n");
+    ok(&["relief", "edit", "box.planish", "edits.toml", "-q", "-o", "a.planish"], at);
+    ok(&["relief", "export", "a.planish", "-q", "-o", "plain"], at);
+    let told = ok(&["relief", "import", "box.planish", "plain", "-o", "b.planish"], at);
+    assert!(told.contains("changed texels") && told.contains("baked, import"), "{told}");
+    let compared = ok(&["compare", "a.planish", "b.planish", "--surface", "displaced", "--tolerance", "0.0001%"], at);
+    assert!(!compared.is_empty());
+    // Wrong model, half a file, nothing.
+    write_box(&at.join("other.ply"), 6);
+    ok(&["fit", "other.ply", "-q", "-o", "other.planish", "--control", "6x6"], at);
+    let wrong = |maps: &str, model: &str, words: &str| {
+        let output = planish(&["relief", "import", model, maps, "-o", "c.planish"], at);
+        assert_eq!(status(&output), 3, "{}", stderr(&output));
+        assert!(error_line(&output).contains(words), "{}", stderr(&output));
+    };
+    wrong("plain", "other.planish", "has maps of other surfaces than this model's");
+    wrong("none", "box.planish", "relief.json");
+    wrong("plain", "plain/relief.json", "not a planish project");
+    ok(&["relief", "export", "box.planish", "-q", "-o", "normals", "--kind", "normal", "--preset", "gltf"], at);
+    wrong("normals", "box.planish", "holds no displacements");
+    ok(&["export", "box.planish", "-q", "-o", "first"], at);
+    wrong("first", "box.planish", "version 1 of relief.json");
+    let whole = fs::read(at.join("plain/patch_0000.exr")).unwrap();
+    fs::write(at.join("plain/patch_0000.exr"), &whole[..whole.len() / 2]).unwrap();
+    wrong("plain", "box.planish", "patch_0000.exr");
+    for (args, words) in [
+        (&["--tile", "16", "--sheets", "udim", "--texels", "40"][..], "do not fit on a tile of 16"),
+        (&["--texels", "1"], "two texels"),
+        (&["--kind", "normal", "--max-error", "1mm"], "does not go with normals"),
+        (&["--frame", "object", "--materialx"], "wires vectors in tangent space"),
+    ] {
+        let output = planish(&[&["relief", "export", "box.planish", "-o", "bad"], args].concat(), at);
+        assert_eq!(status(&output), 2);
+        assert!(error_line(&output).contains(words), "{}", stderr(&output));
+        assert!(!at.join("bad").exists());
+    }
+}
+
+#[test]
+fn a_model_is_parted_leveled_and_gets_detail_from_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    model(at);
+    script(at, "[[step]]\nedit = \"stroke\"\npath = [{ patch = 0, u = 0.5, v = 0.5 }]\nradius = 0.3\nheight = 0.05\n");
+    ok(&["relief", "edit", "box.planish", "edits.toml", "-q", "-o", "a.planish"], at);
+    // The same shape on another level of control points.
+    ok(&["relief", "level", "a.planish", "-q", "-o", "fine.planish", "--control", "9x9"], at);
+    let far = ["compare", "a.planish", "fine.planish", "--surface", "displaced", "--tolerance", "0.01%"];
+    ok(&far, at);
+    ok(&["relief", "part", "fine.planish", "-q", "-o", "parted.planish", "--wavelength", "20%"], at);
+    ok(&["relief", "transfer", "box.planish", "a.planish", "-q", "-o", "t.planish"], at);
+    ok(&["compare", "a.planish", "t.planish", "--surface", "displaced", "--tolerance", "0.01%"], at);
+    ok(&["relief", "transfer", "a.planish", "-q", "-o", "p.planish", "--pairs", "0:1,0:2@1"], at);
+    for (args, words) in [
+        (&["relief", "transfer", "box.planish", "-o", "x.planish"][..], "needs FROM.planish"),
+        (&["relief", "transfer", "box.planish", "-o", "x.planish", "--pairs", "0:99"], "no patch 99 among"),
+        (&["relief", "transfer", "box.planish", "-o", "x.planish", "--pairs", "0-1"], "two patches are needed"),
+    ] {
+        let output = planish(args, at);
+        assert_eq!(status(&output), 2);
+        assert!(error_line(&output).contains(words), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn moved_control_points_carry_the_relief_along() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    model(at);
+    script(at, "[[step]]\nedit = \"stroke\"\npath = [{ patch = 0, u = 0.5, v = 0.5 }]\nradius = 0.3\nheight = 0.05\n");
+    ok(&["relief", "edit", "box.planish", "edits.toml", "-q", "-o", "a.planish"], at);
+    // Surfaces that go out and in again move nothing.
+    ok(&["export", "a.planish", "--surface", "spline", "-q", "-o", "s.obj"], at);
+    let told = ok(&["deform", "a.planish", "s.obj", "-o", "same.planish"], at);
+    assert!(told.contains("apart by 0 mm") && told.contains("baked, stroke"), "{told}");
+    ok(&["compare", "a.planish", "same.planish", "--surface", "displaced", "--tolerance", "0.0001%"], at);
+    assert!(ok(&["info", "same.planish"], at).contains("deform"));
+    // A corner of the box is pulled out: all patches there stay together.
+    fs::write(at.join("moves.toml"), "[[move]]\npatch = 0\ni = 0\nj = 0\nby = [0.1, 0.2, 0.3]\n").unwrap();
+    ok(&["deform", "a.planish", "moves.toml", "-q", "-o", "pulled.planish"], at);
+    ok(&["export", "pulled.planish", "-q", "-o", "pulled.ply"], at);
+    let told = ok(&["info", "pulled.ply"], at);
+    assert!(told.contains("closed") || told.contains("watertight"), "{told}");
+    let output =
+        planish(&["compare", "a.planish", "pulled.planish", "--surface", "displaced", "--tolerance", "1%"], at);
+    assert_eq!(status(&output), 1, "it moved");
+    ok(&["deform", "a.planish", "pulled.planish", "-q", "-o", "again.planish"], at);
+    ok(&["compare", "pulled.planish", "again.planish", "--surface", "displaced", "--tolerance", "0.0001%"], at);
+    // What was deformed is a model like any other.
+    ok(&["relief", "export", "pulled.planish", "-q", "-o", "maps", "--kind", "height"], at);
+    ok(&["fit", "pulled.planish", "-q", "-o", "refit.planish", "--control", "6x6"], at);
+    for (name, text, words) in [
+        ("bad.toml", "[[move]]\npatch = 0\ni = 99\nj = 0\nby = [0, 0, 0]\n", "no control point 99, 0"),
+        ("bad.toml", "[[move]]\npatch = 0\n", "missing field"),
+        ("bad.obj", "v 0 0 0\nf 1 1 1\n", "without B-spline surfaces"),
+        ("bad.obj", "v 0 0 0\ncstype bspline\ndeg 3 3\nsurf 0 1 0 1 1 2\nend\n", "vertex 2 is not there (line 4)"),
+        ("bad.obj", "cstype bezier\n", "only surfaces of the kind bspline"),
+    ] {
+        fs::write(at.join(name), text).unwrap();
+        let output = planish(&["deform", "a.planish", name, "-o", "x.planish"], at);
+        assert_eq!(status(&output), 3, "{}", stderr(&output));
+        assert!(error_line(&output).contains(words), "{}", stderr(&output));
+    }
+}

@@ -1,0 +1,321 @@
+//! Maps of all kinds as images in a folder, and back.
+//!
+//! An image stands upright: its top row is `v = 1` (but where `upside_down` says otherwise). A texel is a node of the patch:
+//! sampled at `(u (n - 1) + 0.5) / n` neighbouring patches agree along their seam.
+
+mod image;
+mod sidecar;
+mod wiring;
+
+pub use image::MapFile;
+pub use sidecar::{ImageEntry, PatchEntry, Sidecar};
+pub use wiring::materialx;
+
+use crate::{Place, ReadError, WriteError};
+use image::Raster;
+use planish::Units;
+use planish::relief::layers::Picture;
+use planish::relief::maps::{MapKind, MapParams, PatchMap, Sheet};
+use planish::surface::Surface;
+use rayon::prelude::*;
+use sidecar::AttributeEntry;
+use std::path::Path;
+
+/// How maps are written.
+#[derive(Clone, Debug)]
+pub struct MapOptions {
+    /// How they were made.
+    pub params: MapParams,
+    /// Kind of the files.
+    pub file: MapFile,
+    /// True where the first row of the images is `v = 0`.
+    pub upside_down: bool,
+    /// Largest error of a displacement that rounding may make, units of the model; `None` rounds as little as the file does.
+    pub max_error: Option<f64>,
+    /// How another program wires them.
+    pub wiring: String,
+    /// Unit of the model.
+    pub units: Units,
+    /// Other files that are written beside the maps.
+    pub companions: Vec<String>,
+}
+
+/// How numbers stand in the images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Coding {
+    file: MapFile,
+    mid_level: f64,
+    scale: f64,
+    /// Displacements are multiples of this, if it is above 0.
+    step: f64,
+}
+
+impl Coding {
+    /// * `kind` - of the maps; `None` for an attribute
+    fn new(kind: Option<MapKind>, maps: &[PatchMap], file: MapFile, max_error: Option<f64>) -> Coding {
+        let most = maps.iter().flat_map(|m| &m.values).map(|x| x.abs()).fold(0.0, f32::max) as f64;
+        let most = if most > 0.0 { most } else { 1.0 };
+        let (mid_level, scale) = match (file.is_whole(), kind) {
+            (false, _) => (0.0, 1.0),
+            (true, Some(MapKind::Normal)) => (0.5, 2.0),
+            (true, Some(MapKind::Length) | None) => (0.0, most),
+            (true, Some(_)) => (0.5, 2.0 * most),
+        };
+        let step = max_error.map_or(0.0, |e| step_of(e, kind.map_or(1, MapKind::channels)));
+        Coding { file, mid_level, scale, step }
+    }
+
+    /// What the image holds for a number.
+    fn coded(&self, x: f32) -> f32 {
+        let x = if self.step > 0.0 { (x as f64 / self.step).round() * self.step } else { x as f64 };
+        self.file.held((x / self.scale + self.mid_level) as f32)
+    }
+
+    /// The number that the image means.
+    fn meant(&self, held: f32) -> f32 {
+        ((held as f64 - self.mid_level) * self.scale) as f32
+    }
+}
+
+/// The step whose multiples are at most `error` from any vector of `channels` numbers: half a step in each. It has three binary
+/// digits, so that its multiples end in zeros and compress.
+fn step_of(error: f64, channels: usize) -> f64 {
+    let most = 2.0 * error / (channels as f64).sqrt();
+    let power = most.log2().floor().exp2();
+    (most / power * 4.0).floor() / 4.0 * power
+}
+
+/// A sum over the control points, to tell maps of another model.
+pub fn surfaces_sum(surfaces: &[Surface]) -> u32 {
+    let mut sum = crc32fast::Hasher::new();
+    for s in surfaces {
+        sum.update(&(s.rows as u64).to_le_bytes());
+        sum.update(&(s.cols as u64).to_le_bytes());
+        s.control.iter().flat_map(|p| p.to_array()).for_each(|x| sum.update(&x.to_le_bytes()));
+    }
+    sum.finalize()
+}
+
+/// Name of an image: `patch_0007.exr`, `atlas.exr`, `relief.1001.exr`; with an attribute's name in front of it.
+fn image_name(sheet: &Sheet, image: usize, file: MapFile, attribute: Option<&str>) -> String {
+    let extension = file.extension();
+    let plain = |name: &str| name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect::<String>();
+    let stem = attribute.map(plain);
+    let prefix = stem.as_ref().map_or(String::new(), |s| format!("{s}_"));
+    match (sheet.kind, sheet.udim(image)) {
+        (_, Some(tile)) => format!("{}.{tile}.{extension}", stem.as_deref().unwrap_or("relief")),
+        (planish::relief::maps::SheetKind::Atlas, _) => format!("{prefix}atlas.{extension}"),
+        _ => format!("{prefix}patch_{image:04}.{extension}"),
+    }
+}
+
+/// Writes maps of all patches, then the sidecar: where it is, all images are. Returns the sidecar.
+///
+/// * `attributes` - maps of vertex attributes with their names, of the same shapes
+///
+/// # Errors
+/// `WriteError::Nothing` without maps; `WriteError::Inconsistent` if maps and sheet do not fit; those of writing.
+pub fn write_maps(
+    folder: impl AsRef<Path>,
+    maps: &[PatchMap],
+    attributes: &[(String, Vec<PatchMap>)],
+    sheet: &Sheet,
+    surfaces: &[Surface],
+    options: &MapOptions,
+) -> Result<Sidecar, WriteError> {
+    let folder = folder.as_ref();
+    if maps.is_empty() {
+        return Err(WriteError::Nothing("the model has no reliefs"));
+    }
+    if maps.len() != sheet.spots.len() {
+        let what = format!("{} maps for {} places", maps.len(), sheet.spots.len());
+        return Err(WriteError::Inconsistent { what, place: Place::Item("patch", maps.len()) });
+    }
+    std::fs::create_dir_all(folder)?;
+    let coding = Coding::new(Some(options.params.kind), maps, options.file, options.max_error);
+    let images = write_images(folder, maps, sheet, (coding, options.upside_down), None, options.units)?;
+    let mut told = Vec::new();
+    for (name, maps) in attributes {
+        let coding = Coding::new(None, maps, options.file, None);
+        let files = write_images(folder, maps, sheet, (coding, options.upside_down), Some(name), options.units)?;
+        told.push(AttributeEntry {
+            name: name.clone(),
+            scale: coding.scale,
+            files: files.into_iter().map(|i| i.file).collect(),
+        });
+    }
+    let (planish_relief, generator) = sidecar::head();
+    let entry = |(m, s): (&PatchMap, &planish::relief::maps::Spot)| PatchEntry {
+        image: s.image,
+        x: s.x,
+        y: s.y,
+        width: m.cols,
+        height: m.rows,
+    };
+    let length = |m: &PatchMap| {
+        m.values.chunks_exact(m.channels).map(|t| t.iter().map(|x| x * x).sum::<f32>()).fold(0.0, f32::max)
+    };
+    let sidecar = Sidecar {
+        planish_relief,
+        generator,
+        units: options.units,
+        params: options.params.clone(),
+        file: options.file,
+        mid_level: coding.mid_level,
+        scale: coding.scale,
+        scale_metres: coding.scale * options.units.metres(),
+        upside_down: options.upside_down,
+        uv: "(u (n - 1) + 0.5) / n".into(),
+        largest: maps.iter().map(length).fold(0.0, f32::max).sqrt() as f64,
+        max_error: options.max_error,
+        wiring: options.wiring.clone(),
+        surfaces: surfaces_sum(surfaces),
+        images,
+        patches: maps.iter().zip(&sheet.spots).map(entry).collect(),
+        attributes: told,
+        companions: options.companions.clone(),
+    };
+    sidecar::write(folder, &sidecar)?;
+    Ok(sidecar)
+}
+
+fn write_images(
+    folder: &Path,
+    maps: &[PatchMap],
+    sheet: &Sheet,
+    (coding, upside_down): (Coding, bool),
+    attribute: Option<&str>,
+    units: Units,
+) -> Result<Vec<ImageEntry>, WriteError> {
+    let note = format!("planish relief: value = (number - {}) * {} {units}", coding.mid_level, coding.scale);
+    let one = |(k, &[width, height]): (usize, &[usize; 2])| {
+        let mut raster = painted(maps, sheet, k, &coding);
+        if upside_down {
+            turn(&mut raster);
+        }
+        let file = image_name(sheet, k, coding.file, attribute);
+        image::write(&folder.join(&file), &raster, coding.file, &note)?;
+        Ok(ImageEntry { file, width, height })
+    };
+    sheet.images.par_iter().enumerate().map(one).collect()
+}
+
+/// An image with its patches and their gutters; what is left over means no displacement.
+fn painted(maps: &[PatchMap], sheet: &Sheet, image: usize, coding: &Coding) -> Raster {
+    let [width, height] = sheet.images[image];
+    let channels = maps[0].channels;
+    let mut values = vec![coding.coded(0.0); width * height * channels];
+    for (map, spot) in maps.iter().zip(&sheet.spots).filter(|(_, s)| s.image == image) {
+        let gutter = sheet.gutter;
+        for y in 0..map.rows + 2 * gutter {
+            let j = y.saturating_sub(gutter).min(map.rows - 1);
+            let row = height - 1 - (spot.y + y - gutter);
+            for x in 0..map.cols + 2 * gutter {
+                let i = x.saturating_sub(gutter).min(map.cols - 1);
+                let to = (row * width + spot.x + x - gutter) * channels;
+                let texel = map.texel(j * map.cols + i);
+                values[to..to + channels].iter_mut().zip(texel).for_each(|(to, &x)| *to = coding.coded(x));
+            }
+        }
+    }
+    Raster { width, height, channels, values }
+}
+
+/// What other ways to write the same maps take: bytes of all images and the largest error, as half floats in lossless ZIP and in DWA.
+/// # Errors
+/// `WriteError::Image` if the image library refuses.
+pub fn other_ways(maps: &[PatchMap], sheet: &Sheet) -> Result<[(u64, f64); 2], WriteError> {
+    let coding = Coding { file: MapFile::Exr, mid_level: 0.0, scale: 1.0, step: 0.0 };
+    let way = |dwa: bool| -> Result<(u64, f64), WriteError> {
+        let one = |k: usize| image::lossy(&painted(maps, sheet, k, &coding), dwa);
+        let each: Vec<(u64, f64)> =
+            (0..sheet.images.len()).into_par_iter().map(one).collect::<Result<_, WriteError>>()?;
+        Ok((each.iter().map(|e| e.0).sum(), each.iter().map(|e| e.1).fold(0.0, f64::max)))
+    };
+    Ok([way(false)?, way(true)?])
+}
+
+fn turn(raster: &mut Raster) {
+    let row = raster.width * raster.channels;
+    let turned = raster.values.chunks_exact(row).rev().flatten().copied().collect();
+    raster.values = turned;
+}
+
+/// Reads an image to stamp with: EXR, PNG or TIFF; the mean of its colours, and its alpha where it has one.
+/// # Errors
+/// As [`read_maps`], for one image.
+pub fn read_picture(path: &Path) -> Result<Picture, ReadError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    image::read_with_alpha(path, &name)
+}
+
+/// Maps that were read.
+#[derive(Clone, Debug)]
+pub struct ReadMaps {
+    /// What is told of them.
+    pub sidecar: Sidecar,
+    /// One per patch.
+    pub maps: Vec<PatchMap>,
+}
+
+/// Reads the maps in a folder.
+/// # Errors
+/// `ReadError` for a folder without sidecar, or an image that is missing, damaged, of another size or number of channels than
+/// the sidecar says, or with numbers that are not finite.
+pub fn read_maps(folder: impl AsRef<Path>) -> Result<ReadMaps, ReadError> {
+    let folder = folder.as_ref();
+    let sidecar = sidecar::read(folder)?;
+    let channels = sidecar.params.kind.channels();
+    let one = |(k, entry): (usize, &ImageEntry)| {
+        let mut raster = image::read(&folder.join(&entry.file), &entry.file, k)?;
+        let wrong = |what: String| ReadError::Syntax {
+            what: format!("{}: {what}", entry.file),
+            place: Place::Item("image", k),
+        };
+        if (raster.width, raster.height) != (entry.width, entry.height) {
+            let [w, h] = [raster.width, raster.height];
+            return Err(wrong(format!("it has {w} x {h} pixels, not {} x {}", entry.width, entry.height)));
+        }
+        if raster.channels < channels {
+            return Err(wrong(format!("it has {} channel, not {channels}", raster.channels)));
+        }
+        if raster.channels > channels {
+            let found = raster.channels;
+            raster.values = raster.values.chunks_exact(found).flat_map(|p| p[..channels].to_vec()).collect();
+            raster.channels = channels;
+        }
+        if sidecar.upside_down {
+            turn(&mut raster);
+        }
+        Ok(raster)
+    };
+    let rasters: Vec<Raster> = sidecar.images.par_iter().enumerate().map(one).collect::<Result<_, ReadError>>()?;
+    let coding = coding_of(&sidecar);
+    let cut = |entry: &PatchEntry| {
+        let raster = &rasters[entry.image];
+        let mut values = Vec::with_capacity(entry.width * entry.height * channels);
+        for j in 0..entry.height {
+            let row = raster.height - 1 - (entry.y + j);
+            let from = (row * raster.width + entry.x) * channels;
+            values.extend(raster.values[from..from + entry.width * channels].iter().map(|&x| coding.meant(x)));
+        }
+        PatchMap { rows: entry.height, cols: entry.width, channels, values }
+    };
+    let maps = sidecar.patches.par_iter().map(cut).collect();
+    Ok(ReadMaps { maps, sidecar })
+}
+
+fn coding_of(sidecar: &Sidecar) -> Coding {
+    Coding { file: sidecar.file, mid_level: sidecar.mid_level, scale: sidecar.scale, step: 0.0 }
+}
+
+/// The numbers of maps as they come back from files: what was written of them with the scale of `sidecar`.
+pub fn as_read(maps: Vec<PatchMap>, sidecar: &Sidecar) -> Vec<PatchMap> {
+    let step = sidecar.max_error.map_or(0.0, |e| step_of(e, sidecar.params.kind.channels()));
+    let coding = Coding { step, ..coding_of(sidecar) };
+    let again = |mut map: PatchMap| {
+        map.values.iter_mut().for_each(|x| *x = coding.meant(coding.coded(*x)));
+        map
+    };
+    maps.into_par_iter().map(again).collect()
+}

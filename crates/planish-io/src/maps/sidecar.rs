@@ -1,0 +1,143 @@
+//! The sidecar `relief.json` of maps, version 2: everything that an image itself does not say. Version 1, one 32-bit EXR
+//! per patch in the surface's frame, is that of `relief_files`.
+
+use super::image::MapFile;
+use crate::relief_files::SIDECAR;
+use crate::{Place, ReadError, WriteError, atomic};
+use planish::Units;
+use planish::relief::maps::MapParams;
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::Path;
+
+/// Version that is written, and the newest that is read.
+const VERSION: u32 = 2;
+
+/// What is told of maps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sidecar {
+    /// Version.
+    pub planish_relief: u32,
+    /// The program.
+    pub generator: String,
+    /// Unit of the displacements.
+    pub units: Units,
+    /// How the maps were made.
+    pub params: MapParams,
+    /// Kind of the image files.
+    pub file: MapFile,
+    /// A displacement is `(value - mid_level) * scale` of what the image holds.
+    pub mid_level: f64,
+    /// See `mid_level`.
+    pub scale: f64,
+    /// The same in metres.
+    pub scale_metres: f64,
+    /// True where the first row of the images is `v = 0`.
+    pub upside_down: bool,
+    /// Where a row of `n` texels of a patch is sampled for the parameter `u`.
+    pub uv: String,
+    /// Largest length of a displacement.
+    pub largest: f64,
+    /// Largest error of a displacement by rounding that was asked for, if any.
+    pub max_error: Option<f64>,
+    /// How a preset's program wires the map.
+    pub wiring: String,
+    /// Sum over the surfaces that the maps belong to.
+    pub surfaces: u32,
+    /// The images.
+    pub images: Vec<ImageEntry>,
+    /// The patches, in their order.
+    pub patches: Vec<PatchEntry>,
+    /// Images of vertex attributes with the same layout.
+    pub attributes: Vec<AttributeEntry>,
+    /// Other files written beside the maps: the base mesh, the wiring.
+    pub companions: Vec<String>,
+}
+
+/// An image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ImageEntry {
+    /// File beside the sidecar.
+    pub file: String,
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels from top to bottom.
+    pub height: usize,
+}
+
+/// Where a patch lies.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PatchEntry {
+    /// Number of the image.
+    pub image: usize,
+    /// Texels from the left.
+    pub x: usize,
+    /// Texels from below (from above where `upside_down`).
+    pub y: usize,
+    /// Texels along `u`.
+    pub width: usize,
+    /// Texels along `v`.
+    pub height: usize,
+}
+
+/// A vertex attribute.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AttributeEntry {
+    /// Its name.
+    pub name: String,
+    /// A value is `(number - mid_level) * scale` with a mid-level of 0.
+    pub scale: f64,
+    /// Its files, in the order of the images.
+    pub files: Vec<String>,
+}
+
+/// Writes the sidecar.
+pub(super) fn write(folder: &Path, sidecar: &Sidecar) -> Result<(), WriteError> {
+    let text = serde_json::to_string_pretty(sidecar).map_err(|e| WriteError::Image(e.to_string()))?;
+    atomic::write(&folder.join(SIDECAR), |out| Ok(writeln!(out, "{text}")?))
+}
+
+/// The version and the program of a new sidecar.
+pub(super) fn head() -> (u32, String) {
+    (VERSION, concat!("planish ", env!("CARGO_PKG_VERSION")).into())
+}
+
+/// Reads the sidecar and checks what it says of sizes.
+pub(super) fn read(folder: &Path) -> Result<Sidecar, ReadError> {
+    let failed = |source| ReadError::Companion { name: SIDECAR.into(), source, place: Place::Byte(0) };
+    let text = crate::mesh_file::bytes_of(&folder.join(SIDECAR)).map_err(failed)?;
+    #[derive(Deserialize)]
+    struct Version {
+        planish_relief: u32,
+    }
+    let wrong = |e: serde_json::Error| ReadError::Syntax {
+        what: format!("{SIDECAR} is not that of maps: {}", e.to_string().split(" at line ").next().unwrap_or_default()),
+        place: Place::Line(e.line()),
+    };
+    let version: Version = serde_json::from_slice(&text).map_err(wrong)?;
+    if version.planish_relief != VERSION {
+        return Err(ReadError::Unsupported {
+            what: format!("version {} of {SIDECAR}", version.planish_relief),
+            place: Place::Line(1),
+            hint: "write the maps with `planish relief export`",
+        });
+    }
+    let sidecar: Sidecar = serde_json::from_slice(&text).map_err(wrong)?;
+    let damaged = |what: String, p: usize| Err(ReadError::Syntax { what, place: Place::Item("patch", p) });
+    if !(sidecar.scale > 0.0 && sidecar.scale.is_finite() && sidecar.mid_level.is_finite()) {
+        return damaged(format!("{SIDECAR}: scale and mid-level are no numbers of a map"), 0);
+    }
+    for (p, entry) in sidecar.patches.iter().enumerate() {
+        let fits =
+            |at: usize, size: usize, whole: usize| size >= 2 && at.checked_add(size).is_some_and(|end| end <= whole);
+        match sidecar.images.get(entry.image) {
+            Some(i) if fits(entry.x, entry.width, i.width) && fits(entry.y, entry.height, i.height) => {}
+            _ => return damaged(format!("{SIDECAR}: the patch lies outside of its image"), p),
+        }
+    }
+    let plain = |name: &String| Path::new(name).file_name().is_some_and(|n| n == name.as_str());
+    match sidecar.images.iter().position(|i| !plain(&i.file)) {
+        Some(k) => damaged(format!("{SIDECAR}: image {k} lies in another folder"), 0),
+        None => Ok(sidecar),
+    }
+}

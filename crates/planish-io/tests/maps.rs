@@ -1,0 +1,262 @@
+//! Maps in every kind of file: what is written comes back, and what is broken is told.
+
+mod common;
+
+use common::folder;
+use planish::mesh::TriMesh;
+use planish::network::{Corner, Curve, CurveKind, Network, Patch, Side};
+use planish::relief::maps::{self, AxisOrder, MapFrame, MapKind, MapParams, PatchMap, SheetKind};
+use planish::relief::{Displaced, Relief};
+use planish::surface::{Surface, fit};
+use planish::{DVec3, Silent, Units};
+use planish_io::maps::{MapFile, MapOptions, as_read, materialx, other_ways, read_maps, read_picture, write_maps};
+
+/// Two patches side by side on a bent sheet, with a relief of waves.
+struct Pair {
+    network: Network,
+    surfaces: Vec<Surface>,
+    reliefs: Vec<Relief>,
+}
+
+fn pair() -> Pair {
+    let place = planish::mesh::FacePoint::corner(0, 0);
+    // 3 -- 4 -- 5 above 0 -- 1 -- 2.
+    let ends = [[0, 1], [1, 4], [3, 4], [0, 3], [1, 2], [2, 5], [4, 5]];
+    let curve = |corners| Curve { corners, kind: CurveKind::Smooth, points: Vec::new() };
+    let side = |curve, reversed| Side { curve, reversed };
+    let patch = |a, b, c, d| Patch { sides: [side(a, false), side(b, false), side(c, true), side(d, true)] };
+    let network = Network {
+        corners: vec![Corner { place }; 6],
+        curves: ends.map(curve).to_vec(),
+        patches: vec![patch(0, 1, 2, 3), patch(4, 5, 6, 1)],
+    };
+    let at = |x: f64, y: f64| DVec3::new(x, y, 0.1 * x * x);
+    let surface = |p: usize| {
+        let points: Vec<DVec3> =
+            (0..9 * 17).map(|k| at(p as f64 + (k % 17) as f64 / 16.0, (k / 17) as f64 / 8.0)).collect();
+        fit(&points, 9, 17, [5, 5]).unwrap()
+    };
+    let wave = |p: usize, k: usize| {
+        let t = (k % 17) as f64 / 16.0 + p as f64;
+        DVec3::new(0.01 * t.sin(), 0.02 * (3.0 * t).cos(), 0.1 * (7.0 * t).sin())
+    };
+    let relief = |p| Relief { rows: 9, cols: 17, vectors: (0..9 * 17).map(|k| wave(p, k)).collect() };
+    Pair { network, surfaces: vec![surface(0), surface(1)], reliefs: vec![relief(0), relief(1)] }
+}
+
+fn options(params: MapParams, file: MapFile) -> MapOptions {
+    MapOptions {
+        params,
+        file,
+        upside_down: false,
+        max_error: None,
+        wiring: String::new(),
+        units: Units::Cm,
+        companions: Vec::new(),
+    }
+}
+
+fn made(pair: &Pair, params: &MapParams) -> Vec<PatchMap> {
+    let displaced = Displaced { network: &pair.network, surfaces: &pair.surfaces, reliefs: &pair.reliefs };
+    maps::render(&displaced, &TriMesh::default(), params, &Silent).unwrap()
+}
+
+fn packed(all: &[PatchMap], params: &MapParams) -> maps::Sheet {
+    let shapes: Vec<[usize; 2]> = all.iter().map(|m| [m.rows, m.cols]).collect();
+    maps::pack(&shapes, params.sheets, params.gutter, params.tile).unwrap()
+}
+
+#[test]
+fn every_kind_frame_sheet_and_file_comes_back_as_what_it_holds() {
+    let pair = pair();
+    for kind in [MapKind::Vector, MapKind::Scalar, MapKind::Length, MapKind::Normal] {
+        for (frame, order) in [
+            (MapFrame::Surface, AxisOrder::Tbn),
+            (MapFrame::Tangent, AxisOrder::Tnb),
+            (MapFrame::Object, AxisOrder::TbnDown),
+        ] {
+            for (sheets, texels) in [(SheetKind::Patch, 0), (SheetKind::Atlas, 20), (SheetKind::Udim, 20)] {
+                let params = MapParams { kind, frame, order, sheets, texels, gutter: 2, tile: 32 };
+                let all = made(&pair, &params);
+                let most = all.iter().flat_map(|m| &m.values).fold(0f32, |a, x| a.max(x.abs()));
+                for (file, error) in [
+                    (MapFile::Exr, 0.0),
+                    (MapFile::ExrHalf, 5e-4),
+                    (MapFile::Png, 2.0 / 65535.0),
+                    (MapFile::Tiff, 2.0 / 65535.0),
+                ] {
+                    let folder = folder();
+                    let sheet = packed(&all, &params);
+                    let options = MapOptions { upside_down: texels == 20, ..options(params.clone(), file) };
+                    let sidecar = write_maps(folder.path(), &all, &[], &sheet, &pair.surfaces, &options).unwrap();
+                    let back = read_maps(folder.path()).unwrap();
+                    assert_eq!(back.sidecar, sidecar);
+                    assert_eq!(back.maps, as_read(all.clone(), &sidecar), "{kind:?} {frame:?} {sheets:?} {file:?}");
+                    let pairs = all.iter().zip(&back.maps).flat_map(|(a, b)| a.values.iter().zip(&b.values));
+                    let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0f32, f32::max);
+                    assert!(worst <= error * most, "{kind:?} {file:?}: {worst} of {most}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn gutters_repeat_the_border_and_the_first_row_is_the_upper_one() {
+    let pair = pair();
+    let params = MapParams { kind: MapKind::Scalar, sheets: SheetKind::Atlas, gutter: 3, ..MapParams::default() };
+    let all = made(&pair, &params);
+    let folder = folder();
+    let sheet = packed(&all, &params);
+    write_maps(folder.path(), &all, &[], &sheet, &pair.surfaces, &options(params, MapFile::Exr)).unwrap();
+    let picture = read_picture(&folder.path().join("atlas.exr")).unwrap();
+    let [width, height] = sheet.images[0];
+    assert_eq!([picture.width, picture.height], [width, height]);
+    for (map, spot) in all.iter().zip(&sheet.spots) {
+        for (x, i) in [(0, 0), (3, 0), (3 + 16, 16), (3 + 16 + 3, 16)] {
+            for (y, j) in [(0, 0), (3, 0), (3 + 8, 8), (3 + 8 + 3, 8)] {
+                let row = height - 1 - (spot.y - 3 + y);
+                let found = picture.pixels[row * width + spot.x - 3 + x][0];
+                assert_eq!(found, map.values[j * map.cols + i]);
+            }
+        }
+    }
+}
+
+#[test]
+fn rounding_stays_within_the_bound_and_makes_files_smaller() {
+    let pair = pair();
+    let params = MapParams { texels: 65, ..MapParams::default() };
+    let all = made(&pair, &params);
+    let sheet = packed(&all, &params);
+    let size = |max_error: Option<f64>| {
+        let folder = folder();
+        let options = MapOptions { max_error, ..options(params.clone(), MapFile::Exr) };
+        write_maps(folder.path(), &all, &[], &sheet, &pair.surfaces, &options).unwrap();
+        let back = read_maps(folder.path()).unwrap();
+        let texels = all.iter().zip(&back.maps).flat_map(|(a, b)| a.values.chunks(3).zip(b.values.chunks(3)));
+        let far = |(a, b): (&[f32], &[f32])| a.iter().zip(b).map(|(x, y)| (*x as f64 - *y as f64).powi(2)).sum::<f64>();
+        let worst = texels.map(far).fold(0.0, f64::max).sqrt();
+        assert!(worst <= max_error.unwrap_or(0.0), "{worst} above {max_error:?}");
+        back.sidecar.images.iter().map(|i| std::fs::metadata(folder.path().join(&i.file)).unwrap().len()).sum::<u64>()
+    };
+    let sizes = [None, Some(1e-5), Some(1e-4), Some(1e-3)].map(size);
+    assert!(sizes.windows(2).all(|w| w[1] < w[0]), "{sizes:?}");
+    let [(half, half_error), (dwa, dwa_error)] = other_ways(&all, &sheet).unwrap();
+    assert!(half < sizes[0] && dwa < sizes[0], "{half} {dwa} {sizes:?}");
+    assert!(
+        half_error > 0.0 && half_error < 1e-4 && dwa_error > half_error && dwa_error < 2e-2,
+        "{half_error} {dwa_error}"
+    );
+}
+
+#[test]
+fn broken_maps_are_told_in_one_line_with_a_hint() {
+    let pair = pair();
+    let params = MapParams::default();
+    let all = made(&pair, &params);
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let sheet = packed(&all, &params);
+    let reset = || {
+        write_maps(folder.path(), &all, &[], &sheet, &pair.surfaces, &options(params.clone(), MapFile::Exr)).unwrap();
+    };
+    let told = |wanted: &str| {
+        let text = read_maps(folder.path()).unwrap_err().to_string();
+        assert!(text.contains(wanted) && text.contains(" - hint: ") && !text.contains('\n'), "{text}");
+        reset();
+    };
+    reset();
+    std::fs::remove_file(at("patch_0001.exr")).unwrap();
+    told("patch_0001.exr");
+    let whole = std::fs::read(at("patch_0000.exr")).unwrap();
+    std::fs::write(at("patch_0000.exr"), &whole[..whole.len() / 2]).unwrap();
+    told("patch_0000.exr: ");
+    std::fs::write(at("patch_0000.exr"), "no image at all").unwrap();
+    told("patch_0000.exr: ");
+    let odd = |edit: &dyn Fn(&mut PatchMap)| {
+        let mut all = all.clone();
+        edit(&mut all[1]);
+        write_maps(
+            folder.path(),
+            &all,
+            &[],
+            &packed(&all, &params),
+            &pair.surfaces,
+            &options(params.clone(), MapFile::Exr),
+        )
+        .unwrap();
+    };
+    odd(&|m| m.values[5] = f32::NAN);
+    told("pixel 1, 8 is NaN, not a finite number");
+    let text = std::fs::read_to_string(at("relief.json")).unwrap();
+    for (from, to, words) in [
+        ("\"width\": 17", "\"width\": 18", "it has 17 x 9 pixels, not 18 x 9"),
+        ("\"planish_relief\": 2", "\"planish_relief\": 3", "version 3"),
+        ("\"planish_relief\": 2", "\"planish_relief\": \"x\"", "is not that of maps"),
+        ("\"kind\": \"vector\"", "\"kind\": \"hair\"", "unknown variant"),
+        ("\"scale\": 1.0", "\"scale\": 0.0", "no numbers of a map"),
+        ("patch_0000.exr", "../patch_0000.exr", "another folder"),
+        ("\"x\": 0", "\"x\": 18446744073709551615", "outside of its image"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(at("relief.json"), text.replace(from, to)).unwrap();
+        told(words);
+    }
+    std::fs::remove_file(at("relief.json")).unwrap();
+    told("relief.json");
+    // One channel where three are wanted.
+    let scalar = MapParams { kind: MapKind::Scalar, ..MapParams::default() };
+    let heights = made(&pair, &scalar);
+    write_maps(folder.path(), &heights, &[], &sheet, &pair.surfaces, &options(params.clone(), MapFile::Exr)).unwrap();
+    told("it has 1 channel, not 3");
+}
+
+#[test]
+fn materialx_names_every_image_and_refuses_what_it_has_no_node_for() {
+    let pair = pair();
+    let wired = |params: MapParams| {
+        let folder = folder();
+        let all = made(&pair, &params);
+        let sheet = packed(&all, &params);
+        let sidecar =
+            write_maps(folder.path(), &all, &[], &sheet, &pair.surfaces, &options(params, MapFile::Exr)).unwrap();
+        (materialx(&sidecar), sidecar)
+    };
+    for kind in [MapKind::Vector, MapKind::Scalar, MapKind::Normal] {
+        for sheets in [SheetKind::Patch, SheetKind::Udim] {
+            let (text, sidecar) =
+                wired(MapParams { kind, sheets, frame: MapFrame::Tangent, tile: 32, ..MapParams::default() });
+            let text = text.unwrap();
+            let named = sidecar.images.iter().all(|i| text.contains(&format!("value=\"{}\"", i.file)));
+            assert!(named || text.contains("relief.&lt;UDIM&gt;.exr"), "{text}");
+            assert_eq!(text.matches("<surfacematerial").count(), if sheets == SheetKind::Udim { 1 } else { 2 });
+        }
+    }
+    assert!(wired(MapParams { frame: MapFrame::Object, ..MapParams::default() }).0.is_none());
+    assert!(wired(MapParams { order: AxisOrder::Tnb, ..MapParams::default() }).0.is_none());
+}
+
+#[test]
+fn attributes_stand_in_the_same_places() {
+    let pair = pair();
+    let params = MapParams { sheets: SheetKind::Atlas, ..MapParams::default() };
+    let all = made(&pair, &params);
+    let colour = |m: &PatchMap| PatchMap {
+        values: (0..m.rows * m.cols * 3).map(|k| (k % 256) as f32 / 255.0).collect(),
+        ..m.clone()
+    };
+    let colours: Vec<PatchMap> = all.iter().map(colour).collect();
+    let folder = folder();
+    let sheet = packed(&all, &params);
+    let list = [("color".to_string(), colours)];
+    let sidecar =
+        write_maps(folder.path(), &all, &list, &sheet, &pair.surfaces, &options(params, MapFile::Png)).unwrap();
+    assert_eq!(
+        (sidecar.attributes[0].name.as_str(), &sidecar.attributes[0].files[..]),
+        ("color", &["color_atlas.png".to_string()][..])
+    );
+    let picture = read_picture(&folder.path().join("color_atlas.png")).unwrap();
+    assert_eq!([picture.width, picture.height], sheet.images[0]);
+    assert!(planish_io::relief_names(folder.path()).contains(&"color_atlas.png".to_string()));
+}

@@ -1,0 +1,185 @@
+//! Strokes and stamps: heights along the normal, by distance in space, so that they go on over seams.
+
+use super::super::Relief;
+use super::ground::{Ground, Place};
+use super::region::fade;
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A brush drawn along places: full height in the middle, nothing at the radius.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stroke {
+    /// The places, joined by straight lines in space.
+    pub path: Vec<Place>,
+    /// Radius, units of the model.
+    pub radius: f64,
+    /// Height in the middle, units of the model; below 0 it engraves.
+    pub height: f64,
+    /// Share of the radius over which it fades: 1 is soft, 0 has an upright border.
+    #[serde(default = "soft")]
+    pub softness: f64,
+}
+
+fn soft() -> f64 {
+    1.0
+}
+
+/// An image pressed into the surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stamp {
+    /// File of the image, beside the script.
+    pub image: String,
+    /// Its middle.
+    pub at: Place,
+    /// Direction that is up in the image, as it appears seen along the normal.
+    pub up: [f64; 3],
+    /// Width on the surface, units of the model.
+    pub width: f64,
+    /// Height of white, units of the model; below 0 it engraves.
+    pub height: f64,
+    /// How far above and below the middle it reaches, units of the model [default: half the width].
+    #[serde(default)]
+    pub depth: Option<f64>,
+    /// What is there gives way to the stamp where its alpha is 1; else it is added.
+    #[serde(default)]
+    pub replace: bool,
+}
+
+/// An image to stamp with.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Picture {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels from top to bottom.
+    pub height: usize,
+    /// Grey and alpha of each pixel, 0 to 1, from the upper left.
+    pub pixels: Vec<[f32; 2]>,
+}
+
+impl Picture {
+    /// Grey and alpha at `(x, y)` in pixels from the upper left corner, bilinear; transparent outside.
+    fn at(&self, x: f64, y: f64) -> [f64; 2] {
+        let (x, y) = (x - 0.5, y - 0.5);
+        let (i, j) = (x.floor(), y.floor());
+        let (s, t) = (x - i, y - j);
+        let pixel = |di: f64, dj: f64| {
+            let (i, j) = (i + di, j + dj);
+            let inside = i >= 0.0 && j >= 0.0 && i < self.width as f64 && j < self.height as f64;
+            let [g, a] = if inside { self.pixels[j as usize * self.width + i as usize] } else { [0.0, 0.0] };
+            DVec2::new(g as f64, a as f64)
+        };
+        let low = pixel(0.0, 0.0).lerp(pixel(1.0, 0.0), s);
+        low.lerp(pixel(0.0, 1.0).lerp(pixel(1.0, 1.0), s), t).to_array()
+    }
+}
+
+/// Heights of some nodes of the patches as a layer on which both sides of seams agree.
+fn raised(
+    ground: &Ground,
+    reach: impl Fn(usize) -> bool + Sync,
+    height: impl Fn(usize, usize) -> f64 + Sync,
+) -> Vec<Relief> {
+    let mut maps = ground.nothing();
+    maps.par_iter_mut().enumerate().filter(|(p, _)| reach(*p)).for_each(|(p, map)| {
+        let heights: Vec<f64> = (0..ground.nodes[p].len()).into_par_iter().map(|k| height(p, k)).collect();
+        if heights.iter().any(|&h| h != 0.0) {
+            map.vectors = heights.into_iter().map(|h| DVec3::new(0.0, 0.0, h)).collect();
+        }
+    });
+    ground.agree(&mut maps);
+    maps
+}
+
+/// True if a patch comes as near as `reach` to the box of some points.
+fn comes_near(ground: &Ground, patch: usize, points: &[DVec3], reach: f64) -> bool {
+    let (patch, path) = (&ground.boxes[patch], crate::geom::Aabb::of(points));
+    (patch.min - path.max).max(path.min - patch.max).max(DVec3::ZERO).length() <= reach
+}
+
+impl Stroke {
+    /// The layer; patches that it does not touch have no vectors.
+    /// # Errors
+    /// What is wrong with it.
+    pub fn layer(&self, ground: &Ground) -> Result<Vec<Relief>, String> {
+        if !(self.radius > 0.0 && self.radius.is_finite() && self.height.is_finite()) {
+            return Err("a stroke needs a radius above 0 and a height".into());
+        }
+        let path: Option<Vec<(DVec3, DVec3)>> = self.path.iter().map(|place| ground.locate(place)).collect();
+        let path = path.filter(|p| !p.is_empty()).ok_or("a stroke needs places on patches that are there")?;
+        let points: Vec<DVec3> = path.iter().map(|(p, _)| *p).collect();
+        let height = |p: usize, k: usize| {
+            let (at, frame) = &ground.nodes[p][k];
+            let (distance, normal) = nearest(&path, *at);
+            // The other side of a thin wall looks away.
+            if distance >= self.radius || frame.normal.dot(normal) <= 0.0 {
+                return 0.0;
+            }
+            self.height * fade(self.radius - distance, self.softness.clamp(0.0, 1.0) * self.radius)
+        };
+        Ok(raised(ground, |p| comes_near(ground, p, &points, self.radius), height))
+    }
+}
+
+/// Distance to a chain of points, and its normal there.
+fn nearest(path: &[(DVec3, DVec3)], at: DVec3) -> (f64, DVec3) {
+    let mut best = (path[0].0.distance(at), path[0].1);
+    for pair in path.windows(2) {
+        let (a, along) = (pair[0].0, pair[1].0 - pair[0].0);
+        let t = if along == DVec3::ZERO { 0.0 } else { ((at - a).dot(along) / along.length_squared()).clamp(0.0, 1.0) };
+        let distance = (a + along * t).distance(at);
+        if distance < best.0 {
+            best = (distance, pair[0].1.lerp(pair[1].1, t));
+        }
+    }
+    best
+}
+
+impl Stamp {
+    /// The layer, or what is wrong.
+    /// * `now` - the relief that gives way, where it does
+    pub(super) fn layer(&self, ground: &Ground, picture: &Picture, now: &[Relief]) -> Result<Vec<Relief>, String> {
+        if !(self.width > 0.0 && self.width.is_finite() && self.height.is_finite()) {
+            return Err("a stamp needs a width above 0 and a height".into());
+        }
+        if picture.width == 0 || picture.pixels.len() != picture.width * picture.height {
+            return Err("the image of the stamp is empty".into());
+        }
+        let (middle, normal) = ground.locate(&self.at).ok_or("the place of the stamp is on no patch")?;
+        let up = DVec3::from(self.up);
+        let up =
+            (up - normal * normal.dot(up)).try_normalize().ok_or("the stamp's up is along the normal; give another")?;
+        let right = up.cross(normal);
+        let pixel = self.width / picture.width as f64;
+        let depth = self.depth.unwrap_or(self.width / 2.0);
+        let value = |p: usize, k: usize| {
+            let (at, frame) = &ground.nodes[p][k];
+            let d = *at - middle;
+            if d.dot(normal).abs() > depth || frame.normal.dot(normal) <= 0.0 {
+                return [0.0, 0.0];
+            }
+            let x = d.dot(right) / pixel + picture.width as f64 / 2.0;
+            let y = picture.height as f64 / 2.0 - d.dot(up) / pixel;
+            picture.at(x, y)
+        };
+        let tall = pixel * picture.height as f64;
+        let reach = (self.width.hypot(tall) / 2.0).max(depth);
+        let near = |p: usize| comes_near(ground, p, &[middle], reach);
+        let mut maps = raised(ground, near, |p, k| value(p, k)[0] * value(p, k)[1] * self.height);
+        if self.replace {
+            for (p, map) in maps.iter_mut().enumerate().filter(|(p, _)| near(*p)) {
+                let alphas: Vec<f64> = (0..ground.nodes[p].len()).map(|k| value(p, k)[1]).collect();
+                if alphas.iter().any(|&a| a > 0.0) && map.vectors.is_empty() {
+                    map.vectors = vec![DVec3::ZERO; map.rows * map.cols];
+                }
+                let below = alphas.iter().zip(&now[p].vectors);
+                map.vectors.iter_mut().zip(below).for_each(|(d, (a, old))| *d -= *old * *a);
+            }
+            ground.agree(&mut maps);
+        }
+        Ok(maps)
+    }
+}

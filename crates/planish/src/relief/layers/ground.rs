@@ -1,0 +1,124 @@
+//! Places and normals of all texels of a model: made once, shared by all edits.
+
+use super::super::frame::{Frame, at_nodes};
+use super::super::seam::{Member, seam_nodes};
+use super::super::{Relief, ReliefError};
+use crate::geom::Aabb;
+use crate::network::Network;
+use crate::surface::Surface;
+use glam::DVec3;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A place: in space, or on a patch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Place {
+    /// `[x, y, z]`; the nearest place of the surface is meant.
+    Space([f64; 3]),
+    /// `{ patch = 3, u = 0.5, v = 0.5 }`.
+    Patch {
+        /// The patch.
+        patch: u32,
+        /// From 0 to 1.
+        u: f64,
+        /// From 0 to 1.
+        v: f64,
+    },
+}
+
+/// What edits stand on.
+pub struct Ground<'a> {
+    /// The network.
+    pub network: &'a Network,
+    /// The surfaces.
+    pub surfaces: &'a [Surface],
+    /// Nodes of each patch along `v` and along `u`.
+    pub shapes: Vec<[usize; 2]>,
+    /// For each patch and node its place on the surface and its frame.
+    pub(super) nodes: Vec<Vec<(DVec3, Frame)>>,
+    pub(super) boxes: Vec<Aabb>,
+    seams: Vec<Vec<Member>>,
+}
+
+impl<'a> Ground<'a> {
+    /// * `shapes` - of the reliefs
+    /// # Errors
+    /// [`ReliefError`] if the parts do not fit together.
+    pub fn new(
+        network: &'a Network,
+        surfaces: &'a [Surface],
+        shapes: Vec<[usize; 2]>,
+    ) -> Result<Ground<'a>, ReliefError> {
+        if surfaces.len() != network.patches.len() {
+            return Err(ReliefError::Count { what: "surfaces", found: surfaces.len(), wanted: network.patches.len() });
+        }
+        surfaces.iter().try_for_each(Surface::check)?;
+        let seams = seam_nodes(network, &shapes)?;
+        let none = Frame { tangent: DVec3::X, bitangent: DVec3::Y, normal: DVec3::Z };
+        let one = |(surface, &[rows, cols]): (&Surface, &[usize; 2])| {
+            let mut nodes = vec![(DVec3::ZERO, none); rows * cols];
+            at_nodes(surface, rows, cols, &mut nodes, |to, at, frame| *to = (at, frame));
+            nodes
+        };
+        let nodes: Vec<Vec<(DVec3, Frame)>> = surfaces.par_iter().zip(&shapes).map(one).collect();
+        let boxes = nodes.iter().map(|n| Aabb::of(n.iter().map(|(p, _)| p))).collect();
+        Ok(Ground { network, surfaces, shapes, nodes, boxes, seams })
+    }
+
+    /// Point and normal of a place: of one in space, those of the nearest node.
+    pub(super) fn locate(&self, place: &Place) -> Option<(DVec3, DVec3)> {
+        match *place {
+            Place::Patch { patch, u, v } => {
+                let surface = self.surfaces.get(patch as usize)?;
+                Some((surface.point(u, v), super::super::frame_at(surface, u, v).normal))
+            }
+            Place::Space(at) => {
+                let at = DVec3::from(at);
+                let nearest = |nodes: &Vec<(DVec3, Frame)>| {
+                    let near = |a: &&(DVec3, Frame), b: &&(DVec3, Frame)| {
+                        a.0.distance_squared(at).total_cmp(&b.0.distance_squared(at))
+                    };
+                    nodes.iter().min_by(near).copied()
+                };
+                let all: Vec<Option<(DVec3, Frame)>> = self.nodes.par_iter().map(nearest).collect();
+                let near = |a: &(DVec3, Frame), b: &(DVec3, Frame)| {
+                    a.0.distance_squared(at).total_cmp(&b.0.distance_squared(at))
+                };
+                all.into_iter().flatten().min_by(near).map(|(p, f)| (p, f.normal))
+            }
+        }
+    }
+
+    /// Gives both sides of seams the mean of their world vectors; patches without vectors have none to say.
+    pub(super) fn agree(&self, maps: &mut [Relief]) {
+        for members in &self.seams {
+            let told = |&&(p, _): &&Member| !maps[p as usize].vectors.is_empty();
+            if members.iter().filter(told).count() == 0 {
+                continue;
+            }
+            let world = |&(p, n): &Member| {
+                let d = maps[p as usize].vectors.get(n as usize).copied().unwrap_or_default();
+                self.nodes[p as usize][n as usize].1.world_from_local(d)
+            };
+            let worlds: Vec<DVec3> = members.iter().map(world).collect();
+            if worlds.iter().all(|w| *w == DVec3::ZERO) {
+                continue;
+            }
+            let mean = worlds.iter().sum::<DVec3>() / worlds.len() as f64;
+            for &(p, n) in members {
+                let (p, n) = (p as usize, n as usize);
+                if maps[p].vectors.is_empty() {
+                    maps[p].vectors = vec![DVec3::ZERO; maps[p].rows * maps[p].cols];
+                }
+                maps[p].vectors[n] = self.nodes[p][n].1.local_from_world(mean);
+            }
+        }
+    }
+
+    /// Maps without any displacement.
+    pub(super) fn nothing(&self) -> Vec<Relief> {
+        self.shapes.iter().map(|&[rows, cols]| Relief { rows, cols, vectors: Vec::new() }).collect()
+    }
+}

@@ -1,0 +1,314 @@
+//! Edits of reliefs as layers: bands, brushes, stamps, regions, limits, transfer.
+
+mod patchworks;
+
+use glam::DVec3;
+use patchworks::*;
+use planish::Silent;
+use planish::network::CurveKind;
+use planish::relief::layers::{self, Ground, Layers, Picture, ReliefEdit};
+use planish::relief::{self, Displaced, Relief};
+use planish::surface::{self, FitParams, Resolution, Surface};
+
+fn surfaces(work: &Patchwork, control: usize) -> Vec<Surface> {
+    let params = FitParams { resolution: Resolution::Control([control, control]), cells_per_span: 1.0, smoothing: 0.0 };
+    surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap()
+}
+
+fn heights(work: &Patchwork, height: impl Fn(DVec3) -> f64) -> Vec<Relief> {
+    let one = |g: &planish::grid::Grid| Relief {
+        rows: g.rows,
+        cols: g.cols,
+        vectors: g.points.iter().map(|&p| DVec3::new(0.0, 0.0, height(p))).collect(),
+    };
+    work.grids.iter().map(one).collect()
+}
+
+fn flat(across: usize, nodes: usize) -> Patchwork {
+    sheet(across, across, [false, false], [nodes, nodes], |x, y| DVec3::new(x, y, 0.0))
+}
+
+fn of(json: &str) -> ReliefEdit {
+    serde_json::from_str(json).unwrap()
+}
+
+struct Edited<'a> {
+    work: &'a Patchwork,
+    surfaces: Vec<Surface>,
+    layers: Layers,
+}
+
+impl<'a> Edited<'a> {
+    fn new(work: &'a Patchwork, reliefs: &[Relief]) -> Edited<'a> {
+        let mut layers = Layers::default();
+        layers.begin(reliefs);
+        Edited { work, surfaces: surfaces(work, 4), layers }
+    }
+
+    fn picture(_: &str) -> Result<Picture, String> {
+        // The left half white, the right half transparent.
+        let pixels = (0..8 * 4).map(|k| if k % 8 < 4 { [1.0, 1.0] } else { [1.0, 0.0] }).collect();
+        Ok(Picture { width: 8, height: 4, pixels })
+    }
+
+    fn make(&mut self, json: &str) -> Result<Vec<String>, String> {
+        let parts = (&self.work.network, &self.surfaces[..]);
+        let made =
+            layers::edit(&mut self.layers, parts, &of(json), &Edited::picture, &Silent).map_err(|e| e.to_string())?;
+        self.layers.record("edit", json, made.stack);
+        Ok(made.told)
+    }
+
+    fn sum(&self) -> Vec<Relief> {
+        self.layers.sum().unwrap()
+    }
+
+    fn crack(&self) -> f64 {
+        let reliefs = self.sum();
+        relief::widest_crack(&Displaced { network: &self.work.network, surfaces: &self.surfaces, reliefs: &reliefs })
+            .unwrap()
+    }
+}
+
+#[test]
+fn a_wave_goes_to_its_band_to_1e_3_and_bands_sum_to_the_bit() {
+    let work = flat(2, 65);
+    // Waves of length 0.125 and 1 on a square of side 2, even at its border.
+    let wave = |p: DVec3, length: f64| (std::f64::consts::TAU * p.x / length).cos();
+    let reliefs = heights(&work, |p| 0.01 * wave(p, 0.125) + 0.02 * wave(p, 1.0));
+    let s = surfaces(&work, 4);
+    let displaced = Displaced { network: &work.network, surfaces: &s, reliefs: &reliefs };
+    let bands = layers::split(&displaced, &[0.4], &Silent).unwrap();
+    assert_eq!(bands.len(), 2);
+    for (band, wanted) in
+        bands.iter().zip([heights(&work, |p| 0.02 * wave(p, 1.0)), heights(&work, |p| 0.01 * wave(p, 0.125))])
+    {
+        let pairs = band.maps.iter().flat_map(|m| &m.vectors).zip(wanted.iter().flat_map(|m| &m.vectors));
+        let worst = pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        assert!(worst < 2e-6, "{worst:e}");
+    }
+    // The mean square of a cosine is a half.
+    assert!((bands[0].rms - 0.02 / 2f64.sqrt()).abs() < 2e-4, "{}", bands[0].rms);
+    assert!((bands[1].rms - 0.01 / 2f64.sqrt()).abs() < 2e-4, "{}", bands[1].rms);
+    let three = layers::split(&displaced, &[0.2, 0.7], &Silent).unwrap();
+    for p in 0..4 {
+        for k in 0..65 * 65 {
+            let up: DVec3 = three.iter().map(|b| b.maps[p].vectors[k]).sum();
+            let down: DVec3 = three.iter().rev().map(|b| b.maps[p].vectors[k]).sum();
+            assert_eq!(up, down);
+            assert!(up.distance(reliefs[p].vectors[k]) < 1e-13);
+        }
+    }
+}
+
+#[test]
+fn what_is_even_everywhere_is_no_short_wave_on_a_closed_surface() {
+    let work = cube(17, CurveKind::Smooth, blob);
+    let s = surfaces(&work, 6);
+    let shapes: Vec<[usize; 2]> = work.grids.iter().map(|g| [g.rows, g.cols]).collect();
+    let filter = layers::Filter::new(&work.network, &s, &shapes, &Silent).unwrap();
+    let even: Vec<Vec<DVec3>> = work.grids.iter().map(|g| vec![DVec3::new(1.0, -2.0, 3.0); g.points.len()]).collect();
+    let values = filter.gather(&even);
+    for d in filter.low_pass(&values, 0.5, &Silent).unwrap() {
+        assert!(d.distance(values[0]) < 1e-9, "{d}");
+    }
+    assert!((filter.rms(&values) - 14f64.sqrt()).abs() < 1e-12);
+}
+
+#[test]
+fn a_stroke_has_its_height_in_the_middle_and_goes_on_over_seams_without_a_crack() {
+    let work = flat(2, 33);
+    let mut edited = Edited::new(&work, &heights(&work, |_| 0.0));
+    // Along y = 1, where four patches meet, from x = 0.5 to 1.5.
+    edited.make(r#"{"edit":"stroke","path":[[0.5,1,0],[1.5,1,0]],"radius":0.25,"height":0.1}"#).unwrap();
+    let sum = edited.sum();
+    for (grid, relief) in work.grids.iter().zip(&sum) {
+        for (p, d) in grid.points.iter().zip(&relief.vectors) {
+            let away = DVec3::new(p.x.clamp(0.5, 1.5), 1.0, 0.0).distance(*p);
+            let t: f64 = (1.0 - away / 0.25).clamp(0.0, 1.0);
+            let wanted = 0.1 * t * t * (3.0 - 2.0 * t);
+            assert!(d.distance(DVec3::new(0.0, 0.0, wanted)) < 1e-12, "{p}: {d}");
+        }
+    }
+    assert!(edited.crack() < 1e-14);
+    // The other side of a thin wall, which faces away, stays as it was; a sharp edge has no crack.
+    let thin = cube(17, CurveKind::Feature, |p| p * DVec3::new(1.0, 1.0, 0.01));
+    let mut edited = Edited::new(&thin, &heights(&thin, |_| 0.0));
+    edited.make(r#"{"edit":"stroke","path":[[0,0,0.01],[2,0,0.01]],"radius":0.3,"height":0.05}"#).unwrap();
+    let sum = edited.sum();
+    let bottom = thin.grids.iter().position(|g| g.points.iter().all(|p| p.z < 0.0)).unwrap();
+    assert!(sum[bottom].vectors[8 * 17 + 8].length() < 1e-15);
+    assert!(sum.iter().flat_map(|r| &r.vectors).any(|d| d.z > 0.04));
+    assert!(edited.crack() < 1e-14);
+}
+
+#[test]
+fn a_stamp_stands_upright_and_gives_way_where_it_is_transparent() {
+    let work = flat(2, 33);
+    let mut edited = Edited::new(&work, &heights(&work, |_| 0.5));
+    edited.make(r#"{"edit":"stamp","image":"a.png","at":[1,1,0],"up":[0,1,0],"width":1,"height":-0.1}"#).unwrap();
+    let at = |sum: &[Relief], x: f64, y: f64| {
+        let near = |a: &(f64, f64), b: &(f64, f64)| a.0.total_cmp(&b.0);
+        let all = work.grids.iter().zip(sum).flat_map(|(g, r)| g.points.iter().zip(&r.vectors));
+        all.map(|(p, d)| (p.distance(DVec3::new(x, y, 0.0)), d.z)).min_by(near).unwrap().1
+    };
+    let sum = edited.sum();
+    assert!((at(&sum, 0.75, 1.0) - 0.4).abs() < 1e-12, "white engraves");
+    assert_eq!(at(&sum, 1.25, 1.0), 0.5, "transparent leaves");
+    assert_eq!(at(&sum, 0.75, 1.4), 0.5, "above the image");
+    edited
+        .make(r#"{"edit":"stamp","image":"a.png","at":[1,1,0],"up":[1,0,0],"width":1,"height":0.3,"replace":true}"#)
+        .unwrap();
+    let sum = edited.sum();
+    // Up is along x: left of the image is above, along y.
+    assert!((at(&sum, 1.0, 1.25) - 0.3).abs() < 1e-12, "what was there gives way");
+    assert_eq!(at(&sum, 1.25, 0.6), 0.5);
+    assert!(edited.crack() < 1e-14);
+}
+
+#[test]
+fn scale_threshold_erase_blur_and_sharpen_do_what_they_say() {
+    let work = flat(2, 17);
+    let bump = |p: DVec3| if p.distance(DVec3::new(1.0, 1.0, 0.0)) < 0.3 { 0.2 } else { 0.01 };
+    let reliefs = heights(&work, bump);
+    let z = |r: &[Relief]| r.iter().flat_map(|r| &r.vectors).map(|d| d.z).collect::<Vec<f64>>();
+    let was = z(&reliefs);
+    let after = |json: &str| {
+        let mut edited = Edited::new(&work, &reliefs);
+        edited.make(json).unwrap();
+        assert!(edited.crack() < 1e-14);
+        z(&edited.sum())
+    };
+    assert_eq!(after(r#"{"edit":"scale","factor":2.0}"#), was.iter().map(|z| z * 2.0).collect::<Vec<_>>());
+    let low: Vec<f64> = was.iter().map(|&z| if z < 0.1 { 0.0 } else { z }).collect();
+    assert_eq!(after(r#"{"edit":"threshold","height":0.1}"#), low);
+    let erased = after(r#"{"edit":"erase","region":{"at":[1,1,0],"radius":0.4}}"#);
+    assert!(erased.iter().zip(&was).all(|(e, w)| if *w > 0.1 { *e == 0.0 } else { *e <= *w }));
+    let outside = after(r#"{"edit":"erase","region":{"at":[1,1,0],"radius":0.4,"outside":true}}"#);
+    assert!(outside.iter().zip(&was).all(|(o, w)| *w < 0.1 || o == w));
+    let one = after(r#"{"edit":"erase","region":{"patches":[3]}}"#);
+    assert!(one.iter().zip(&was).any(|(o, w)| o == w) && one.contains(&0.0));
+    let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
+    let soft = after(r#"{"edit":"blur","radius":0.1}"#);
+    assert!(soft.iter().copied().fold(0.0, f64::max) < 0.2 && (mean(&soft) - mean(&was)).abs() < 2e-3);
+    let hard = after(r#"{"edit":"sharpen","radius":0.1,"amount":1.0}"#);
+    for ((s, h), w) in soft.iter().zip(&hard).zip(&was) {
+        assert!((h - (2.0 * w - s)).abs() < 1e-12, "what is added is what a blur takes");
+    }
+}
+
+#[test]
+fn layers_come_back_in_every_order_of_undo_and_redo() {
+    let work = flat(2, 9);
+    let mut edited = Edited::new(&work, &heights(&work, |p| 0.1 * p.x));
+    let start = edited.sum();
+    edited.make(r#"{"edit":"stroke","path":[[1,1,0]],"radius":0.5,"height":0.1}"#).unwrap();
+    let stroked = edited.sum();
+    edited.make(r#"{"edit":"scale","factor":0.5,"layer":"stroke"}"#).unwrap();
+    edited.make(r#"{"edit":"resample","texels":21}"#).unwrap();
+    assert_eq!(edited.sum()[0].cols, 21);
+    edited.make(r#"{"edit":"remove","layer":"stroke"}"#).unwrap();
+    let end = edited.sum();
+    assert!(edited.layers.undo() && edited.layers.undo() && edited.layers.undo());
+    assert_eq!(edited.sum(), stroked);
+    assert!(edited.layers.undo() && !edited.layers.undo());
+    assert_eq!(edited.sum(), start);
+    while edited.layers.redo() {}
+    assert_eq!(edited.sum(), end);
+    // A new edit forgets what was taken back, and maps that nothing names.
+    edited.layers.undo();
+    edited.layers.undo();
+    edited.make(r#"{"edit":"erase"}"#).unwrap();
+    assert!(!edited.layers.redo() && edited.layers.fits(4));
+    assert_eq!(edited.layers.pool.len(), 3);
+}
+
+#[test]
+fn edits_that_cannot_be_meant_tell_why() {
+    let work = flat(1, 9);
+    let mut edited = Edited::new(&work, &heights(&work, |_| 0.1));
+    for (json, words) in [
+        (r#"{"edit":"stroke","path":[],"radius":1,"height":1}"#, "needs places"),
+        (r#"{"edit":"stroke","path":[{"patch":7,"u":0,"v":0}],"radius":1,"height":1}"#, "on patches that are there"),
+        (r#"{"edit":"stroke","path":[[0,0,0]],"radius":0,"height":1}"#, "radius above 0"),
+        (r#"{"edit":"erase","region":{"patches":[1]}}"#, "no patch 1 among 1"),
+        (r#"{"edit":"erase","region":{"at":[0,0,0]}}"#, "needs a radius"),
+        (r#"{"edit":"threshold","height":0}"#, "above 0"),
+        (r#"{"edit":"split","wavelengths":[]}"#, "above 0"),
+        (r#"{"edit":"scale","factor":2,"layer":"hair"}"#, "no layer \"hair\"; there are baked"),
+        (r#"{"edit":"remove","layer":"baked"}"#, "only layer"),
+        (r#"{"edit":"resample","texels":1}"#, "2 to 16384"),
+        (r#"{"edit":"tile","from":0,"to":[4]}"#, "no patch 4"),
+        (r#"{"edit":"limit","share":2}"#, "at most 1"),
+    ] {
+        let told = edited.make(json).unwrap_err();
+        assert!(told.contains(words), "{json}: {told}");
+    }
+}
+
+#[test]
+fn limited_displacements_stay_within_their_share_of_the_radius() {
+    // Radius 1, the normal outward.
+    let work = tube([61, 17]);
+    let s = surfaces(&work, 12);
+    let reliefs = vec![Relief { rows: 17, cols: 61, vectors: vec![DVec3::new(0.0, 0.0, -1.5); 17 * 61] }];
+    let mut edited = Edited { surfaces: s, ..Edited::new(&work, &reliefs) };
+    let told = edited.make(r#"{"edit":"limit","share":0.5}"#).unwrap();
+    assert_eq!(told, ["1037 texels brought back"]);
+    let sum = edited.sum();
+    assert!(relief::fold_over(&edited.surfaces[0], &sum[0]).unwrap().is_empty());
+    // Half the radius that the spline has at the node; at the seam, the mean of both of its sides.
+    for k in (0..17 * 61).filter(|k| (1..60).contains(&(k % 61))) {
+        let bends = edited.surfaces[0].jet((k % 61) as f64 / 60.0, (k / 61) as f64 / 16.0).curvatures().unwrap();
+        assert!((sum[0].vectors[k].z * bends[1] - 0.5).abs() < 1e-9, "{}", sum[0].vectors[k]);
+    }
+}
+
+#[test]
+fn a_tiled_patch_repeats_mirrored_and_a_pasted_one_turns() {
+    let work = flat(2, 17);
+    let reliefs = heights(&work, |p| if p.x <= 1.0 && p.y <= 1.0 { p.x } else { 0.0 });
+    let s = surfaces(&work, 4);
+    let shapes: Vec<[usize; 2]> = work.grids.iter().map(|g| [g.rows, g.cols]).collect();
+    let ground = Ground::new(&work.network, &s, shapes).unwrap();
+    let tiled = layers::tile(&ground, &reliefs[0], &[3], [2, 1]);
+    // Up to 1 in the middle of the patch and down again; its border is shared with patches that have none.
+    for k in 1..16 {
+        let wanted = if k <= 8 { k as f64 / 8.0 } else { (16 - k) as f64 / 8.0 };
+        assert!((tiled[3].vectors[5 * 17 + k].z - wanted).abs() < 1e-12);
+    }
+    let turned = layers::paste(&ground, &reliefs[0], &[(1, 3)]);
+    assert!((turned[3].vectors[5 * 17 + 3].z - 5.0 / 16.0).abs() < 1e-12);
+}
+
+#[test]
+fn detail_goes_to_another_network_of_the_same_shape_by_closest_points() {
+    let (coarse, fine) = (flat(1, 65), sheet(2, 2, [false, false], [33, 33], |x, y| DVec3::new(x / 2.0, y / 2.0, 0.0)));
+    let height = |p: DVec3| 0.05 * (6.0 * p.x).sin() * (5.0 * p.y).cos();
+    let (from, to) = (heights(&coarse, height), heights(&fine, height));
+    let (a, b) = (surfaces(&coarse, 4), surfaces(&fine, 4));
+    let shapes = fine.grids.iter().map(|g| [g.rows, g.cols]).collect();
+    let ground = Ground::new(&fine.network, &b, shapes).unwrap();
+    let source = Displaced { network: &coarse.network, surfaces: &a, reliefs: &from };
+    let (found, missed) = layers::transfer(&ground, &source, 0.1, &Silent).unwrap();
+    assert_eq!(missed, 0);
+    let pairs = found.iter().flat_map(|r| &r.vectors).zip(to.iter().flat_map(|r| &r.vectors));
+    let worst = pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    assert!(worst < 1e-9, "{worst:e}");
+}
+
+#[test]
+fn layers_are_the_same_to_the_bit_on_1_and_4_threads() {
+    let work = cube(17, CurveKind::Smooth, blob);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut edited = Edited::new(&work, &heights(&work, |p| 0.01 * (20.0 * p.x).sin()));
+            edited.make(r#"{"edit":"split","wavelengths":[0.4]}"#).unwrap();
+            edited.make(r#"{"edit":"stroke","path":[[1,0,0],[0,1,0],[0,0,1]],"radius":0.3,"height":0.1}"#).unwrap();
+            edited.make(r#"{"edit":"blur","radius":0.1}"#).unwrap();
+            edited.sum()
+        })
+    };
+    assert_eq!(run(1), run(4));
+}
