@@ -40,7 +40,9 @@ pub fn check(command: &Command) -> Result<(), Failure> {
         }
         Command::Edit(a) => a.stages.params(None).map(drop),
         Command::Export(a) => splines(a),
-        Command::Compare(_) | Command::Info(_) => Ok(()),
+        Command::Compare(a) => columns(&a.scan),
+        Command::Transform(a) => columns(&a.scan),
+        Command::Info(_) => Ok(()),
     }
 }
 
