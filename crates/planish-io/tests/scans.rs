@@ -342,3 +342,14 @@ fn compressed_points_whose_table_names_four_billion_chunks_are_refused_before_me
     let error = read_scan(&path, &ScanOptions::default()).unwrap_err();
     assert!(matches!(error, ReadError::Truncated { .. }), "{error}");
 }
+
+#[test]
+fn a_numpy_array_whose_type_begins_with_a_byte_of_no_text_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npy");
+    let mut bytes = b"\x93NUMPY\x01\x00\x3b\x00{'descr': '\xb3f8', 'fortran_order': False, 'shape': (2, 3), }".to_vec();
+    bytes.extend([0u8; 48]);
+    std::fs::write(&path, bytes).unwrap();
+    let error = read_scan(&path, &ScanOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("are not read"), "{error}");
+}
