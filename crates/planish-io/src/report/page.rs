@@ -458,6 +458,7 @@ mod tests {
     fn the_verdict_stands_above_the_tiles_folded_seams_are_told_from_ends_without_a_normal_and_steps_can_be_pasted() {
         let mut report = report();
         report.quality.insert("seam.folded".into(), Figure::Count(1));
+        report.quality.insert("seam.inner_angle_max_deg".into(), Figure::Number(178.0));
         let seam = |curve, inner_angle_max_deg, folded| SeamRow {
             curve,
             patches: [0, 1],

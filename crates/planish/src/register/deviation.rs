@@ -301,7 +301,7 @@ mod tests {
             values,
         };
         let histogram = found.histogram(4);
-        assert_eq!((histogram.bounds[0], histogram.bounds[2], histogram.bounds[4]), (-48.5, 0.0, 48.5));
+        assert_eq!((histogram.bounds[0], histogram.bounds[2], histogram.bounds[4]), (-49.5, 0.0, 49.5));
         assert!((histogram.shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
         assert!(histogram.shares.iter().all(|s| (s - 0.25).abs() < 0.011), "{:?}", histogram.shares);
     }
