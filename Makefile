@@ -3,6 +3,7 @@
 #   make demo    build the program and run everything on a synthetic part: products in out/demo
 #   make test    all tests: the library, the program, files read back by other programs' libraries
 #   make wheel   the Python package with the program inside: out/wheels
+#   make fuzz    damaged files for ten minutes a format, 300 killed sessions, hostile shapes through every command
 #   make lint    formatting and clippy, warnings are errors
 #   make bench   time every stage: bench/runs/<date>-<machine>.json
 #   make figures headline figures of parts and measured meshes: bench/runs/<date>-<machine>-figures.json
@@ -17,7 +18,7 @@ PYTHON  := .venv/bin/python
 DATA    := $(or $(PLANISH_DATA),../shared/data)
 
 .NOTPARALLEL:
-.PHONY: build demo wheel test test-rust test-readers test-python lint bench figures docs clean
+.PHONY: build demo wheel fuzz deny test test-rust test-readers test-python lint bench figures docs clean
 .DELETE_ON_ERROR:
 
 build: .stamp/packages
@@ -48,7 +49,19 @@ test-python: wheel
 	$(PYTHON) -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall out/wheels/*.whl
 	$(PYTHON) -m pytest crates/planish-py/tests
 
-lint: .stamp/packages
+# PLANISH_FUZZ_SECONDS: for each of the seventeen formats. Another PLANISH_FUZZ_SEED makes other files.
+fuzz: export PLANISH_FUZZ_SECONDS ?= 600
+fuzz: export PLANISH_KILLS ?= 300
+fuzz: export PLANISH_HOSTILE ?= all
+fuzz: .stamp/packages
+	$(CARGO) test --release --locked --workspace --test fuzz --test kills --test hostile -- --nocapture
+
+# Licences and sources of everything that is linked: deny.toml.
+deny:
+	@if $(CARGO) deny --version >/dev/null 2>&1; then $(CARGO) deny --locked check licenses sources bans; \
+	else echo "skipped: licences and sources; cargo-deny is not installed"; fi
+
+lint: .stamp/packages deny
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
 

@@ -3,9 +3,11 @@
 pub mod groups;
 pub mod relief;
 pub mod stages;
+pub mod steps;
 
 pub use groups::{Common, HoleArgs, Policy, ScanArgs};
 pub use stages::AllStages;
+pub use steps::{Step, Steps};
 
 use crate::failure::Failure;
 use crate::options::StageOptions;
@@ -67,8 +69,10 @@ pub enum Command {
     Relief(relief::Relief),
     /// Model -> STEP, IGES, USD, mesh, network or displacement maps; the format comes from the extension
     Export(Export),
-    /// Distances and normal errors between any two meshes or models
+    /// Distances between any two scans, meshes or models: signed, in figures, columns and pictures
     Compare(Compare),
+    /// Move, turn, scale, mirror or crop a mesh or a scan, or fit it on another
+    Transform(Transform),
     /// What is in a file, and what is wrong with it
     Info(Info),
 }
@@ -372,17 +376,50 @@ pub enum ExportWord {
 /// `planish compare`
 #[derive(Args, Debug)]
 pub struct Compare {
-    /// A mesh or a model
+    /// A scan, a mesh or a model: what is judged
     pub a: PathBuf,
-    /// A mesh or a model
+    /// A scan, a mesh or a model: what it should be like
     pub b: PathBuf,
+    /// A with its distance from B in a column for each vertex or point (below zero inside of B), and coloured by it
+    #[arg(short, long, value_name = "FILE.ply")]
+    pub output: Option<PathBuf>,
+    /// Picture of A, coloured by the distance from B
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
+    /// Bring A onto B first: the best rigid fit
+    #[arg(long)]
+    pub align: bool,
     /// Largest distance that is accepted: a length (0.05 in units of A, 0.05mm) or a share of A's diagonal (0.02%);
     /// beyond it the exit status is 1
     #[arg(long, value_name = "LENGTH|%", allow_negative_numbers = true)]
     pub tolerance: Option<Tolerance>,
+    /// Share of the distances that must keep the tolerance, percent
+    #[arg(long, value_name = "%", default_value = "100", value_parser = percent, requires = "tolerance")]
+    pub within: f64,
     /// Which surface of a model is compared
     #[arg(long, value_name = "WORD", default_value = "base")]
     pub surface: SurfaceWord,
+    /// Axis of A that points up, for the picture
+    #[arg(long, value_name = "AXIS", default_value = "y")]
+    pub up: UpWord,
+    #[command(flatten)]
+    pub scan: ScanArgs,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// `planish transform`
+#[derive(Args, Debug)]
+pub struct Transform {
+    /// A mesh or a scan of any format that is read
+    pub input: PathBuf,
+    /// The same moved: .ply, .obj, .stl or .glb for a mesh; .ply, .xyz, .las, .laz or .e57 for a scan
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub steps: Steps,
+    #[command(flatten)]
+    pub scan: ScanArgs,
     #[command(flatten)]
     pub common: Common,
 }
@@ -400,5 +437,12 @@ fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
         _ => Err("a number above 0 is needed".into()),
+    }
+}
+
+fn percent(text: &str) -> Result<f64, String> {
+    match text.trim_end_matches('%').parse::<f64>() {
+        Ok(x) if x > 0.0 && x <= 100.0 => Ok(x),
+        _ => Err("a share above 0 and up to 100 percent is needed".into()),
     }
 }

@@ -46,7 +46,9 @@ pub fn check(command: &Command) -> Result<(), Failure> {
             _ => Ok(()),
         },
         Command::Export(a) => splines(a),
-        Command::Deform(_) | Command::Compare(_) | Command::Info(_) => Ok(()),
+        Command::Compare(a) => columns(&a.scan),
+        Command::Transform(a) => columns(&a.scan),
+        Command::Deform(_) | Command::Info(_) => Ok(()),
     }
 }
 

@@ -1,10 +1,12 @@
 //! Inputs: meshes, models and networks from files, with what the user is told when they cannot be used.
 
 use crate::failure::Failure;
+use planish::cloud::Cloud;
 use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{Model, Units};
 use planish::network::Network;
-use planish_io::report::Input;
+use planish::pipeline::Warning;
+use planish_io::report::{Input, count};
 use std::path::Path;
 
 /// A mesh or a model.
@@ -48,12 +50,26 @@ pub fn tagged_mesh(path: &Path) -> Result<(TriMesh, Option<FeatureTags>), Failur
     planish_io::read_tagged_mesh(path).map_err(|e| Failure::input(path, e))
 }
 
-/// Reads a scan.
+/// Reads a scan with all its points.
 /// # Errors
 /// If the file is no usable scan.
-pub fn scan(path: &Path, options: &crate::args::ScanArgs) -> Result<planish::cloud::Cloud, Failure> {
+pub fn scan(path: &Path, options: &crate::args::ScanArgs) -> Result<Cloud, Failure> {
     let options = planish_io::ScanOptions { columns: options.columns.clone(), classes: options.classes.clone() };
     planish_io::read_scan(path, &options).map_err(|e| Failure::input(path, e))
+}
+
+/// Reads a scan, and what to tell of points that are too far off to be of it.
+/// # Errors
+/// If the file is no usable scan.
+pub fn scan_body(path: &Path, options: &crate::args::ScanArgs) -> Result<(Cloud, Option<Warning>), Failure> {
+    let options = planish_io::ScanOptions { columns: options.columns.clone(), classes: options.classes.clone() };
+    let (cloud, left_out) = planish_io::read_body(path, &options).map_err(|e| Failure::input(path, e))?;
+    let text = format!(
+        "{} points lie more than a hundred times further off than the rest and are left out: wild ranges, or returns that the \
+         scanner marks as invalid.",
+        count(left_out as u64)
+    );
+    Ok((cloud, (left_out > 0).then(|| Warning::new("points_far_off", text, ""))))
 }
 
 /// Reads a model.

@@ -12,6 +12,7 @@ mod pictures;
 mod placed;
 mod products;
 mod progress;
+mod shapes;
 mod summary;
 mod tolerance;
 mod usage;

@@ -5,7 +5,7 @@
 //! bear it belongs to somebody else.
 
 use crate::args::relief::ReliefCommand;
-use crate::args::{Command, Common, Policy};
+use crate::args::{Command, Common, Policy, Step};
 use crate::failure::Failure;
 use planish_io::ExportKind;
 use std::fs;
@@ -79,7 +79,18 @@ fn files(command: &Command) -> (&Common, Vec<PathBuf>, Vec<PathBuf>) {
             let is_folder = is_folder_of_maps(&a.output);
             (&a.common, vec![a.model.clone()], if is_folder { Vec::new() } else { vec![a.output.clone()] })
         }
-        Command::Compare(a) => (&a.common, vec![a.a.clone(), a.b.clone()], Vec::new()),
+        Command::Compare(a) => (
+            &a.common,
+            vec![a.a.clone(), a.b.clone()],
+            [a.output.clone(), a.picture.clone()].into_iter().flatten().collect(),
+        ),
+        Command::Transform(a) => {
+            let named = a.steps.0.iter().filter_map(|step| match step {
+                Step::Align(path) | Step::Pairs(path) => Some(path.clone()),
+                _ => None,
+            });
+            (&a.common, std::iter::once(a.input.clone()).chain(named).collect(), vec![a.output.clone()])
+        }
         Command::Info(a) => (&a.common, vec![a.file.clone()], Vec::new()),
     }
 }

@@ -7,14 +7,21 @@ use planish::mesh::TriMesh;
 use planish::model::{Drawing, Model};
 use planish::network::CurveKind;
 use planish::pipeline;
+use planish::register::Shape;
 use planish::relief;
-use planish::render::{self, Camera, Image, Line, Look, Paint};
+use planish::render::{self, Camera, Image, Label, Line, Look, Paint};
 use planish_io::Up;
-use planish_io::report::{Picture, Report, Scale, number};
+use planish_io::report::{Picture, Place, Report, Scale, number};
 use rayon::prelude::*;
 
 /// Pixels of a picture: two stand side by side on a page, sharp on screens of twice the usual density.
-const SIZE: (usize, usize) = (800, 600);
+const SIZE: (usize, usize) = (1200, 900);
+/// Pixels of one of the six sides: three stand side by side.
+const SIDE: (usize, usize) = (720, 540);
+/// Numbers that are drawn: more would be a grey cloud.
+const NUMBERS: usize = 400;
+/// Curves whose numbers are drawn: those that the table of seams has.
+const NUMBERED_CURVES: usize = 15;
 const ASPECT: f64 = SIZE.0 as f64 / SIZE.1 as f64;
 /// Free rim around the shape, as a share of half the picture.
 const RIM: f64 = 0.06;
@@ -38,6 +45,9 @@ const CUTS_PER_SPAN: usize = 8;
 /// Steps of the colour table: finer than a byte of colour can show.
 const COLORS: usize = 1024;
 
+/// Titles of the two pictures under a slider.
+const SLIDER: [&str; 2] = ["Surfaces", "Displaced"];
+
 /// Draws all pictures of a report.
 /// * `raw` - points of a scan on the surface, and its outliers
 /// # Errors
@@ -48,13 +58,11 @@ pub fn pictures(
     report: &Report,
     up: Up,
 ) -> Result<Vec<Picture>, Failure> {
-    let (up, toward) = match up {
-        Up::Y => (DVec3::Y, DVec3::new(0.62, 0.42, 1.0)),
-        Up::Z => (DVec3::Z, DVec3::new(-0.85, -0.75, 0.6)),
-    };
+    let (up, toward) = view(up);
     let camera = close_up(Camera::fit(&model.mesh.bounds(), toward, up, ASPECT), &model.mesh);
+    // The page is the ground, light or dark.
     let draw = |mesh: &TriMesh, look: Look| {
-        let look = Look { background: Some(GROUND), ..look };
+        let look = Look { background: None, ..look };
         let image = render::render(mesh, &look, &camera, SIZE.0, SIZE.1).map_err(Failure::fault)?;
         png(&image)
     };
@@ -65,7 +73,8 @@ pub fn pictures(
     let unit = report.input.units.as_str();
     let mut pictures = Vec::new();
     let mut add = |title: &str, caption: String, png: Vec<u8>| {
-        pictures.push(Picture { title: title.into(), caption, png, scale: None });
+        let place = if SLIDER.contains(&title) { Place::Slider } else { Place::Gallery };
+        pictures.push(Picture { title: title.into(), caption, png, scale: None, place });
     };
 
     if let Some([points, strays]) = raw {
@@ -86,6 +95,17 @@ pub fn pictures(
     let caption = "One colour per patch, with iso-curves of its grid in white. Dark lines are smooth seams, red lines \
                    follow sharp edges or the boundary.";
     add("Patches", caption.into(), draw(&painted, look)?);
+
+    let look = Look {
+        paint: Paint::PerTriangle(&colors),
+        lines: outlines(model),
+        labels: numbers(model, report),
+        hollows: 0.3,
+        ..Look::default()
+    };
+    let caption = "Numbers of the patches, and in red those of the seams that bend most: as in the table, in warnings and in \
+                   scripts for `planish edit`.";
+    add("Numbers", caption.into(), draw(&painted, look)?);
 
     let look = Look { paint: Paint::Plain(STEEL), ..Look::default() };
     add("Surfaces", "The B-spline surfaces alone, as they are in surface.step.".into(), draw(&base, look.clone())?);
@@ -110,7 +130,47 @@ pub fn pictures(
     if let Some(picture) = pictures.iter_mut().find(|p| p.title == "Deviation") {
         picture.scale = Some(Scale { colors: steps.collect(), labels: labels.into() });
     }
+    pictures.extend(sides(&displaced, up)?);
     Ok(pictures)
+}
+
+/// A shape from its six sides.
+fn sides(mesh: &TriMesh, up: DVec3) -> Result<Vec<Picture>, Failure> {
+    let front = if up == DVec3::Y { DVec3::Z } else { -DVec3::Y };
+    let right = up.cross(front);
+    let views = [
+        ("Front", front, up),
+        ("Back", -front, up),
+        ("Right", right, up),
+        ("Left", -right, up),
+        ("Top", up, -front),
+        ("Bottom", -up, front),
+    ];
+    let draw = |(title, toward, up): (&str, DVec3, DVec3)| {
+        let aspect = SIDE.0 as f64 / SIDE.1 as f64;
+        let camera = Camera::around(&mesh.points, toward, up, aspect);
+        let look = Look { paint: Paint::Plain(STEEL), background: None, ..Look::default() };
+        let image = render::render(mesh, &look, &camera, SIDE.0, SIDE.1).map_err(Failure::fault)?;
+        let png = png(&image)?;
+        Ok(Picture { title: title.into(), caption: String::new(), png, scale: None, place: Place::Side })
+    };
+    views.into_iter().map(draw).collect()
+}
+
+/// Numbers of the seams that bend most, at their middles, and of the patches, at theirs.
+fn numbers(model: &Model, report: &Report) -> Vec<Label> {
+    let mut worst: Vec<_> = report.seams.iter().filter(|s| !s.feature).collect();
+    worst.sort_by(|a, b| b.inner_angle_max_deg.total_cmp(&a.inner_angle_max_deg));
+    let seams = worst.into_iter().take(NUMBERED_CURVES).map(|seam| {
+        let points = &model.network.curves[seam.curve as usize].points;
+        let place = points[points.len() / 2].position(&model.mesh);
+        Label { place, text: seam.curve.to_string(), color: [255, 170, 160] }
+    });
+    let patches = model.grids.iter().enumerate().take(NUMBERS).map(|(p, grid)| {
+        let place = grid.points[grid.rows / 2 * grid.cols + grid.cols / 2];
+        Label { place, text: p.to_string(), color: [255, 255, 255] }
+    });
+    seams.chain(patches).collect()
 }
 
 /// What a picture of a drawing shows.
@@ -194,6 +254,52 @@ pub fn clay(mesh: &TriMesh, curves: Vec<Vec<DVec3>>, view: &View) -> Result<Vec<
     png(&render::render(mesh, &look, &camera, SIZE.0, SIZE.1).map_err(Failure::fault)?)
 }
 
+/// A shape coloured by a number for each vertex or point: blue below zero, red above, grey where there is none.
+/// * `reach` - the number at the ends of the scale
+/// # Errors
+/// If the picture cannot be drawn.
+pub fn coloured(shape: &Shape, values: &[f64], reach: f64, up: Up, unit: &str) -> Result<Vec<u8>, Failure> {
+    let (up, toward) = view(up);
+    let (mesh, values) = match shape {
+        Shape::Surface(mesh) => (mesh.clone(), values.to_vec()),
+        Shape::Points(cloud) => facing(&cloud.points, values, toward),
+    };
+    let camera = close_up(Camera::fit(&mesh.bounds(), toward, up, ASPECT), &mesh);
+    let label = format!("distance, {unit}");
+    let paint = Paint::Signed { values: &values, reach, label: &label };
+    let look = Look { paint, hollows: 0.0, background: Some(GROUND), ..Look::default() };
+    let image = render::render(&mesh, &look, &camera, SIZE.0, SIZE.1).map_err(Failure::fault)?;
+    png(&image)
+}
+
+/// Which way is up, and the direction from the shape towards the eye.
+fn view(up: Up) -> (DVec3, DVec3) {
+    match up {
+        Up::Y => (DVec3::Y, DVec3::new(0.62, 0.42, 1.0)),
+        Up::Z => (DVec3::Z, DVec3::new(-0.85, -0.75, 0.6)),
+    }
+}
+
+/// Points that have a number as small triangles that face the eye.
+fn facing(points: &[DVec3], values: &[f64], toward: DVec3) -> (TriMesh, Vec<f64>) {
+    let ids: Vec<usize> = (0..points.len()).filter(|&i| values[i].is_finite()).collect();
+    let step = ids.len().div_ceil(DOTS).max(1);
+    let shown: Vec<usize> = ids.into_iter().step_by(step).collect();
+    let diagonal = planish::geom::Aabb::of(shown.iter().map(|&i| &points[i])).diagonal();
+    // As if they lay on a square of the size of the box.
+    let side = diagonal / (shown.len().max(1) as f64).sqrt() / 2.0;
+    let u = toward.any_orthogonal_vector().normalize() * side;
+    let v = toward.normalize().cross(u);
+    let (mut mesh, mut numbers) = (TriMesh::default(), Vec::new());
+    for i in shown {
+        let first = mesh.points.len() as u32;
+        mesh.points.extend([-u - 0.6 * v, u - 0.6 * v, 1.2 * v].map(|d| points[i] + d));
+        mesh.triangles.push([first, first + 1, first + 2]);
+        numbers.extend([values[i]; 3]);
+    }
+    (mesh, numbers)
+}
+
 /// `camera` moved so that `mesh` just fills the picture.
 fn close_up(camera: Camera, mesh: &TriMesh) -> Camera {
     let mut camera = camera;
@@ -250,12 +356,18 @@ fn curves(model: &Model) -> Vec<Line> {
             lines.push(Line { points, color: ISO_COLOR, width: 0.8 });
         }
     }
-    for curve in &model.network.curves {
+    lines.extend(outlines(model));
+    lines
+}
+
+/// The curves of the network.
+fn outlines(model: &Model) -> Vec<Line> {
+    let line = |curve: &planish::network::Curve| {
         let points = curve.points.iter().map(|p| p.position(&model.mesh)).collect();
         let (color, width) = if curve.kind == CurveKind::Smooth { (SEAM_COLOR, 1.6) } else { (FEATURE_COLOR, 2.2) };
-        lines.push(Line { points, color, width });
-    }
-    lines
+        Line { points, color, width }
+    };
+    model.network.curves.iter().map(line).collect()
 }
 
 /// Points as small triangles that lie like the surface beside them, outliers in a colour of their own and facing up.
@@ -310,16 +422,18 @@ fn deviation(mesh: &TriMesh, surface: &TriMesh) -> (Vec<f64>, f64) {
 fn png(image: &Image) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, image.width as u32, image.height as u32);
-    encoder.set_color(png::ColorType::Rgb);
+    // An opaque ground needs no fourth byte.
+    let is_opaque = image.rgba.chunks_exact(4).all(|p| p[3] == 255);
+    encoder.set_color(if is_opaque { png::ColorType::Rgb } else { png::ColorType::Rgba });
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Balanced);
     encoder
         .add_text_chunk("Software".into(), concat!("planish ", env!("CARGO_PKG_VERSION")).into())
         .map_err(Failure::fault)?;
     let mut writer = encoder.write_header().map_err(Failure::fault)?;
-    // The ground is opaque: a fourth byte would say nothing.
-    let rgb: Vec<u8> = image.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-    writer.write_image_data(&rgb).map_err(Failure::fault)?;
+    let kept = if is_opaque { 3 } else { 4 };
+    let bytes_of: Vec<u8> = image.rgba.chunks_exact(4).flat_map(|p| &p[..kept]).copied().collect();
+    writer.write_image_data(&bytes_of).map_err(Failure::fault)?;
     writer.finish().map_err(Failure::fault)?;
     Ok(bytes)
 }

@@ -15,6 +15,8 @@ static STAGING: Mutex<Vec<Place>> = Mutex::new(Vec::new());
 
 /// How staging folders begin.
 const PREFIX: &str = ".planish-partial-";
+/// How often a staging folder is made anew that another process swept before it had its lock.
+const TRIES: usize = 10;
 /// The file in a staging folder that its process keeps locked.
 const LOCK: &str = ".lock";
 
@@ -81,9 +83,16 @@ impl Staged {
     fn open(beside: &Path, target: &Path, kind: Kind, made: Vec<PathBuf>) -> Result<Staged, Failure> {
         sweep(beside);
         let open = || -> io::Result<(TempDir, Option<File>)> {
-            let staging = tempfile::Builder::new().prefix(PREFIX).tempdir_in(beside)?;
+            let mut tries = 0..TRIES;
+            let (staging, lock) = loop {
+                let staging = tempfile::Builder::new().prefix(PREFIX).tempdir_in(beside)?;
+                match File::create(staging.path().join(LOCK)) {
+                    // Another process took the empty folder for one that was left.
+                    Err(e) if e.kind() == io::ErrorKind::NotFound && tries.next().is_some() => {}
+                    lock => break (staging, lock?),
+                }
+            };
             // A file system without locks keeps what killed runs leave.
-            let lock = File::create(staging.path().join(LOCK))?;
             let held = lock.try_lock().is_ok();
             Ok((staging, held.then_some(lock)))
         };
@@ -172,7 +181,11 @@ fn replace_maps(from: &Path, to: &Path) -> io::Result<()> {
 fn sweep(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten().filter(|e| e.file_name().to_string_lossy().starts_with(PREFIX)) {
-        let Ok(lock) = File::open(entry.path().join(LOCK)) else { continue };
+        let Ok(lock) = File::open(entry.path().join(LOCK)) else {
+            // Killed before it had its lock, or after it gave it back: nothing is in it.
+            let _ = fs::remove_dir(entry.path());
+            continue;
+        };
         if lock.try_lock().is_ok() {
             let _ = fs::remove_dir_all(entry.path());
         }
@@ -285,8 +298,11 @@ mod tests {
         fs::create_dir(&left).unwrap();
         fs::write(left.join(LOCK), "").unwrap();
         fs::write(left.join("half.ply"), "half").unwrap();
+        // And one that was killed before it had a lock.
+        let early = dir.path().join(format!("{PREFIX}early"));
+        fs::create_dir(&early).unwrap();
         let living = Staged::file(&dir.path().join("a.txt")).unwrap();
-        assert!(!left.exists());
+        assert!(!left.exists() && !early.exists());
         let folder = Staged::folder(&dir.path().join("deep/out")).unwrap();
         assert!(living.file_path().parent().unwrap().exists());
         drop(folder);

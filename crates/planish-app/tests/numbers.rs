@@ -140,3 +140,28 @@ fn the_noise_of_a_scan_is_one_figure_in_clean_mesh_and_run() {
     let page = fs::read_to_string(path.join("out/report.html")).unwrap();
     assert!(page.contains("Deviation, RMS") && !page.contains("Mean deviation") && !page.contains("on average"));
 }
+
+#[test]
+fn a_wild_point_and_invalid_returns_at_the_origin_are_left_out_and_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let ball = |k: usize, far: [f64; 2]| {
+        let (z, a) = (1.0 - 2.0 * (k as f64 + 0.5) / 2000.0, 2.4 * k as f64);
+        let r = (1.0f64 - z * z).sqrt();
+        format!("{} {} {z}\n", r * a.cos() + far[0], r * a.sin() + far[1])
+    };
+    let near: String = (0..2000).map(|k| ball(k, [0.0; 2])).collect();
+    let far: String = (0..2000).map(|k| ball(k, [FAR[0], FAR[1]])).collect();
+    fs::write(path.join("wild.xyz"), near + "1e12 0 0\n").unwrap();
+    fs::write(path.join("invalid.xyz"), far + &"0 0 0\n".repeat(200)).unwrap();
+    for (name, count) in [("wild.xyz", 1), ("invalid.xyz", 200)] {
+        let (table, told) = done(&["mesh", name, "-o", "m.ply", "--report", "r.json"], path);
+        assert!(told.contains(&format!("{count} points lie more than a hundred times further off")), "{told}");
+        assert!(table.contains("watertight, manifold"), "{table}");
+        let size = report(path, "r.json")["input"]["diagonal"].as_f64().unwrap();
+        assert!(size < 4.0, "{name}: {size}");
+        // `info` tells of all points.
+        done(&["info", name, "-q", "--report", "i.json"], path);
+        assert_eq!(report(path, "i.json")["quality"]["scan.points"], 2000 + count);
+    }
+}

@@ -15,6 +15,35 @@ pub fn shift_of(bounds: &Aabb) -> DVec3 {
     if center.is_finite() && size > 0.0 && center.length() > FAR * size { center.round() } else { DVec3::ZERO }
 }
 
+/// The points of the body of a scan, where others are so far from it that nothing lies between: wild ranges, and returns that a
+/// scanner marks by the origin of a map. `None` if all are of one body.
+///
+/// From the middle of the points (the median of each coordinate) outwards a body has no gap of more than [`FAR`] times; the half
+/// of the points that lies nearest is in it anyway.
+pub fn body(points: &[DVec3]) -> Option<Vec<u32>> {
+    let finite: Vec<u32> = (0..points.len() as u32).filter(|&i| points[i as usize].is_finite()).collect();
+    let median = |k: usize| {
+        let mut values: Vec<f64> = finite.iter().map(|&i| points[i as usize][k]).collect();
+        let middle = values.len() / 2;
+        *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    };
+    if finite.len() < LEAST {
+        return None;
+    }
+    let middle = DVec3::from_array([0, 1, 2].map(median));
+    let mut away: Vec<f64> = finite.iter().map(|&i| points[i as usize].distance(middle)).collect();
+    away.sort_unstable_by(f64::total_cmp);
+    let half = away.len() / 2;
+    let gap = (half..away.len() - 1).find(|&i| away[i] > 0.0 && away[i + 1] > FAR * away[i])?;
+    let reach = away[gap];
+    // What is no number stays: the cleaning counts it.
+    let is_in = |i: &u32| !(points[*i as usize].distance(middle) > reach);
+    Some((0..points.len() as u32).filter(is_in).collect())
+}
+
+/// Points that have a middle worth the name.
+const LEAST: usize = 10;
+
 /// Step between neighbouring numbers of single precision at the largest coordinate, if all coordinates are of single precision;
 /// `None` if any is finer.
 pub fn single_step(points: &[DVec3]) -> Option<f64> {
@@ -46,6 +75,24 @@ pub fn file_units(path: &Path) -> FileUnits {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_wild_point_and_returns_at_the_origin_of_a_map_are_no_body_and_a_body_of_two_parts_is_one() {
+        let ball = |k: usize| DVec3::new((k as f64).sin(), (k as f64 * 1.7).cos(), (k as f64 * 0.3).sin());
+        let mut points: Vec<DVec3> = (0..300).map(ball).collect();
+        assert_eq!(body(&points), None);
+        points.push(DVec3::new(1e12, 0.0, 0.0));
+        points.push(DVec3::new(f64::NAN, 0.0, 0.0));
+        let kept = body(&points).unwrap();
+        assert!(kept.len() == 301 && !kept.contains(&300));
+        let map = DVec3::new(515_380.0, 4_918_360.0, 0.0);
+        let mut points: Vec<DVec3> = (0..300).map(|k| ball(k) + map).collect();
+        points.extend([DVec3::ZERO; 30]);
+        assert_eq!(body(&points).unwrap(), (0..300).collect::<Vec<u32>>());
+        // Fifty sizes apart: a part and a sphere beside it.
+        let apart: Vec<DVec3> = (0..300).map(|k| ball(k) + DVec3::X * if k < 100 { 50.0 } else { 0.0 }).collect();
+        assert_eq!(body(&apart), None);
+    }
 
     #[test]
     fn a_shape_of_2_m_at_utm_coordinates_is_moved_by_whole_numbers_and_its_single_precision_is_half_a_metre() {

@@ -343,7 +343,8 @@ fn npy(mut file: impl Read, length: u64) -> Result<ScalarGrid, ReadError> {
     let quoted = |text: &str| text.split('\'').nth(1).map(str::to_owned);
     let descr =
         entry("descr").as_deref().and_then(quoted).ok_or_else(|| fault("the header has no \"descr\"".into()))?;
-    let (order, word) = descr.split_at(descr.len().min(1));
+    // A letter of more than one byte is no order of bytes.
+    let (order, word) = descr.split_at_checked(1).unwrap_or_default();
     let kind = match word {
         "i1" => Scalar::I8,
         "u1" | "b1" => Scalar::U8,

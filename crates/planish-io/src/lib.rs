@@ -50,7 +50,8 @@ pub use relief_files::{
     SIDECAR as RELIEF_SIDECAR, image_facts, is_relief_name, read_relief, relief_names, relief_roundtrip, write_relief,
 };
 pub use scan::{
-    SCAN_EXTENSIONS, ScanOptions, WRITTEN_SCANS, check_columns, is_scan, read_scan, write_scan, write_scan_in,
+    SCAN_EXTENSIONS, ScanOptions, WRITTEN_SCANS, check_columns, is_scan, read_body, read_scan, write_scan,
+    write_scan_in,
 };
 pub use step::{StepInput, StepSummary, write_step};
 pub use usd::{UsdInput, write_usd};

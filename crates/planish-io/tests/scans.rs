@@ -327,3 +327,29 @@ fn columns_that_nobody_knows_are_refused_with_their_names_and_empty_ones_are_tol
         }
     }
 }
+
+#[test]
+fn compressed_points_whose_table_names_four_billion_chunks_are_refused_before_memory_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.laz");
+    let points = (0..40).map(|k| DVec3::new(k as f64, (k % 3) as f64, (k % 7) as f64)).collect();
+    write_scan(&path, &Cloud::new(points)).unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    let data = u32::from_le_bytes(bytes[96..100].try_into().unwrap()) as usize;
+    let table = i64::from_le_bytes(bytes[data..data + 8].try_into().unwrap()) as usize;
+    bytes[table + 4..table + 8].copy_from_slice(&u32::MAX.to_le_bytes());
+    std::fs::write(&path, bytes).unwrap();
+    let error = read_scan(&path, &ScanOptions::default()).unwrap_err();
+    assert!(matches!(error, ReadError::Truncated { .. }), "{error}");
+}
+
+#[test]
+fn a_numpy_array_whose_type_begins_with_a_byte_of_no_text_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npy");
+    let mut bytes = b"\x93NUMPY\x01\x00\x3b\x00{'descr': '\xb3f8', 'fortran_order': False, 'shape': (2, 3), }".to_vec();
+    bytes.extend([0u8; 48]);
+    std::fs::write(&path, bytes).unwrap();
+    let error = read_scan(&path, &ScanOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("are not read"), "{error}");
+}

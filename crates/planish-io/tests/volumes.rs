@@ -58,3 +58,15 @@ fn npy_volumes_of_every_type_byte_order_and_memory_order_hold_the_same_numbers()
         }
     }
 }
+
+#[test]
+fn a_numpy_volume_whose_type_begins_with_a_byte_of_no_text_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npy");
+    let mut bytes =
+        b"\x93NUMPY\x01\x00\x3e\x00{'descr': '\xb3f8', 'fortran_order': False, 'shape': (2, 2, 2), }".to_vec();
+    bytes.extend([0u8; 64]);
+    std::fs::write(&path, bytes).unwrap();
+    let error = planish_io::read_grid(&path).unwrap_err();
+    assert!(error.to_string().contains("are not read"), "{error}");
+}

@@ -36,6 +36,7 @@ pub mod model;
 pub mod network;
 pub mod observe;
 pub mod pipeline;
+pub mod register;
 pub mod relief;
 pub mod render;
 pub mod sharp;

@@ -21,8 +21,8 @@ mod truth;
 
 pub use deform::{Move, deform, join, moved};
 pub use quality::{
-    SEAM_ANGLE_WARNING_DEG, displaced_mesh, displaced_patches, span_count, surface_mesh, surface_mesh_cut,
-    surface_patches, worst_seams,
+    FOLDED_DEG, SEAM_ANGLE_WARNING_DEG, displaced_mesh, displaced_patches, inner_angles, span_count, surface_mesh,
+    surface_mesh_cut, surface_patches, worst_seams,
 };
 pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
 pub use scan::{

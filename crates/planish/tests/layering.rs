@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Rooms of the library and the floor each stands on; a room may use its own and lower floors.
-const FLOORS: [(&str, u32); 20] = [
+const FLOORS: [(&str, u32); 21] = [
     ("observe", 0),
     ("linalg", 0),
     ("geom", 0),
@@ -13,6 +13,7 @@ const FLOORS: [(&str, u32); 20] = [
     ("mend", 2),
     ("sharp", 2),
     ("cloud", 2),
+    ("register", 3),
     ("field", 3),
     ("contour", 4),
     ("synthetic", 5),

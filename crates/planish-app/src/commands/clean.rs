@@ -34,10 +34,11 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
     let params = args.clean.params(None)?;
     let project = args.project.params(None)?;
-    let (scan, read) = session.step("read", || files::scan(&args.scan, &args.options))?;
+    let ((scan, far_off), read) = session.step("read", || files::scan_body(&args.scan, &args.options))?;
     let units = session.units_of(&args.scan);
     let mut report = Report::new("clean", scan_facts(&args.scan, &scan, units));
     let far = scan.shift != planish::DVec3::ZERO;
+    report.warnings.extend(far_off);
     report.warnings.extend(session.guessed_units(&args.scan, scan.bounds().diagonal(), far));
     let (made, fit) = session.bars.step("samples", |o| cloud::clean(&scan, &params, o));
     if progress::interrupted() {

@@ -22,7 +22,8 @@ use planish_io::{MeshFormat, WriteOptions};
 const RESOLUTION: usize = 129;
 /// What is to be meshed.
 enum Source {
-    Scan(planish::cloud::Cloud),
+    /// With what to tell of points that are not of it.
+    Scan(planish::cloud::Cloud, Option<Warning>),
     Mesh(Placed),
     Script(Script),
     Grid(Box<planish::field::ScalarGrid>),
@@ -32,7 +33,7 @@ impl Source {
     /// What brings the coordinates back to their place.
     fn shift(&self) -> DVec3 {
         match self {
-            Source::Scan(scan) => scan.shift,
+            Source::Scan(scan, _) => scan.shift,
             Source::Mesh(placed) => placed.shift,
             Source::Script(_) | Source::Grid(_) => DVec3::ZERO,
         }
@@ -47,7 +48,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let grid_params = args.volume.params(None)?;
     let ((source, input, units), read) = session.step("read", || read(session, args, params.cells))?;
     match &source {
-        Source::Scan(_) => {}
+        Source::Scan(..) => {}
         Source::Grid(_) => {
             args.meshing.refuse_cleaning("--volume-close tells whether the border of a volume closes the surface")?
         }
@@ -60,7 +61,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let contour = &params.contour;
     let (made, record) = session.bars.step("mesh", |o| {
         Ok::<Made, Trouble>(match &source {
-            Source::Scan(scan) => Made::OfScan(pipeline::mesh_scan(scan, &params, o)?),
+            Source::Scan(scan, _) => Made::OfScan(pipeline::mesh_scan(scan, &params, o)?),
             Source::Mesh(placed) => Made::Plain(contour::from_mesh(&placed.mesh, sampling, contour, o)?),
             Source::Script(Script::Part(part)) => Made::Plain(contour::from_part(part, sampling, contour, o)?),
             Source::Script(Script::Job(milling)) => Made::Plain(contour::from_field(milling, sampling, contour, o)?),
@@ -86,12 +87,15 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
             .map_err(|e| write_failure(&args.input, &args.output, e))
     })?;
     let mut report = Report::new("mesh", input);
-    if let Source::Mesh(_) | Source::Scan(_) = &source {
+    if let Source::Mesh(_) | Source::Scan(..) = &source {
         let far = shift != DVec3::ZERO;
         report.warnings.extend(session.guessed_units(&args.input, report.input.diagonal, far));
     }
     if let Source::Mesh(placed) = &source {
         report.warnings.extend(placed.warning(units.symbol()));
+    }
+    if let Source::Scan(_, far_off) = &source {
+        report.warnings.extend(far_off.clone());
     }
     report.warnings.extend(moved);
     report.stages = vec![read, record, write];
@@ -185,10 +189,10 @@ fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Sourc
         return Ok((Source::Grid(Box::new(grid)), input, units));
     }
     if planish_io::is_scan(path) {
-        let scan = files::scan(path, &args.scan)?;
+        let (scan, far_off) = files::scan_body(path, &args.scan)?;
         let units = session.units_of(path);
         let input = super::clean::scan_facts(path, &scan, units);
-        return Ok((Source::Scan(scan), input, units));
+        return Ok((Source::Scan(scan, far_off), input, units));
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     if !files::is_model(path) && MeshFormat::ALL.iter().all(|f| f.extension() != extension) {

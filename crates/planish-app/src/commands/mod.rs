@@ -15,6 +15,7 @@ mod missed;
 mod relief;
 mod run;
 mod smooth;
+mod transform;
 
 use crate::args::{Cli, Command, Common};
 use crate::check;
@@ -57,6 +58,7 @@ pub fn run(cli: Cli) -> Result<Status, Failure> {
         Command::Relief(args) => relief::relief(&args),
         Command::Export(args) => export::export(&Session::new(&args.common)?, &args),
         Command::Compare(args) => compare::compare(&Session::new(&args.common)?, &args),
+        Command::Transform(args) => transform::transform(&Session::new(&args.common)?, &args),
         Command::Info(args) => info::info(&Session::new(&args.common)?, &args),
     }
 }
@@ -132,7 +134,11 @@ impl Session {
         for warning in &report.warnings {
             let place = if warning.place.is_empty() { String::new() } else { format!(" ({})", warning.place) };
             let text = words::message(&warning.message.replace('\u{202f}', " "));
-            let _ = writeln!(std::io::stderr(), "warning: {}{}", text.trim_end_matches('.'), words::plain(&place));
+            // A step of a script has lines of its own: it stands in the report.
+            let try_it =
+                if warning.step.starts_with("--") { format!(" - hint: try {}", warning.step) } else { String::new() };
+            let text = text.trim_end_matches('.');
+            let _ = writeln!(std::io::stderr(), "warning: {text}{}{try_it}", words::plain(&place));
         }
     }
 

@@ -35,8 +35,8 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
         truth: None,
     };
     if planish_io::is_scan(&args.input) {
-        let (scan, read) = session.step("read", || files::scan(&args.input, &args.scan))?;
-        return produce(session, job, From::scan(&scan), staged, vec![read]);
+        let ((scan, far_off), read) = session.step("read", || files::scan_body(&args.input, &args.scan))?;
+        return produce(session, job, From { warning: far_off, ..From::scan(&scan) }, staged, vec![read]);
     }
     args.meshing.refuse("use `planish mesh` first")?;
     if let Some(flag) = args.points.first_given() {
@@ -244,10 +244,17 @@ pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
         format!(
             "gap {} {unit}, angle {} degrees at most, {} RMS",
             number(figure("seam.gap_max")),
-            number(figure("seam.angle_max_deg")),
+            number(figure("seam.inner_angle_max_deg")),
             number(figure("seam.angle_rms_deg"))
         ),
     );
+    if figure("seam.folded") > 0.0 {
+        table.row("folded seams", count(figure("seam.folded") as u64));
+    }
+    let (state, reasons) = planish_io::report::verdict(report);
+    let why: Vec<&str> = reasons.iter().map(|r| r.1.as_str()).collect();
+    let why = if why.is_empty() { String::new() } else { format!(": {}", why.join("; ")) };
+    table.row("verdict", format!("{}{why}", state.word().to_lowercase()));
     if let Some(wanted) = demanded {
         let reached = figure("surface.patch_rms_max_rel");
         let word = if reached > wanted { "missed" } else { "kept" };
@@ -273,10 +280,12 @@ pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
 /// The seams of a report, worst first.
 pub fn seam_rows(model: &Model, seams: &[planish::surface::SeamQuality]) -> Vec<SeamRow> {
     let uses = model.network.uses();
+    let inner = pipeline::inner_angles(model);
     pipeline::worst_seams(seams)
         .into_iter()
         .map(|s| {
             let sides = &uses[s.curve as usize];
+            let inner_angle_max_deg = inner.get(&s.curve).map_or(0.0, |found| found.0);
             SeamRow {
                 curve: s.curve,
                 patches: [sides[0].0, sides[1].0],
@@ -285,6 +294,8 @@ pub fn seam_rows(model: &Model, seams: &[planish::surface::SeamQuality]) -> Vec<
                 gap_max: s.gap_max,
                 angle_max_deg: s.angle_max_deg,
                 angle_rms_deg: s.angle_rms_deg,
+                inner_angle_max_deg,
+                folded: s.kind == planish::network::CurveKind::Smooth && inner_angle_max_deg > pipeline::FOLDED_DEG,
             }
         })
         .collect()

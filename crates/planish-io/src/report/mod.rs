@@ -3,14 +3,19 @@
 //! Both are written from one [`Report`]; the page adds pictures. Keys are documented in the guide and only
 //! ever added to.
 
+mod gallery;
 mod page;
+mod verdict;
 mod words;
 
-pub use page::{Picture, Scale, html};
+pub use gallery::{Picture, Place, Scale};
+pub use page::html;
+pub use verdict::{State, verdict};
 pub use words::{count, distance, number, percent};
 
 use planish::edit::CurveNumber;
 use planish::pipeline::{Figure, Quality, StageRecord, Warning};
+use planish::register::Histogram;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -35,6 +40,9 @@ pub struct Report {
     /// What every edit of a script did; absent for other commands.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub edits: Vec<EditRow>,
+    /// Distances in classes; absent but after `compare`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub histogram: Option<Histogram>,
 }
 
 /// What one edit of a script did. Numbers are those after it.
@@ -110,6 +118,12 @@ pub struct SeamRow {
     pub angle_max_deg: f64,
     /// Root mean square of that angle, degrees.
     pub angle_rms_deg: f64,
+    /// Largest angle but at the ends, where a surface may have no normal of its own, degrees.
+    #[serde(default)]
+    pub inner_angle_max_deg: f64,
+    /// True if the surfaces beside it turn back over each other.
+    #[serde(default)]
+    pub folded: bool,
 }
 
 impl Report {
@@ -124,6 +138,7 @@ impl Report {
             warnings: Vec::new(),
             seams: Vec::new(),
             edits: Vec::new(),
+            histogram: None,
         }
     }
 

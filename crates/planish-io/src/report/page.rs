@@ -1,9 +1,9 @@
 //! The page: one self-contained HTML file without scripts and without anything from outside.
 
-use super::words::{count, number, percent};
+use super::gallery::{Picture, gallery};
+use super::verdict::{State, state_of, verdict};
+use super::words::{count, escape, number, percent};
 use super::{Report, SeamRow};
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use planish::pipeline::Figure;
 use std::fmt::Write;
 
@@ -11,27 +11,9 @@ use std::fmt::Write;
 const SEAMS_SHOWN: usize = 15;
 /// Gaps below this fraction of the diagonal are rounding: the boundary is shared.
 const ROUNDING: f64 = 1e-12;
+/// An end whose normals turn by so much more than those of the rest, degrees, has a patch without a normal of its own there.
+const END_DEG: f64 = 10.0;
 const STYLE: &str = include_str!("style.css");
-
-/// A picture of the page.
-pub struct Picture {
-    /// What it shows, in a few words.
-    pub title: String,
-    /// One or two sentences on how to read it.
-    pub caption: String,
-    /// The picture as a PNG file.
-    pub png: Vec<u8>,
-    /// Meaning of its colours, if they have one.
-    pub scale: Option<Scale>,
-}
-
-/// The meaning of a picture's colours.
-pub struct Scale {
-    /// Colours from the least to the greatest value, evenly spaced, sRGB.
-    pub colors: Vec<[u8; 3]>,
-    /// Labels from the least to the greatest value, evenly spaced.
-    pub labels: Vec<String>,
-}
 
 /// Figures of a scan in words: key, meaning, and how the value is read.
 const SCAN_FIGURES: [(&str, &str, Reading); 15] = [
@@ -69,7 +51,7 @@ const TRUTH_FIGURES: [(&str, &str, Reading); 12] = [
 ];
 
 /// Figures of quality in words: key, meaning, and how the value is read.
-const FIGURES: [(&str, &str, Reading); 25] = [
+const FIGURES: [(&str, &str, Reading); 27] = [
     ("mesh.triangles", "Triangles of the mesh after repair", Reading::Plain),
     ("mesh.watertight", "The mesh is closed", Reading::Plain),
     ("mesh.manifold", "The mesh is manifold", Reading::Plain),
@@ -90,7 +72,9 @@ const FIGURES: [(&str, &str, Reading); 25] = [
     ("displaced.max", "Displaced surface to input, largest", Reading::Length),
     ("seam.count", "Seams between two patches", Reading::Plain),
     ("seam.gap_max", "Largest gap along a seam", Reading::Length),
-    ("seam.angle_max_deg", "Largest angle across a smooth seam", Reading::Degrees),
+    ("seam.folded", "Smooth seams that are folded over", Reading::Plain),
+    ("seam.inner_angle_max_deg", "Largest angle across a smooth seam, its ends left out", Reading::Degrees),
+    ("seam.angle_max_deg", "The same with ends, which may have no normal of their own", Reading::Degrees),
     ("seam.angle_rms_deg", "Angle across smooth seams, root mean square", Reading::Degrees),
     ("relief.texels", "Texels of all displacement maps", Reading::Plain),
     ("relief.max", "Largest displacement", Reading::Length),
@@ -121,6 +105,7 @@ pub fn html(report: &Report, pictures: &[Picture]) -> String {
         escape(name)
     );
     header(&mut page, report, name);
+    judged(&mut page, report);
     lead(&mut page, report);
     tiles(&mut page, report);
     warnings(&mut page, report);
@@ -182,7 +167,7 @@ fn lead(page: &mut String, report: &Report) {
     if let Some(rms) = report.figure("displaced.rms_rel") {
         text += &format!(" With the displacement maps applied the average is {}.", percent(rms));
     }
-    if let (Some(gap), Some(angle)) = (report.figure("seam.gap_max"), report.figure("seam.angle_max_deg")) {
+    if let (Some(gap), Some(angle)) = (report.figure("seam.gap_max"), report.figure("seam.inner_angle_max_deg")) {
         let closed = if gap <= ROUNDING * report.input.diagonal {
             "Neighbours share their boundaries exactly".to_owned()
         } else {
@@ -193,6 +178,25 @@ fn lead(page: &mut String, report: &Report) {
     let _ = writeln!(page, "<p class=\"lead\">{}</p>", escape(&text));
 }
 
+/// The verdict, where there is a result to judge.
+fn judged(page: &mut String, report: &Report) {
+    if report.figure("patches.count").is_none() {
+        return;
+    }
+    let (state, reasons) = verdict(report);
+    let _ = write!(page, "<div class=\"verdict {}\"><b>{}</b>", state.class(), state.word());
+    if reasons.is_empty() {
+        page.push_str("<span>Nothing speaks against it: no folds, no gaps, no bent seams.</span>");
+    } else {
+        page.push_str("<ol>");
+        for (state, reason) in &reasons {
+            let _ = write!(page, "<li class=\"{}\">{}</li>", state.class(), escape(reason));
+        }
+        page.push_str("</ol>");
+    }
+    page.push_str("</div>\n");
+}
+
 fn tiles(page: &mut String, report: &Report) {
     let unit = report.input.units.as_str();
     let length = |key: &str| {
@@ -200,11 +204,12 @@ fn tiles(page: &mut String, report: &Report) {
         Some((number(rel * 100.0), "%", format!("{} {unit}", number(report.figure(key)?))))
     };
     let seconds: f64 = report.stages.iter().map(|s| s.seconds).sum();
-    let mut row: Vec<(String, &str, &str, String)> = Vec::new();
+    let state = |key: &str| state_of(report, key).unwrap_or(State::Good);
+    let mut row: Vec<(String, &str, &str, String, State)> = Vec::new();
     let control = report.figure("surface.control_points");
     if let Some(n) = report.figure("patches.count") {
         let detail = control.map(|c| format!("{} control points", count(c as u64))).unwrap_or_default();
-        row.push((count(n as u64), "", "Patches", detail));
+        row.push((count(n as u64), "", "Patches", detail, State::Good));
     }
     for (key, name) in [
         ("surface.rms", "Deviation, RMS"),
@@ -212,24 +217,36 @@ fn tiles(page: &mut String, report: &Report) {
         ("displaced.rms", "With displacement, RMS"),
     ] {
         if let Some((value, small, detail)) = length(key) {
-            row.push((value, small, name, detail));
+            row.push((value, small, name, detail, state(key)));
         }
     }
-    if let Some(angle) = report.figure("seam.angle_max_deg") {
-        let gap = gap_of(report, report.figure("seam.gap_max").unwrap_or(0.0));
-        row.push((number(angle), "°", "Seam angle, worst", format!("gap {} {unit}", number(gap))));
+    let angle = report.figure("seam.inner_angle_max_deg").or(report.figure("seam.angle_max_deg"));
+    if let Some(angle) = angle {
+        let gap = match gap_of(report, report.figure("seam.gap_max").unwrap_or(0.0)) {
+            0.0 => "no gaps".to_owned(),
+            gap => format!("gap {} {unit}", number(gap)),
+        };
+        let worst = ["seam.folded", "seam.inner_angle_max_deg", "seam.gap_max"].map(state).into_iter().max();
+        row.push((number(angle), "°", "Smooth seams bend, most", gap, worst.unwrap_or(State::Good)));
     }
-    if !report.stages.is_empty() {
-        row.push((number(seconds), "s", "Computing time", format!("{} stages", report.stages.len())));
+    if let Some(folds) = report.figure("grid.folds") {
+        let cells = report.figure("grid.points").unwrap_or(0.0);
+        let detail = format!("of {}", count(cells as u64));
+        row.push((count(folds as u64), "", "Folded cells", detail, state("grid.folds")));
+    }
+    if let Some(closed) = report.flag("mesh.watertight") {
+        let word = if closed { "closed" } else { "open" };
+        row.push((word.to_owned(), "", "Shape", format!("{} s", number(seconds)), state("mesh.watertight")));
     }
     if row.is_empty() {
         return;
     }
     page.push_str("<div class=\"tiles\">\n");
-    for (value, small, name, detail) in row {
+    for (value, small, name, detail, state) in row {
         let _ = writeln!(
             page,
-            "<div class=\"tile\"><b>{}{}<small>{small}</small></b><span>{name}</span><i>{}</i></div>",
+            "<div class=\"tile {}\"><b>{}{}<small>{small}</small></b><span>{name}</span><i>{}</i></div>",
+            state.class(),
             escape(&value),
             if small.is_empty() || small == "°" { "" } else { "\u{202f}" },
             escape(&detail)
@@ -252,46 +269,21 @@ fn warnings(page: &mut String, report: &Report) {
         if !warning.place.is_empty() {
             let _ = write!(page, " <span class=\"where\">({})</span>", escape(&warning.place));
         }
+        if !warning.step.is_empty() {
+            let to = if warning.step.starts_with("[[") { "A step for <code>planish edit</code>" } else { "Try" };
+            let _ = write!(page, "<div class=\"step\">{to}:<pre>{}</pre></div>", escape(&warning.step));
+        }
         page.push_str("</li>\n");
     }
     page.push_str("</ul></div>\n");
-}
-
-fn gallery(page: &mut String, pictures: &[Picture]) {
-    if pictures.is_empty() {
-        return;
-    }
-    page.push_str(
-        "<h2>Pictures</h2>\n<p class=\"note\">All from the same point of view.</p>\n<div class=\"pictures\">\n",
-    );
-    for picture in pictures {
-        let _ = write!(
-            page,
-            "<figure><img alt=\"{}\" src=\"data:image/png;base64,{}\">\n<figcaption><b>{}</b><span>{}</span>",
-            escape(&picture.title),
-            STANDARD.encode(&picture.png),
-            escape(&picture.title),
-            escape(&picture.caption)
-        );
-        if let Some(scale) = &picture.scale {
-            let stops: Vec<String> = scale.colors.iter().map(|c| format!("rgb({},{},{})", c[0], c[1], c[2])).collect();
-            let labels: String = scale.labels.iter().map(|l| format!("<span>{}</span>", escape(l))).collect();
-            let _ = write!(
-                page,
-                "<div class=\"scale\"><div style=\"background:linear-gradient(90deg,{})\"></div><p>{labels}</p></div>",
-                stops.join(",")
-            );
-        }
-        page.push_str("</figcaption></figure>\n");
-    }
-    page.push_str("</div>\n");
 }
 
 fn seams(page: &mut String, report: &Report) {
     if report.seams.is_empty() {
         return;
     }
-    let smooth: Vec<&SeamRow> = report.seams.iter().filter(|s| !s.feature).collect();
+    let mut smooth: Vec<&SeamRow> = report.seams.iter().filter(|s| !s.feature).collect();
+    smooth.sort_by(|a, b| b.inner_angle_max_deg.total_cmp(&a.inner_angle_max_deg));
     let sharp = report.seams.len() - smooth.len();
     let mut note = format!(
         "Across a smooth seam the surface should not bend: the angle is that between the two normals. {} smooth seams",
@@ -306,28 +298,36 @@ fn seams(page: &mut String, report: &Report) {
     }
     let _ = write!(
         page,
-        "<h2>Seams</h2>\n<p class=\"note\">{}</p>\n<div class=\"scroll\"><table><thead><tr><th>Curve</th>\
-         <th>Between patches</th><th class=\"n\">Angle, largest</th><th class=\"n\">Angle, RMS</th>\
-         <th class=\"n\">Gap</th><th class=\"n\">Length</th></tr></thead><tbody>\n",
+        "<h2>Seams</h2>\n<p class=\"note\">{}</p>\n<table class=\"stack\"><thead><tr><th>Curve</th>\
+         <th>Between patches</th><th class=\"n\">Bends, most</th><th class=\"n\">Bends, RMS</th>\
+         <th class=\"n\">Gap</th><th class=\"n\">Length</th><th></th></tr></thead><tbody>\n",
         escape(&note)
     );
     for seam in smooth.iter().take(SEAMS_SHOWN) {
+        let gap = match gap_of(report, seam.gap_max) {
+            0.0 => "none".to_owned(),
+            gap => format!("{} {}", number(gap), escape(&report.input.units)),
+        };
+        let (class, word) = match seam {
+            seam if seam.folded => ("broken", "folded"),
+            seam if seam.angle_max_deg > END_DEG + seam.inner_angle_max_deg => ("", "an end has no normal"),
+            _ => ("", ""),
+        };
         let _ = writeln!(
             page,
-            "<tr><td>{}</td><td>{} and {}</td><td class=\"n\">{}°</td><td class=\"n\">{}°</td><td class=\"n\">{} {}</td>\
-             <td class=\"n\">{} {}</td></tr>",
+            "<tr class=\"{class}\"><td data-label=\"Curve\">{}</td><td data-label=\"Between patches\">{} and {}</td>\
+             <td class=\"n\" data-label=\"Bends, most\">{}°</td><td class=\"n\" data-label=\"Bends, RMS\">{}°</td>\
+             <td class=\"n\" data-label=\"Gap\">{gap}</td><td class=\"n\" data-label=\"Length\">{} {}</td><td>{word}</td></tr>",
             seam.curve,
             seam.patches[0],
             seam.patches[1],
-            number(seam.angle_max_deg),
+            number(seam.inner_angle_max_deg),
             number(seam.angle_rms_deg),
-            number(gap_of(report, seam.gap_max)),
-            escape(&report.input.units),
             number(seam.length),
             escape(&report.input.units)
         );
     }
-    page.push_str("</tbody></table></div>\n");
+    page.push_str("</tbody></table>\n");
 }
 
 /// A gap without what is rounding.
@@ -341,8 +341,8 @@ fn figures(page: &mut String, report: &Report, title: &str, list: &[(&str, &str,
     }
     let _ = write!(
         page,
-        "<h2>{title}</h2>\n<p class=\"note\">Each with its key in <code>report.json</code>.</p>\n<div class=\"scroll\">\
-         <table><tbody>\n",
+        "<h2>{title}</h2>\n<p class=\"note\">Each with its key in <code>report.json</code>.</p>\n\
+         <table class=\"stack\"><tbody>\n",
     );
     for &(key, words, reading) in list {
         let Some(figure) = report.quality.get(key) else { continue };
@@ -356,12 +356,13 @@ fn figures(page: &mut String, report: &Report, title: &str, list: &[(&str, &str,
         };
         let _ = writeln!(
             page,
-            "<tr><td>{}</td><td class=\"n\">{}</td><td><code>{key}</code></td></tr>",
+            "<tr class=\"{}\"><td>{}</td><td class=\"n\">{}</td><td class=\"key\"><code>{key}</code></td></tr>",
+            state_of(report, key).filter(|s| *s != State::Good).map_or("", State::class),
             escape(words),
             escape(&value)
         );
     }
-    page.push_str("</tbody></table></div>\n");
+    page.push_str("</tbody></table>\n");
 }
 
 fn stages(page: &mut String, report: &Report) {
@@ -371,15 +372,15 @@ fn stages(page: &mut String, report: &Report) {
     let longest = report.stages.iter().map(|s| s.seconds).fold(0.0, f64::max);
     let total: f64 = report.stages.iter().map(|s| s.seconds).sum();
     page.push_str(
-        "<h2>Stages</h2>\n<div class=\"scroll\"><table><thead><tr><th>Stage</th><th class=\"n\">Time</th><th></th>\
+        "<h2>Stages</h2>\n<table class=\"stack\"><thead><tr><th>Stage</th><th class=\"n\">Time</th><th></th>\
          <th>Made</th><th class=\"n\">Memory</th></tr></thead><tbody>\n",
     );
     for stage in &report.stages {
         let made: Vec<String> = stage.counts.iter().map(|(what, &n)| format!("{} {what}", count(n))).collect();
         let _ = writeln!(
             page,
-            "<tr><td>{}</td><td class=\"n\">{} s</td><td class=\"bar\"><div style=\"width:{:.1}%\"></div></td><td>{}</td>\
-             <td class=\"n\">{}</td></tr>",
+            "<tr><td>{}</td><td class=\"n\" data-label=\"Time\">{} s</td><td class=\"bar\"><div style=\"width:{:.1}%\"></div></td>\
+             <td data-label=\"Made\">{}</td><td class=\"n\" data-label=\"Memory\">{}</td></tr>",
             escape(&stage.name),
             number(stage.seconds),
             100.0 * stage.seconds / longest.max(f64::MIN_POSITIVE),
@@ -389,7 +390,7 @@ fn stages(page: &mut String, report: &Report) {
     }
     let _ = writeln!(
         page,
-        "</tbody><tfoot><tr><td>All</td><td class=\"n\">{} s</td><td></td><td></td><td></td></tr></tfoot></table></div>",
+        "</tbody><tfoot><tr><td>All</td><td class=\"n\">{} s</td><td></td><td></td><td></td></tr></tfoot></table>",
         number(total)
     );
 }
@@ -398,15 +399,11 @@ fn memory(bytes: u64) -> String {
     if bytes == 0 { "-".into() } else { format!("{} MiB", bytes >> 20) }
 }
 
-/// Text as HTML.
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::report::Input;
+    use crate::report::gallery::{Place, Scale};
     use planish::pipeline::Warning;
 
     fn report() -> Report {
@@ -450,9 +447,58 @@ mod tests {
             title: "Deviation".into(),
             caption: "Blue is close.".into(),
             png: vec![1, 2, 3],
+            place: Place::Gallery,
             scale: Some(Scale { colors: vec![[0, 0, 255], [255, 0, 0]], labels: vec!["0".into(), "1 mm".into()] }),
         };
         let page = html(&report(), &[picture]);
         assert!(page.contains("data:image/png;base64,AQID") && page.contains("rgb(0,0,255),rgb(255,0,0)"));
+    }
+
+    #[test]
+    fn the_verdict_stands_above_the_tiles_folded_seams_are_told_from_ends_without_a_normal_and_steps_can_be_pasted() {
+        let mut report = report();
+        report.quality.insert("seam.folded".into(), Figure::Count(1));
+        report.quality.insert("seam.inner_angle_max_deg".into(), Figure::Number(178.0));
+        let seam = |curve, inner_angle_max_deg, folded| SeamRow {
+            curve,
+            patches: [0, 1],
+            feature: false,
+            length: 3.0,
+            gap_max: 0.0,
+            angle_max_deg: 180.0,
+            angle_rms_deg: 0.5,
+            inner_angle_max_deg,
+            folded,
+        };
+        report.seams = vec![seam(4, 0.7, false), seam(9, 178.0, true)];
+        report.warnings[0] = report.warnings[0].clone().with_step("[[step]]\nedit = \"relax\"");
+        let page = html(&report, &[]);
+        let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("{text}"));
+        assert!(at("class=\"verdict broken\"><b>Broken</b>") < at("class=\"tiles\""));
+        assert!(at(">folded</td>") < at(">an end has no normal</td>"));
+        assert!(page.contains("<pre>[[step]]\nedit = &quot;relax&quot;</pre>") && page.contains("tile broken"));
+        // Cells carry their own names where the head of the table is not shown.
+        assert!(page.contains("data-label=\"Gap\">none"));
+    }
+
+    #[test]
+    fn pictures_are_enlarged_and_compared_without_scripts() {
+        let picture = |title: &str, place| Picture {
+            title: title.into(),
+            caption: "Seen.".into(),
+            png: vec![1, 2, 3],
+            scale: None,
+            place,
+        };
+        let all = [
+            picture("Input", Place::Gallery),
+            picture("Surfaces", Place::Slider),
+            picture("Displaced", Place::Slider),
+            picture("Front", Place::Side),
+        ];
+        let page = html(&report(), &all);
+        for part in ["href=\"#picture-0\"", "class=\"slider\"", "Displaced and surfaces", "From six sides"] {
+            assert!(page.contains(part), "{part}");
+        }
     }
 }

@@ -11,6 +11,34 @@ use std::io::{Cursor, Write};
 /// Points read at once.
 const PIECE: u64 = 1 << 16;
 
+/// Bytes of the first point of a compressed chunk, which is not compressed: the shortest format has 20.
+const CHUNK: u64 = 20;
+
+/// Refuses compressed points whose table names more chunks than the file has room for: the library that reads them takes memory
+/// for as many as it is told.
+fn check_chunks(bytes: &[u8]) -> Result<(), ReadError> {
+    let piece = |at: u64| bytes.get(at as usize..).unwrap_or_default();
+    let word = |at: u64| piece(at).first_chunk().map(|b| u32::from_le_bytes(*b));
+    let long = |at: u64| piece(at).first_chunk().map(|b| i64::from_le_bytes(*b));
+    // The upper bits of the point format tell that the points are compressed.
+    if bytes.get(104).is_none_or(|format| format & 0xc0 == 0) {
+        return Ok(());
+    }
+    let size = bytes.len() as u64;
+    // A writer that could not go back leaves the place of the table at the end of the file.
+    let table = match word(96).and_then(|points| long(points as u64)) {
+        Some(-1) => long(size.saturating_sub(8)),
+        found => found,
+    };
+    let Some(chunks) = table.and_then(|at| word(u64::try_from(at).ok()?.checked_add(4)?)) else { return Ok(()) };
+    let needed = chunks as u64 * CHUNK;
+    if needed > size {
+        let place = Place::Byte(table.unwrap_or_default() as usize);
+        return Err(ReadError::Truncated { what: format!("{chunks} chunks of points"), needed, left: size, place });
+    }
+    Ok(())
+}
+
 pub(super) fn read(bytes: Vec<u8>, classes: &[u8]) -> Result<Cloud, ReadError> {
     if !bytes.starts_with(b"LASF") {
         return Err(ReadError::WrongFormat {
@@ -20,6 +48,7 @@ pub(super) fn read(bytes: Vec<u8>, classes: &[u8]) -> Result<Cloud, ReadError> {
         });
     }
     let size = bytes.len() as u64;
+    check_chunks(&bytes)?;
     let classes = classes.to_vec();
     guarded(move || {
         let mut reader = Reader::new(Cursor::new(bytes)).map_err(foreign)?;

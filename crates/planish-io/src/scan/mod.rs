@@ -51,13 +51,32 @@ pub fn is_scan(path: &Path) -> bool {
 /// # Errors
 /// Everything that [`ReadError`] lists. No file makes it panic.
 pub fn read_scan(path: impl AsRef<Path>, options: &ScanOptions) -> Result<Cloud, ReadError> {
-    let path = path.as_ref();
+    let mut cloud = read_in_place(path.as_ref(), options)?;
+    shift(&mut cloud);
+    Ok(cloud)
+}
+
+/// As [`read_scan`], without the points that are too far off to be of the scan ([`crate::far::body`]); and how many these are.
+/// # Errors
+/// As [`read_scan`].
+pub fn read_body(path: impl AsRef<Path>, options: &ScanOptions) -> Result<(Cloud, usize), ReadError> {
+    let mut cloud = read_in_place(path.as_ref(), options)?;
+    let count = cloud.points.len();
+    if let Some(body) = crate::far::body(&cloud.points) {
+        cloud = cloud.select(&body);
+    }
+    shift(&mut cloud);
+    let left_out = count - cloud.points.len();
+    Ok((cloud, left_out))
+}
+
+fn read_in_place(path: &Path, options: &ScanOptions) -> Result<Cloud, ReadError> {
     let extension = lower(path);
     let bytes = crate::mesh_file::content(path)?;
     if bytes.is_empty() {
         return Err(ReadError::Empty);
     }
-    let mut cloud = match extension.as_str() {
+    let cloud = match extension.as_str() {
         "e57" => e57::read(bytes)?,
         "las" | "laz" => las::read(bytes, &options.classes)?,
         "pcd" => pcd::read(&bytes)?,
@@ -80,7 +99,6 @@ pub fn read_scan(path: impl AsRef<Path>, options: &ScanOptions) -> Result<Cloud,
         let (count, limit) = (cloud.points.len() as u64, u32::MAX as u64 - 1);
         return Err(ReadError::TooLarge { what: "points", count, limit, place: Place::Byte(0) });
     }
-    shift(&mut cloud);
     Ok(cloud)
 }
 

@@ -73,11 +73,13 @@ fn array(bytes: &[u8]) -> Result<Cloud, ReadError> {
     if width < 3 {
         return Err(fault(format!("rows of {width} numbers are no points")));
     }
-    let (order, kind) = head.word.split_at(head.word.len().min(1));
+    let unread = || fault(format!("numbers of type \"{}\" are not read", head.word));
+    // A letter of more than one byte is no order of bytes.
+    let (order, kind) = head.word.split_at_checked(1).ok_or_else(unread)?;
     let size = match kind {
         "f4" | "i4" => 4,
         "f8" | "i8" => 8,
-        _ => return Err(fault(format!("numbers of type \"{kind}\" are not read"))),
+        _ => return Err(unread()),
     };
     let body = &bytes[head.start.min(bytes.len())..];
     let needed = n.saturating_mul(width).saturating_mul(size);

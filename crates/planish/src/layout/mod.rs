@@ -57,6 +57,8 @@ const COVER: f64 = 2.4;
 /// Patches smaller than this part of the mean stand on specks and slivers and do not count as forced.
 const CROWDED: f64 = 0.05;
 
+/// Triangles of the mesh for each patch at least: a square of two.
+const TRIANGLES_PER_PATCH: usize = 2;
 /// Part of the patches of the first draft that counts as forced by the features.
 const FORCED: f64 = 0.85;
 
@@ -167,6 +169,7 @@ pub fn layout(
 ) -> Result<Layout, LayoutError> {
     let Known { sharp: tagged, lines, corners } = known;
     check(mesh)?;
+    let params = &LayoutParams { patches: params.patches.min(most_patches(mesh)), ..params.clone() };
     let adjacency = Adjacency::new(mesh);
     let mut sharp = lines::feature_lines(mesh, &adjacency, tagged, params, observer)?;
     sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
@@ -185,6 +188,11 @@ pub fn layout(
     let params = LayoutParams { patches, ..params.clone() };
     let network = partitioned((mesh, &adjacency), &sharp, corners, &params, observer)?;
     Ok(Layout { network, method: Method::Partition { why } })
+}
+
+/// Patches that a mesh has room for: finer ones would have no two triangles each to follow.
+fn most_patches(mesh: &TriMesh) -> usize {
+    (mesh.triangles.len() / TRIANGLES_PER_PATCH).max(1)
 }
 
 /// The network of a partition, for meshes without a usable map.

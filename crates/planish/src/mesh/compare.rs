@@ -132,7 +132,7 @@ pub fn compare_samples(
         check(mesh).map_err(|error| CompareError::Mesh { which, error })?;
     }
     let (a, b) = (Side::new(a, 'a', observer)?, Side::new(b, 'b', observer)?);
-    let diagonal = Aabb::of(&a.mesh.points).diagonal();
+    let diagonal = Aabb::of(&a.sampler.mesh.points).diagonal();
     let mut samples = measure(&a, &b, params, 0, observer)?;
     samples.extend(measure(&b, &a, params, 1, observer)?);
     observer.progress(1.0);
@@ -159,28 +159,39 @@ pub fn compare_samples(
     Ok((comparison, samples))
 }
 
-/// One of the two surfaces: its triangles of some area, their summed areas, and the tree.
+/// One of the two surfaces: its triangles of some area, and the tree.
 struct Side {
-    mesh: TriMesh,
-    sums: Vec<f64>,
+    sampler: AreaSampler,
     bvh: Bvh,
 }
 
 impl Side {
     fn new(mesh: &TriMesh, which: char, observer: &dyn Observer) -> Result<Side, CompareError> {
-        let triangles: Vec<[u32; 3]> =
-            (0..mesh.triangles.len()).filter(|&t| mesh.area(t) > 0.0).map(|t| mesh.triangles[t]).collect();
-        if triangles.is_empty() {
+        observer.check()?;
+        let sampler = AreaSampler::new(mesh);
+        if sampler.mesh.triangles.is_empty() {
             return Err(CompareError::NoArea { which, triangles: mesh.triangles.len() });
         }
-        observer.check()?;
+        let bvh = Bvh::watched(&sampler.mesh, observer)?;
+        Ok(Side { sampler, bvh })
+    }
+}
+
+/// Draws places of a mesh evenly by area: its triangles of some area, and their summed areas.
+pub(crate) struct AreaSampler {
+    mesh: TriMesh,
+    sums: Vec<f64>,
+}
+
+impl AreaSampler {
+    pub(crate) fn new(mesh: &TriMesh) -> AreaSampler {
         // Only the vertices in use, so that the box is that of the surface.
         let mut id = vec![u32::MAX; mesh.points.len()];
         let mut points = Vec::new();
-        let triangles = triangles
-            .into_iter()
+        let triangles = (0..mesh.triangles.len())
+            .filter(|&t| mesh.area(t) > 0.0)
             .map(|t| {
-                t.map(|v| {
+                mesh.triangles[t].map(|v| {
                     if id[v as usize] == u32::MAX {
                         id[v as usize] = points.len() as u32;
                         points.push(mesh.points[v as usize]);
@@ -197,12 +208,11 @@ impl Side {
                 total
             })
             .collect();
-        let bvh = Bvh::watched(&mesh, observer)?;
-        Ok(Side { mesh, sums, bvh })
+        AreaSampler { mesh, sums }
     }
 
     /// Sample number `n` of `count` of the stream `seed`: position and normal.
-    fn sample(&self, seed: u64, n: u64, count: usize) -> (DVec3, DVec3) {
+    pub(crate) fn sample(&self, seed: u64, n: u64, count: usize) -> (DVec3, DVec3) {
         let [pick, r, s] = [0, 1, 2].map(|k| random::unit(seed, 3 * n + k));
         // The n-th sample lies in the n-th of equal shares of the area: less spread than free choice, and
         // neighbours in the mesh are asked one after the other.
@@ -230,16 +240,16 @@ fn measure(
         observer.progress((pass as f64 + result.len() as f64 / params.samples as f64) / 2.0);
         let range = result.len()..(result.len() + SAMPLES_PER_CHUNK).min(params.samples);
         result.par_extend(range.into_par_iter().map(|n| {
-            let (place, m) = from.sample(seed, n as u64, params.samples);
+            let (place, m) = from.sampler.sample(seed, n as u64, params.samples);
             let hit = to.bvh.closest(place);
-            let n = to.mesh.normal(hit.place.face as usize);
+            let n = to.sampler.mesh.normal(hit.place.face as usize);
             Sample { place, distance: hit.distance, angle_deg: m.cross(n).length().atan2(m.dot(n)).to_degrees() }
         }));
     }
     Ok(result)
 }
 
-fn spread(mut values: Vec<f64>) -> Spread {
+pub(crate) fn spread(mut values: Vec<f64>) -> Spread {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let rms = (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt();

@@ -13,7 +13,9 @@ use crate::observe::{Cancelled, Observer, Part};
 use crate::relief::{self, PatchedMesh};
 use crate::surface::basis::uniform_parameters;
 use crate::surface::{self, SeamQuality, Surface};
+use glam::DVec3;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Quads per knot span and direction, at most, in the mesh that stands for a surface when distances are measured:
 /// between them a cubic span with a turn of 30 degrees leaves its chord by less than 1/500 of its length.
@@ -294,10 +296,19 @@ fn grid_figures(
     if folds > 0 {
         let places: Vec<String> =
             grids.iter().enumerate().filter(|(_, g)| g.folds > 0).map(|(p, _)| p.to_string()).collect();
-        let text = format!("{folds} grid cells are folded over. A curve through the middle of the patch helps.");
-        warnings.push(Warning::new("grid_folds", text, format!("patches {}", few(&places))));
+        let text = format!("{folds} grid cells are folded over. An iso-curve through the middle of the patch helps.");
+        let worst = (0..grids.len()).max_by_key(|&p| (grids[p].folds, std::cmp::Reverse(p))).unwrap_or_default();
+        let step = across(&model.grids[worst]);
+        warnings.push(Warning::new("grid_folds", text, format!("patches {}", few(&places))).with_step(step));
     }
     Ok(())
+}
+
+/// The step of a script that draws an iso-curve through the middle of a grid.
+fn across(grid: &Grid) -> String {
+    let pick = |row: usize| in_script(grid.points[row * grid.cols + grid.cols / 2]);
+    let picks = [0, grid.rows / 2, grid.rows - 1].map(pick).join(", ");
+    format!("[[step]]\nedit = \"feature\"\nmode = \"geodesic\"\npicks = [{picks}]")
 }
 
 fn seam_figures(
@@ -316,19 +327,66 @@ fn seam_figures(
     length(quality, "seam.gap_max", gap, diagonal);
     let widest = smooth.iter().map(|s| s.angle_max_deg).fold(0.0, f64::max);
     quality.insert("seam.angle_max_deg".into(), Figure::Number(widest));
+    let inner = inner_angles(model);
+    let inner_of = |s: &SeamQuality| inner.get(&s.curve).map_or(0.0, |found| found.0);
+    let widest = smooth.iter().map(|s| inner_of(s)).fold(0.0, f64::max);
+    quality.insert("seam.inner_angle_max_deg".into(), Figure::Number(widest));
+    let folded: Vec<&&SeamQuality> = smooth.iter().filter(|s| inner_of(s) > FOLDED_DEG).collect();
+    quality.insert("seam.folded".into(), Figure::Count(folded.len() as u64));
+    if let Some(at) = folded.first().and_then(|s| inner.get(&s.curve)) {
+        let names: Vec<String> = folded.iter().map(|s| s.curve.to_string()).collect();
+        let text = format!("{} smooth seams are folded over: the surfaces beside them turn back.", folded.len());
+        warnings.push(Warning::new("seam_folds", text, format!("curves {}", few(&names))).with_step(relax_near(at.1)));
+    }
     let rms = if total > 0.0 { (squares / total).sqrt() } else { 0.0 };
     quality.insert("seam.angle_rms_deg".into(), Figure::Number(rms));
-    let bent = smooth.iter().filter(|s| s.angle_max_deg > SEAM_ANGLE_WARNING_DEG).count();
+    let bent = smooth.iter().filter(|s| inner_of(s) > SEAM_ANGLE_WARNING_DEG).count();
     if bent > 0 {
         let text = format!(
             "{bent} of {} smooth seams bend by more than {SEAM_ANGLE_WARNING_DEG} degrees somewhere, {widest:.2} at most; \
              along all smooth seams it is {rms:.2} RMS.",
             smooth.len()
         );
-        let worst: Vec<String> = worst_seams(&seams).iter().take(3).map(|s| s.curve.to_string()).collect();
-        warnings.push(Warning::new("seam_angle", text, format!("curves {}", few(&worst))));
+        let mut worst: Vec<&&SeamQuality> = smooth.iter().collect();
+        worst.sort_by(|a, b| inner_of(b).total_cmp(&inner_of(a)).then(a.curve.cmp(&b.curve)));
+        let worst: Vec<String> = worst.iter().take(3).map(|s| s.curve.to_string()).collect();
+        warnings.push(Warning::new("seam_angle", text, format!("curves {}", few(&worst))).with_step("--stiffness 100"));
     }
     Ok(seams)
+}
+
+/// Smooth seams whose normals turn by more than this have surfaces that turn back over each other.
+pub const FOLDED_DEG: f64 = 90.0;
+/// Places of a seam that are looked at are this share of the diagonal apart.
+const INNER_STEP: f64 = 2e-3;
+
+/// For each curve the largest angle between the normals beside it and where that is, but for its ends: a corner of an angle near
+/// 180 degrees has no normal of its own, and what is measured there says nothing of the seam.
+pub fn inner_angles(model: &Model) -> BTreeMap<u32, (f64, DVec3)> {
+    let step = INNER_STEP * model.mesh.bounds().diagonal();
+    let mut found: BTreeMap<u32, (f64, DVec3)> = BTreeMap::new();
+    if !(step > 0.0) {
+        return found;
+    }
+    for place in surface::seam_angles(&model.network, &model.surfaces, step).iter().filter(|p| p.angle_deg.is_finite())
+    {
+        let best = found.entry(place.curve).or_insert((0.0, place.point));
+        if place.angle_deg > best.0 {
+            *best = (place.angle_deg, place.point);
+        }
+    }
+    found
+}
+
+/// A coordinate as a script has it: what is left out is far below what moves a curve.
+fn in_script(p: DVec3) -> String {
+    let [x, y, z] = p.to_array().map(|x| (x * 1e6).round() / 1e6);
+    format!("[{x}, {y}, {z}]")
+}
+
+/// The step of a script that lets the curve near a place come to rest.
+fn relax_near(at: DVec3) -> String {
+    format!("[[step]]\nedit = \"relax\"\ncurve = {{ near = {} }}", in_script(at))
 }
 
 fn relief_figures(
@@ -360,7 +418,9 @@ fn relief_figures(
             "{folding} of {texels} texels displace the surface beyond its centre of curvature: scaling such a map up \
              folds the surface over. More control points there help."
         );
-        warnings.push(Warning::new("relief_folds", text, format!("patches {}", few(&places))));
+        warnings.push(
+            Warning::new("relief_folds", text, format!("patches {}", few(&places))).with_step("--cells-per-span 2"),
+        );
     }
     Ok(())
 }

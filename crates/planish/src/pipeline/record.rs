@@ -73,12 +73,20 @@ pub struct Warning {
     /// Place: a patch, a curve or coordinates; empty when it is the whole.
     #[serde(rename = "where")]
     pub place: String,
+    /// What helps, to be pasted: options of a command, or a step of a script for `planish edit`; empty if there is nothing.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub step: String,
 }
 
 impl Warning {
     /// A warning.
     pub fn new(code: &str, message: impl Into<String>, place: impl Into<String>) -> Warning {
-        Warning { code: code.into(), message: message.into(), place: place.into() }
+        Warning { code: code.into(), message: message.into(), place: place.into(), step: String::new() }
+    }
+
+    /// The same with what helps.
+    pub fn with_step(self, step: impl Into<String>) -> Warning {
+        Warning { step: step.into(), ..self }
     }
 }
 

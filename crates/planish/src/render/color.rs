@@ -54,6 +54,17 @@ pub fn field_color(x: f64) -> [u8; 3] {
     colorful(0.30 + 0.65 * x, 0.08 + 0.28 * x * (1.0 - x) + 0.06 * x, 285.0 - 185.0 * x)
 }
 
+/// The colour scale of numbers with a side, `x` from 0 to 1 with zero in the middle: blue, pale, red. Both ends are equally
+/// dark and equally far from the middle, so neither side looks larger.
+pub fn signed_color(x: f64) -> [u8; 3] {
+    if x.is_nan() {
+        return [160, 160, 160];
+    }
+    let side = 2.0 * x.clamp(0.0, 1.0) - 1.0;
+    let (away, hue) = (side.abs(), if side < 0.0 { 255.0 } else { 27.0 });
+    colorful(0.95 - 0.45 * away, 0.19 * away, hue)
+}
+
 /// `n` soft colours of equal lightness; neighbours in the list are far apart in hue (golden angle).
 pub fn even_colors(n: usize) -> Vec<[u8; 3]> {
     (0..n).map(|k| colorful([0.80, 0.72, 0.86][k % 3], 0.09, 40.0 + 137.507_764 * k as f64)).collect()

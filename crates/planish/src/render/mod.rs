@@ -15,7 +15,7 @@ mod shade;
 mod visible;
 
 pub use camera::Camera;
-pub use color::{even_colors, field_color};
+pub use color::{even_colors, field_color, signed_color};
 
 use crate::mesh::TriMesh;
 use glam::DVec3;
@@ -59,6 +59,15 @@ pub enum Paint<'a> {
         /// Written over the scale bar (digits, letters and `.,:+-/%()`).
         label: &'a str,
     },
+    /// A number per vertex with a side: blue below zero, pale at zero, red above, with a scale bar.
+    Signed {
+        /// The numbers; those that are not finite are grey.
+        values: &'a [f64],
+        /// Numbers at the ends of the colour scale are this far from zero.
+        reach: f64,
+        /// As for [`Paint::Field`].
+        label: &'a str,
+    },
     /// Stripes as long parallel lamps would reflect, that many over the half sphere; they move with the view.
     /// Stripes are continuous where the surface is tangent-continuous, and smooth where its curvature is.
     Zebra {
@@ -78,6 +87,17 @@ pub struct Line {
     pub width: f64,
 }
 
+/// A short text at a place, drawn where the place is not hidden.
+#[derive(Clone, Debug)]
+pub struct Label {
+    /// The place, world units.
+    pub place: DVec3,
+    /// Digits, letters and `.,:+-/%()`.
+    pub text: String,
+    /// sRGB of the plate that it stands on.
+    pub color: [u8; 3],
+}
+
 /// How a mesh is to look.
 #[derive(Clone, Debug)]
 pub struct Look<'a> {
@@ -89,6 +109,8 @@ pub struct Look<'a> {
     pub hollows: f64,
     /// Polylines.
     pub lines: Vec<Line>,
+    /// Texts; of two that would cover each other the first is drawn.
+    pub labels: Vec<Label>,
     /// sRGB, or transparent.
     pub background: Option<[u8; 3]>,
 }
@@ -100,6 +122,7 @@ impl Default for Look<'_> {
             crease_deg: 35.0,
             hollows: 0.8,
             lines: Vec::new(),
+            labels: Vec::new(),
             background: Some([255, 255, 255]),
         }
     }
@@ -144,7 +167,7 @@ pub fn render(mesh: &TriMesh, look: &Look, camera: &Camera, width: usize, height
     let (what, wanted, found) = match look.paint {
         Paint::PerTriangle(c) => ("triangles", mesh.triangles.len(), c.len()),
         Paint::PerVertex(c) => ("vertices", mesh.points.len(), c.len()),
-        Paint::Field { values, .. } => ("vertices", mesh.points.len(), values.len()),
+        Paint::Field { values, .. } | Paint::Signed { values, .. } => ("vertices", mesh.points.len(), values.len()),
         _ => ("", 0, 0),
     };
     if wanted != found {
@@ -155,8 +178,11 @@ pub fn render(mesh: &TriMesh, look: &Look, camera: &Camera, width: usize, height
     let mut samples = shade::shade(mesh, look, &frame, &seen);
     overlay::draw_lines(&mut samples, look, &frame, &seen, mesh.bounds().diagonal());
     let mut image = shade::average(&samples, width, height, look.background);
-    if let Paint::Field { range, label, .. } = look.paint {
-        overlay::draw_bar(&mut image, range, label);
+    overlay::draw_labels(&mut image, look, &frame, &seen, mesh.bounds().diagonal());
+    match look.paint {
+        Paint::Field { range, label, .. } => overlay::draw_bar(&mut image, range, label, field_color),
+        Paint::Signed { reach, label, .. } => overlay::draw_bar(&mut image, [-reach, reach], label, signed_color),
+        _ => {}
     }
     Ok(image)
 }

@@ -1,7 +1,7 @@
 //! Lines over the surface, and the scale bar.
 
 use super::camera::Frame;
-use super::color::{field_color, linear};
+use super::color::linear;
 use super::font::{self, draw_text};
 use super::shade::Sample;
 use super::visible::Seen;
@@ -54,11 +54,37 @@ fn stamp(samples: &mut [Sample], frame: &Frame, x: f64, y: f64, radius: f64, col
     }
 }
 
+/// Draws the labels whose places are seen, none over another.
+pub(super) fn draw_labels(image: &mut Image, look: &Look, frame: &Frame, seen: &Seen, diagonal: f64) {
+    let scale = (image.height / 450).max(1);
+    let mut taken: Vec<[usize; 4]> = Vec::new();
+    for label in &look.labels {
+        let (x, y, depth) = frame.project(label.place);
+        let inside = x >= 0.0 && y >= 0.0 && x < frame.width as f64 && y < frame.height as f64 && depth > 0.0;
+        if !inside || depth > seen.depth[y as usize * frame.width + x as usize] as f64 + UNDER * diagonal {
+            continue;
+        }
+        // A dot of air around the letters, the last of which needs no gap after it.
+        let (wide, high) = ((label.text.chars().count() * font::ADVANCE + 1) * scale, (font::HEIGHT + 2) * scale);
+        let left = (x as usize / FINE).saturating_sub(wide / 2).min(image.width.saturating_sub(wide));
+        let top = (y as usize / FINE).saturating_sub(high / 2).min(image.height.saturating_sub(high));
+        let plate = [left, top, left + wide, top + high];
+        if taken.iter().any(|t| t[0] < plate[2] && plate[0] < t[2] && t[1] < plate[3] && plate[1] < t[3]) {
+            continue;
+        }
+        for v in top..top + high {
+            (left..left + wide).for_each(|u| image.put(u, v, label.color));
+        }
+        draw_text(image, left + scale, top + scale, scale, &label.text);
+        taken.push(plate);
+    }
+}
+
 /// Numbers beside the scale bar.
 const TICKS: usize = 5;
 
 /// Draws the colour scale at the right rim: bar, numbers, label. Pictures too small for it are left as they are.
-pub(super) fn draw_bar(image: &mut Image, range: [f64; 2], label: &str) {
+pub(super) fn draw_bar(image: &mut Image, range: [f64; 2], label: &str, color_at: fn(f64) -> [u8; 3]) {
     let scale = (image.height / 450).max(1);
     let (glyph, line) = (font::ADVANCE * scale, font::HEIGHT * scale);
     let numbers: Vec<String> = (0..TICKS)
@@ -73,7 +99,7 @@ pub(super) fn draw_bar(image: &mut Image, range: [f64; 2], label: &str) {
     let left = image.width - needed;
     let top = (image.height - tall) / 2;
     for y in 0..tall {
-        let color = field_color(1.0 - y as f64 / (tall - 1) as f64);
+        let color = color_at(1.0 - y as f64 / (tall - 1) as f64);
         for x in 0..thick {
             let edge = x < scale || x >= thick - scale || y < scale || y >= tall - scale;
             image.put(left + x, top + y, if edge { [40, 40, 40] } else { color });

@@ -1,7 +1,7 @@
 //! Light on the samples, and samples to pixels.
 
 use super::camera::Frame;
-use super::color::{encoded, field_color, linear};
+use super::color::{encoded, field_color, linear, signed_color};
 use super::visible::{NOTHING, Seen};
 use super::{FINE, Image, Look, Paint};
 use crate::geom::random;
@@ -18,7 +18,8 @@ const TABLE: usize = 1024;
 pub(super) fn shade(mesh: &TriMesh, look: &Look, frame: &Frame, seen: &Seen) -> Vec<Sample> {
     let normals = corner_normals(mesh, look.crease_deg, seen);
     let open = if look.hollows > 0.0 { openness(mesh, frame, seen) } else { Vec::new() };
-    let table: Vec<Vec3> = (0..=TABLE).map(|k| light(field_color(k as f64 / TABLE as f64))).collect();
+    let color_at = if let Paint::Signed { .. } = look.paint { signed_color } else { field_color };
+    let table: Vec<Vec3> = (0..=TABLE).map(|k| light(color_at(k as f64 / TABLE as f64))).collect();
     (0..seen.face.len())
         .into_par_iter()
         .map(|i| {
@@ -66,14 +67,18 @@ fn base_color(mesh: &TriMesh, paint: Paint, table: &[Vec3], face: usize, bary: [
         Paint::Plain(c) => light(c),
         Paint::PerTriangle(c) => light(c[face]),
         Paint::PerVertex(c) => blend(&|v| light(c[v])),
-        Paint::Field { values, range, .. } => {
-            let t = mesh.triangles[face].map(|v| values[v as usize]);
-            let value = t[0] * bary[0] + t[1] * bary[1] + t[2] * bary[2];
-            let x = if range[1] > range[0] { (value - range[0]) / (range[1] - range[0]) } else { 0.5 };
-            if x.is_nan() { light(field_color(f64::NAN)) } else { table[(x.clamp(0.0, 1.0) * TABLE as f64) as usize] }
-        }
+        Paint::Field { values, range, .. } => by_number(mesh, values, range, table, face, bary),
+        Paint::Signed { values, reach, .. } => by_number(mesh, values, [-reach, reach], table, face, bary),
         Paint::Zebra { .. } => Vec3::ONE,
     }
+}
+
+/// The colour of a number between those of the corners.
+fn by_number(mesh: &TriMesh, values: &[f64], range: [f64; 2], table: &[Vec3], face: usize, bary: [f64; 3]) -> Vec3 {
+    let t = mesh.triangles[face].map(|v| values[v as usize]);
+    let value = t[0] * bary[0] + t[1] * bary[1] + t[2] * bary[2];
+    let x = if range[1] > range[0] { (value - range[0]) / (range[1] - range[0]) } else { 0.5 };
+    if x.is_nan() { light(field_color(f64::NAN)) } else { table[(x.clamp(0.0, 1.0) * TABLE as f64) as usize] }
 }
 
 /// Barycentric weights of the place where the ray meets the triangle's plane, pulled into the triangle.
