@@ -12,14 +12,15 @@ use super::embed::{self, EmbedError};
 use super::fan;
 use super::integers::{self, QuantizeError, Scale};
 use super::map::{self, Charts, SeamlessMap};
-use super::proxy::{self, Proxy};
+use super::proxy::{self, Proxy, Sizing};
 use super::recut::Bench;
 use super::{LayoutParams, improve};
-use crate::mesh::TriMesh;
+use crate::mesh::{NONE, TriMesh, next};
 use crate::network::Network;
 use crate::network::field::{self, FieldParams};
 use crate::observe::{Cancelled, Observer};
-use glam::DMat2;
+use glam::{DMat2, DVec3};
+use planish_sparse::SparseCholesky;
 use std::f64::consts::FRAC_PI_2;
 
 /// Triangles of the proxy: the seamless maps of the measured meshes were made on 5 000 to 6 000 (two fifths of a second).
@@ -33,6 +34,9 @@ const PAIR_TO_SIDE: f64 = 0.5;
 
 /// Patches of a typical layout, which the scale of directions goes by.
 const TYPICAL_PATCHES: f64 = 100.0;
+
+/// Rounds of making the proxy finer where cones are tight; each halves its edges there.
+const REFINEMENTS: usize = 2;
 
 /// How gently the field follows the form, and on how fine a proxy.
 struct Attempt {
@@ -56,22 +60,63 @@ struct Aligned {
 }
 
 impl Aligned {
-    /// The map of a proxy.
-    fn on(proxy: Proxy, attempt: &Attempt, observer: &dyn Observer) -> Result<Option<Aligned>, Cancelled> {
-        let Proxy { mesh, adjacency, lines, .. } = &proxy;
-        let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
-        let side = (area / TYPICAL_PATCHES).sqrt();
-        let params = FieldParams {
-            curvature: attempt.curvature,
-            smoothing: attempt.smoothing,
-            radius: RADIUS_TO_SIDE * side,
-            pair_distance: PAIR_TO_SIDE * side,
+    /// The map of a mesh.
+    ///
+    /// A triangle whose corners are all bound, by lines or as cones, may get no area on whole numbers. Where cones are that
+    /// near to lines and to each other the proxy is made finer, until none is.
+    fn on(
+        (mesh, sharp): (&TriMesh, &[bool]),
+        attempt: &Attempt,
+        observer: &dyn Observer,
+    ) -> Result<Option<Aligned>, Cancelled> {
+        let mut sizing = Sizing::even(mesh, attempt.triangles);
+        let mut rounds = REFINEMENTS;
+        let (proxy, charts) = loop {
+            let Some(proxy) = proxy::proxy(mesh, sharp, &[], &sizing, observer) else { return Ok(None) };
+            let charts = charts(&proxy, attempt, observer)?;
+            let tight = tight(&proxy, &charts);
+            if tight.is_empty() || rounds == 0 {
+                break (proxy, charts);
+            }
+            rounds -= 1;
+            let edges: Vec<f64> = tight.iter().map(|&p| sizing.at(p) / 2.0).collect();
+            tight.into_iter().zip(edges).for_each(|(place, edge)| sizing.shorten(place, edge));
         };
-        let field = field::field(mesh, adjacency, lines, &params, observer)?;
-        let charts = Charts::new(mesh, adjacency, lines, &field);
-        let mapped = map::seamless(mesh, adjacency, lines, &charts, observer)?;
+        let mapped = map::seamless(&proxy.mesh, &proxy.adjacency, &proxy.lines, &charts, observer)?;
         Ok(mapped.map(|mapped| Aligned { proxy, charts, mapped }))
     }
+}
+
+/// The charts of the field on a proxy.
+fn charts(proxy: &Proxy, attempt: &Attempt, observer: &dyn Observer) -> Result<Charts, Cancelled> {
+    let Proxy { mesh, adjacency, lines, .. } = proxy;
+    let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
+    let side = (area / TYPICAL_PATCHES).sqrt();
+    let params = FieldParams {
+        curvature: attempt.curvature,
+        smoothing: attempt.smoothing,
+        radius: RADIUS_TO_SIDE * side,
+        pair_distance: PAIR_TO_SIDE * side,
+    };
+    let field = field::field(mesh, adjacency, lines, &params, observer)?;
+    Ok(Charts::new(mesh, adjacency, lines, &field))
+}
+
+/// The cones beside a line or another cone.
+fn tight(proxy: &Proxy, charts: &Charts) -> Vec<DVec3> {
+    let Proxy { mesh, adjacency, lines, .. } = proxy;
+    let on_line = |h: u32| lines[h as usize] || adjacency.opposite[h as usize] == NONE;
+    let mut lined = vec![false; mesh.points.len()];
+    for h in (0..lines.len() as u32).filter(|&h| on_line(h)) {
+        lined[mesh.origin(h) as usize] = true;
+        lined[mesh.origin(next(h)) as usize] = true;
+    }
+    let corners = charts.corners();
+    let is_tight = |v: u32| {
+        let bound = |h: u32| lined[mesh.origin(next(h)) as usize] || corners[mesh.origin(next(h)) as usize];
+        corners[v as usize] && !lined[v as usize] && adjacency.fan(v).any(bound)
+    };
+    (0..mesh.points.len() as u32).filter(|&v| is_tight(v)).map(|v| mesh.points[v as usize]).collect()
 }
 
 /// Why no network follows the form.
@@ -118,11 +163,14 @@ const MOST_SKEW_DEG: f64 = 35.0;
 /// The normal of a patch turns by at most this from side to side: a quarter and a third of it, radians.
 const MOST_TURN: f64 = 2.1;
 
+/// What is smaller than this part of a patch's side is detail that its grid carries, and does not turn its normal.
+const DETAIL_TO_SIDE: f64 = 0.5;
+
 /// Part of the surface that has to keep both.
 const KEPT: f64 = 0.95;
 
 /// Numbers of patches that are tried, in those of the coarsest network: as few as the form needs.
-const GROWTH: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
+const GROWTH: [f64; 8] = [1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0, 11.3];
 
 /// More patches than this are not tried where nobody asked for them.
 const MOST_UNASKED: f64 = 300.0;
@@ -172,11 +220,14 @@ pub(super) fn lay(
     }
     let mut why = AlignError::Unmapped;
     for attempt in &ATTEMPTS {
-        let Some(proxy) = proxy::proxy(mesh, sharp, corners, attempt.triangles, observer) else {
+        // A finer proxy of the same form has patches of the same shape.
+        if matches!(why, AlignError::Skewed | AlignError::Count { .. }) && attempt.triangles > PROXY_TRIANGLES {
+            continue;
+        }
+        let Some(aligned) = Aligned::on((mesh, sharp), attempt, observer)? else {
             observer.check()?;
             continue;
         };
-        let Some(aligned) = Aligned::on(proxy, attempt, observer)? else { continue };
         observer.progress(0.3);
         let laid = match aligned.mapped.faults() {
             0 => aligned.choose(params, observer),
@@ -251,7 +302,7 @@ impl Aligned {
     /// How well the patches of the integer map `map` are shaped.
     pub fn fitness(&self, map: &SeamlessMap) -> Fitness {
         let mesh = &self.proxy.mesh;
-        let normals = mesh.vertex_normals();
+        let normals = self.normals(map);
         let mut on_line = vec![false; mesh.points.len()];
         for h in (0..self.proxy.lines.len() as u32).filter(|&h| self.proxy.lines[h as usize]) {
             on_line[mesh.origin(h) as usize] = true;
@@ -276,12 +327,44 @@ impl Aligned {
         Fitness { skew_deg: kept(skew), turn: kept(turn) }
     }
 
+    /// The normals of the vertices as a patch sees them: what is smaller than it is detail that a grid carries. One step of
+    /// diffusion over [`DETAIL_TO_SIDE`] of its side, not across lines.
+    fn normals(&self, map: &SeamlessMap) -> Vec<DVec3> {
+        let Proxy { mesh, adjacency, lines, .. } = &self.proxy;
+        let mut normals = mesh.vertex_normals();
+        let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
+        let squares: f64 = map.uv.iter().map(|[a, b, c]| (*b - *a).perp_dot(*c - *a) / 2.0).sum();
+        let time = (DETAIL_TO_SIDE * DETAIL_TO_SIDE * area / squares.max(1.0)) / 4.0;
+        let mut lined = vec![false; mesh.points.len()];
+        (0..lines.len() as u32).filter(|&h| lines[h as usize]).for_each(|h| lined[mesh.origin(h) as usize] = true);
+        let mut entries = Vec::with_capacity(4 * lines.len());
+        let mut around = vec![0.0; mesh.points.len()];
+        for h in 0..lines.len() as u32 {
+            let (a, b) = (mesh.origin(h) as usize, mesh.origin(next(h)) as usize);
+            around[a] += mesh.area(h as usize / 3) / 3.0;
+            if h < adjacency.opposite[h as usize] && !lined[a] && !lined[b] {
+                // Proxies are even: all their triangles are taken for equilateral.
+                let weight = time / 3f64.sqrt();
+                entries.extend([(a, a, weight), (b, b, weight), (a.max(b), a.min(b), -weight)]);
+            }
+        }
+        entries.extend(around.iter().enumerate().map(|(v, &a)| (v, v, a.max(f64::MIN_POSITIVE))));
+        let Ok(system) = SparseCholesky::factor(normals.len(), &entries) else { return normals };
+        for axis in 0..3 {
+            let mut one: Vec<f64> = normals.iter().zip(&around).map(|(n, a)| a * n[axis]).collect();
+            system.solve(&mut one);
+            normals.iter_mut().zip(one).for_each(|(n, x)| n[axis] = x);
+        }
+        normals.into_iter().map(DVec3::normalize_or_zero).collect()
+    }
+
     /// The smoothest integer map at a scale.
     fn integers(&self, scale: Scale, observer: &dyn Observer) -> Result<map::Mapped, QuantizeError> {
         let Proxy { mesh, adjacency, lines, .. } = &self.proxy;
         let whole = integers::quantize(mesh, adjacency, &self.mapped.map, lines, scale, observer)?;
-        let smooth = map::smooth_integers(mesh, adjacency, lines, &self.charts, &whole.uv, observer)?;
-        smooth.ok_or(QuantizeError::Torn)
+        let smooth =
+            map::smooth_integers(mesh, adjacency, lines, &self.charts, (&self.mapped.map.uv, &whole.uv), observer)?;
+        smooth.ok_or(QuantizeError::Tight)
     }
 
     /// The network of the integer map `map`.

@@ -2,7 +2,7 @@ use super::*;
 use crate::Silent;
 use crate::layout::map::polycube::{Charted, cuboid, flat, solid, torus};
 use crate::layout::map::quarter_turn;
-use crate::layout::proxy::proxy;
+use crate::layout::proxy::{Sizing, proxy};
 use crate::layout::recut::Bench;
 use crate::layout::strips;
 use crate::mesh::sharp_edges;
@@ -109,7 +109,7 @@ fn squares_drawn_on_a_proxy_of_3_000_triangles_are_disks_of_the_fine_box_with_it
     let mesh = shapes::cuboid(DVec3::new(1.0, 2.0, 3.0), 58);
     let sharp = sharp_edges(&mesh, &Adjacency::new(&mesh), 40.0);
     assert!(mesh.triangles.len() > 40_000);
-    let proxy = proxy(&mesh, &sharp, &[], 3_000, &Silent).expect("a proxy");
+    let proxy = proxy(&mesh, &sharp, &[], &Sizing::even(&mesh, 3_000), &Silent).expect("a proxy");
     assert!((2_900..3_001).contains(&proxy.mesh.triangles.len()), "{}", proxy.mesh.triangles.len());
     for squares in [1.0, 2.0] {
         let map = box_map(&proxy.mesh, &proxy.adjacency, squares);
@@ -138,7 +138,8 @@ fn squares_drawn_on_a_proxy_of_3_000_triangles_are_disks_of_the_fine_box_with_it
 #[test]
 fn squares_drawn_on_a_proxy_of_a_sheet_come_back_with_its_whole_boundary() {
     let mesh = shapes::rectangle(1.0, 1.0, 60, 60);
-    let proxy = proxy(&mesh, &vec![false; 3 * mesh.triangles.len()], &[], 1_000, &Silent).expect("a proxy");
+    let proxy = proxy(&mesh, &vec![false; 3 * mesh.triangles.len()], &[], &Sizing::even(&mesh, 1_000), &Silent)
+        .expect("a proxy");
     let map = SeamlessMap {
         uv: (0..proxy.mesh.triangles.len()).map(|f| proxy.mesh.corners(f).map(|p| p.truncate() * 4.0)).collect(),
         jump: vec![0; proxy.lines.len()],

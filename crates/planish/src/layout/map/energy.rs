@@ -12,6 +12,9 @@ use rayon::prelude::*;
 /// Weight of the change of area beside the change of angles in [`Maps::barrier`] (the authors' choice is a half or less).
 const AREA_WEIGHT: f64 = 0.3;
 
+/// Weight of what follows the field closely: the rest is bent a hundred times as easily.
+const CLOSELY: f64 = 100.0;
+
 /// The faces of a mesh as they are mapped.
 pub(super) struct Maps<'a> {
     pub seams: &'a Seams,
@@ -52,6 +55,11 @@ impl<'a> Maps<'a> {
 
     /// The system of the map that follows the field best, and of any step: `sum share |J|^2` by the free unknowns.
     pub fn laplacian(&self) -> Option<SparseCholesky> {
+        self.system(&self.share)
+    }
+
+    /// The system of `sum weight |J|^2`.
+    fn system(&self, weight: &[f64]) -> Option<SparseCholesky> {
         let entries: Vec<Vec<(usize, usize, f64)>> = (0..self.gradient.len())
             .into_par_iter()
             .with_min_len(256)
@@ -61,7 +69,7 @@ impl<'a> Maps<'a> {
                     let rows = self.seams.place[f].map(|p| self.seams.row(2 * p + axis).0);
                     for i in 0..3 {
                         for j in 0..3 {
-                            let weight = self.share[f] * self.gradient[f][i].dot(self.gradient[f][j]);
+                            let weight = weight[f] * self.gradient[f][i].dot(self.gradient[f][j]);
                             for &(a, c) in rows[i] {
                                 let below = rows[j].iter().filter(|t| t.0 <= a);
                                 entries.extend(below.map(|&(b, d)| (a as usize, b as usize, weight * c * d)));
@@ -77,15 +85,47 @@ impl<'a> Maps<'a> {
 
     /// The free unknowns of the map that follows the field best: the gradients of u and v are its two directions.
     pub fn follow(&self, laplacian: &SparseCholesky) -> Vec<f64> {
+        self.following(&self.share, laplacian)
+    }
+
+    /// The least of `sum weight |J - I|^2`, from its system.
+    fn following(&self, weight: &[f64], system: &SparseCholesky) -> Vec<f64> {
         let none = self.seams.coordinates(&vec![0.0; self.seams.free()]);
         let mut gradient = vec![0.0; none.len()];
         for f in 0..self.gradient.len() {
-            let miss = self.share[f] * (DMat2::IDENTITY - self.jacobian(f, &none));
+            let miss = weight[f] * (DMat2::IDENTITY - self.jacobian(f, &none));
             self.add(f, miss, &mut gradient);
+        }
+        let mut free = self.seams.pull_back(&gradient);
+        system.solve(&mut free);
+        free
+    }
+
+    /// As [`Maps::follow`], but follows the field much closer on the faces that are `held`. `None` if the equations have no one
+    /// answer.
+    pub fn follow_closely(&self, held: &[bool]) -> Option<Vec<f64>> {
+        let weight: Vec<f64> = self.share.iter().zip(held).map(|(s, h)| if *h { CLOSELY * s } else { *s }).collect();
+        Some(self.following(&weight, &self.system(&weight)?))
+    }
+
+    /// The free unknowns of the smoothest shift of the map that has these coordinates where all that is free is zero.
+    pub fn shift(&self, laplacian: &SparseCholesky, moved: &[f64]) -> Vec<f64> {
+        let mut gradient = vec![0.0; moved.len()];
+        for f in 0..self.gradient.len() {
+            self.add(f, -self.share[f] * self.jacobian(f, moved), &mut gradient);
         }
         let mut free = self.seams.pull_back(&gradient);
         laplacian.solve(&mut free);
         free
+    }
+
+    /// Least part of its determinant that a face keeps on the way from `before` to `after`.
+    pub fn least_kept(&self, before: &[f64], after: &[f64]) -> f64 {
+        (0..self.gradient.len())
+            .into_par_iter()
+            .with_min_len(512)
+            .map(|f| self.jacobian(f, after).determinant() / self.jacobian(f, before).determinant())
+            .reduce(|| f64::INFINITY, f64::min)
     }
 
     /// Adds the gradient by the corners of face `f` from that by its Jacobian.

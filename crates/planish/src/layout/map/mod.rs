@@ -8,6 +8,7 @@
 //! Bommes, Zimmer, Kobbelt, *Mixed-Integer Quadrangulation*, 2009, for charts, cut and energy; `docs/methods/layout.md`,
 //! steps 3 and 4.
 
+mod carry;
 mod cones;
 mod eliminate;
 mod energy;
@@ -24,7 +25,7 @@ use crate::observe::{Cancelled, Observer};
 use energy::Maps;
 use glam::DVec2;
 use planish_sparse::SparseCholesky;
-use seams::Seams;
+use seams::{Held, Seams};
 use std::f64::consts::FRAC_PI_2;
 
 /// Steps of the lattice that a certified map lies on, in parts of its size: eight digits are left for sums.
@@ -36,6 +37,9 @@ const HOLD: f64 = 0.5;
 /// Softness of the barrier at the start of an attempt to untangle a map, against determinants of 1: what one does not
 /// untangle another mostly does.
 const SOFTNESS: [f64; 3] = [0.1, 1.0, 0.01];
+
+/// Rings of faces around the faults of a map on which it follows the field closely, one after the other.
+const HELD_RINGS: [usize; 3] = [2, 4, 8];
 
 /// A map of a mesh to the plane, triangle by triangle.
 ///
@@ -71,6 +75,8 @@ pub(super) struct Mapped {
     pub wound: Vec<u32>,
     /// Mean angle between the isolines and the field, degrees.
     pub deviation_deg: f64,
+    /// The free unknowns.
+    free: Vec<f64>,
 }
 
 impl Mapped {
@@ -94,16 +100,66 @@ pub(super) fn seamless(
     charts: &Charts,
     observer: &dyn Observer,
 ) -> Result<Option<Mapped>, Cancelled> {
-    let Some(seams) = Seams::new(mesh, adjacency, lines, charts, None) else { return Ok(None) };
+    let Some(seams) = Seams::new(mesh, adjacency, lines, charts, Held::Origin) else { return Ok(None) };
     let maps = Maps::new(mesh, charts, &seams, 1.0);
     let Some(laplacian) = maps.laplacian() else { return Ok(None) };
     observer.check()?;
-    let free = maps.follow(&laplacian);
-    let straight = certified((mesh, adjacency), &maps, charts, free.clone());
+    let straight = certified((mesh, adjacency), &maps, charts, maps.follow(&laplacian));
     if straight.is_injective() {
         return Ok(Some(straight));
     }
-    untangled((mesh, adjacency), &maps, &laplacian, charts, &[free], observer).map(Some)
+    let starts = [straight.free];
+    let best = untangled((mesh, adjacency), &maps, &laplacian, charts, &starts, observer)?;
+    unwound((mesh, adjacency), &maps, &laplacian, charts, best, observer).map(Some)
+}
+
+/// A map without vertices that it winds around too often, from one that has some.
+///
+/// Around a cone with one quarter too much (five patches) a map that follows its field is `z^(5/4)` but for its shape, and
+/// `z^(1/4)` has the same seams: the Poisson map has a share of it, which moves the zero of its derivative off the cone to
+/// some vertex beside it, where it then winds twice. Whatever is flipped is untangled around both, for there is no way
+/// back without flipping. So it starts again from a map that follows the field closely around such cones, and around
+/// whatever else is at fault.
+fn unwound(
+    ground: (&TriMesh, &Adjacency),
+    maps: &Maps,
+    laplacian: &SparseCholesky,
+    charts: &Charts,
+    mut best: Mapped,
+    observer: &dyn Observer,
+) -> Result<Mapped, Cancelled> {
+    let five: Vec<u32> = (0..charts.index.len() as u32).filter(|&v| charts.index[v as usize] < 0).collect();
+    let mut held = around(ground, &five, HELD_RINGS[0]);
+    for rings in HELD_RINGS {
+        if best.is_injective() {
+            break;
+        }
+        let flipped = best.flipped.iter().flat_map(|&f| ground.0.triangles[f as usize]);
+        let faults: Vec<u32> = best.wound.iter().copied().chain(flipped).collect();
+        held.iter_mut().zip(around(ground, &faults, rings)).for_each(|(h, near)| *h |= near);
+        let Some(mut free) = maps.follow_closely(&held) else { break };
+        untangle::untangle(maps, laplacian, &mut free, (SOFTNESS[0], HOLD), observer)?;
+        let mapped = certified(ground, maps, charts, free);
+        if mapped.faults() <= best.faults() {
+            best = mapped;
+        }
+    }
+    Ok(best)
+}
+
+/// The faces within so many rings of some vertices.
+fn around((mesh, adjacency): (&TriMesh, &Adjacency), vertices: &[u32], rings: usize) -> Vec<bool> {
+    let mut reached = vec![false; mesh.points.len()];
+    vertices.iter().for_each(|&v| reached[v as usize] = true);
+    for _ in 1..rings {
+        let before = reached.clone();
+        for h in 0..adjacency.opposite.len() as u32 {
+            let (a, b) = (mesh.origin(h) as usize, mesh.origin(next(h)) as usize);
+            reached[a] |= before[b];
+            reached[b] |= before[a];
+        }
+    }
+    mesh.triangles.iter().map(|t| t.iter().any(|&v| reached[v as usize])).collect()
 }
 
 /// The first untangled map without faults, from these starts; else that with the fewest.
@@ -131,8 +187,9 @@ fn untangled(
     best.ok_or(Cancelled)
 }
 
-/// The smoothest integer map with the integers of `uv` (corners of patches, lines and translations), which has the jumps of
-/// `charts`; `None` if it contradicts itself.
+/// The smoothest integer map with the integers of `whole` (corners of patches, lines and translations), which has the jumps
+/// of `charts`; `None` if the triangles do not allow it.
+/// * `from` - an injective seamless map of the same charts
 /// # Errors
 /// `Cancelled`.
 pub(super) fn smooth_integers(
@@ -140,19 +197,27 @@ pub(super) fn smooth_integers(
     adjacency: &Adjacency,
     lines: &[bool],
     charts: &Charts,
-    uv: &[[DVec2; 3]],
+    (from, whole): (&[[DVec2; 3]], &[[DVec2; 3]]),
     observer: &dyn Observer,
 ) -> Result<Option<Mapped>, Cancelled> {
-    let uv = joined(mesh, adjacency, charts, uv);
-    let Some(seams) = Seams::new(mesh, adjacency, lines, charts, Some(&uv)) else { return Ok(None) };
-    let (area, mapped) = (0..uv.len()).fold((0.0, 0.0), |(area, mapped), f| {
-        let [a, b, c] = uv[f];
-        (area + mesh.area(f), mapped + (b - a).perp_dot(c - a) / 2.0)
-    });
-    let maps = Maps::new(mesh, charts, &seams, (mapped / area).sqrt());
-    let (Some(laplacian), Some(free)) = (maps.laplacian(), seams.read(&uv)) else { return Ok(None) };
-    let starts = [free, maps.follow(&laplacian)];
-    untangled((mesh, adjacency), &maps, &laplacian, charts, &starts, observer).map(Some)
+    let area = |uv: &[[DVec2; 3]]| uv.iter().map(|[a, b, c]| (*b - *a).perp_dot(*c - *a) / 2.0).sum::<f64>();
+    let growth = (area(whole) / area(from)).sqrt();
+    let from: Vec<[DVec2; 3]> = from.iter().map(|corners| corners.map(|c| growth * c)).collect();
+    let [from, whole] = [&from, whole].map(|uv| joined(mesh, adjacency, charts, uv));
+    let seams = |held| Seams::new(mesh, adjacency, lines, charts, held);
+    let (Some(start), Some(seams)) = (seams(Held::At(&from)), seams(Held::Whole(&whole))) else { return Ok(None) };
+    let world: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
+    let scale = (area(&whole) / world).sqrt();
+    let maps = Maps::new(mesh, charts, &seams, scale);
+    let (Some(laplacian), Some(free)) = (maps.laplacian(), start.read(&from)) else { return Ok(None) };
+    let maps_at = |seams: &Seams, free: &mut Vec<f64>| {
+        let there = Maps::new(mesh, charts, seams, scale);
+        untangle::settle(&there, &laplacian, free, HOLD, observer)
+    };
+    let free = carry::carry(&maps, &laplacian, (&start, free), &maps_at, observer)?;
+    let Some(mut free) = free else { return Ok(None) };
+    untangle::untangle(&maps, &laplacian, &mut free, (0.0, HOLD), observer)?;
+    Ok(Some(certified((mesh, adjacency), &maps, charts, free)))
 }
 
 /// The same map with the charts that are not cut apart put next to each other, and one corner of each component at an
@@ -211,7 +276,7 @@ fn certified((mesh, adjacency): (&TriMesh, &Adjacency), maps: &Maps, charts: &Ch
         adjacency.outgoing[*v as usize] != NONE && whole - quarters != charts.index[*v as usize]
     };
     let wound = (0..mesh.points.len() as u32).filter(winds).collect();
-    Mapped { map: SeamlessMap { uv, jump: charts.jump.clone() }, flipped, wound, deviation_deg }
+    Mapped { map: SeamlessMap { uv, jump: charts.jump.clone() }, flipped, wound, deviation_deg, free }
 }
 
 #[cfg(test)]
@@ -220,7 +285,7 @@ mod tests {
     use crate::network::field::{FieldParams, field};
     use crate::observe::Silent;
     use crate::synthetic::shapes;
-    use glam::{DQuat, DVec3};
+    use glam::{DMat2, DQuat, DVec3};
 
     const PARAMS: FieldParams = FieldParams { curvature: 1.0, smoothing: 1.0, radius: 0.1, pair_distance: 1.0 };
 
@@ -287,8 +352,9 @@ mod tests {
             shapes::annulus(0.5, 1.0, 40),
         ] {
             let adjacency = Adjacency::new(&mesh);
-            let (_, Mapped { map, flipped, .. }) = mapped(&mesh, &sharp(&mesh));
+            let (_, Mapped { map, flipped, wound, .. }) = mapped(&mesh, &sharp(&mesh));
             assert!(flipped.is_empty(), "{} of {}", flipped.len(), mesh.triangles.len());
+            assert!(wound.is_empty(), "{wound:?}");
             let edge = |h: u32| {
                 let k = h as usize % 3;
                 map.uv[h as usize / 3][(k + 1) % 3] - map.uv[h as usize / 3][k]
@@ -323,6 +389,53 @@ mod tests {
         let (charts, mapped) = mapped(&mesh, &sharp(&mesh));
         assert!(charts.sectors.iter().all(|s| s.1 >= 1));
         assert!(mapped.flipped.is_empty(), "{}", mapped.flipped.len());
+    }
+
+    #[test]
+    fn what_follows_the_field_closely_around_a_cone_of_five_patches_winds_around_it_once() {
+        // A regular pentagon: five corners of a quarter turn each leave one cone of five patches in its middle.
+        let corners: Vec<[f64; 2]> =
+            (0..5).map(|i| (1.256_637 * f64::from(i)).sin_cos()).map(|(s, c)| [c, s]).collect();
+        let mesh = prism(&corners, 1.0, 3);
+        let lines = sharp(&mesh);
+        let (adjacency, charts) = (Adjacency::new(&mesh), charts(&mesh, &lines));
+        let five: Vec<u32> = (0..charts.index.len() as u32).filter(|&v| charts.index[v as usize] < 0).collect();
+        assert_eq!(five.len(), 2);
+        let seams = Seams::new(&mesh, &adjacency, &lines, &charts, Held::Origin).unwrap();
+        let maps = Maps::new(&mesh, &charts, &seams, 1.0);
+        let held = around((&mesh, &adjacency), &five, HELD_RINGS[0]);
+        let free = maps.follow_closely(&held).unwrap();
+        let mapped = certified((&mesh, &adjacency), &maps, &charts, free);
+        assert!(five.iter().all(|v| !mapped.wound.contains(v)), "{:?}", mapped.wound);
+    }
+
+    #[test]
+    fn an_injective_map_is_carried_to_whole_numbers_without_a_fault() {
+        let mesh = shapes::cuboid(DVec3::new(1.0, 2.0, 3.0), 6);
+        let lines = sharp(&mesh);
+        let (charts, mapped) = mapped(&mesh, &lines);
+        // The box of 1 x 2 x 3 is stretched to one of 2 x 2 x 3.
+        let adjacency = Adjacency::new(&mesh);
+        let whole: Vec<[DVec2; 3]> = (0..mesh.triangles.len())
+            .map(|f| {
+                let [a, b, c] = mesh.corners(f);
+                let uv = mapped.map.uv[f];
+                // Which axis of the chart runs along x of the box, if any does.
+                let by_uv = DMat2::from_cols(uv[1] - uv[0], uv[2] - uv[0]).inverse();
+                let by = |d: DVec2| ((b - a) * d.x + (c - a) * d.y).x.abs();
+                let scale = DVec2::new(1.0 + by(by_uv.x_axis).round(), 1.0 + by(by_uv.y_axis).round());
+                uv.map(|p| p * scale)
+            })
+            .collect();
+        let carried = smooth_integers(&mesh, &adjacency, &lines, &charts, (&mapped.map.uv, &whole), &Silent);
+        let carried = carried.unwrap().unwrap();
+        assert!(carried.is_injective());
+        for (corners, wanted) in carried.map.uv.iter().zip(&whole) {
+            for k in 0..3 {
+                let off = (corners[(k + 1) % 3] - corners[k]) - (wanted[(k + 1) % 3] - wanted[k]);
+                assert!(off.length() < 1e-6, "{off}");
+            }
+        }
     }
 
     /// A prism over a convex polygon around its middle, each triangle and wall split `level` times.

@@ -14,7 +14,19 @@ use glam::DVec2;
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
+/// What is held of a map.
+#[derive(Clone, Copy)]
+pub(super) enum Held<'a> {
+    /// One corner of each component, at the origin.
+    Origin,
+    /// Corners of patches, lines and translations, where this map has them. Its charts are joined where they are not cut apart.
+    At(&'a [[DVec2; 3]]),
+    /// The same at the whole numbers they are next to.
+    Whole(&'a [[DVec2; 3]]),
+}
+
 /// The corners of all charts as linear functions of free unknowns.
+#[derive(Clone)]
 pub(super) struct Seams {
     /// The place of each corner of each face, among all different ones.
     pub place: Vec<[u32; 3]>,
@@ -31,15 +43,15 @@ pub(super) struct Seams {
 impl Seams {
     /// The equations of `charts`. `None` if they contradict each other.
     ///
-    /// With the corners of an integer map (`integers`, joined where charts are not cut apart) its corners of patches, lines and
-    /// translations are held as well, at the integers they are next to. Without, one corner of each component is at the origin.
-    pub fn new(
-        mesh: &TriMesh,
-        adjacency: &Adjacency,
-        lines: &[bool],
-        charts: &Charts,
-        integers: Option<&[[DVec2; 3]]>,
-    ) -> Option<Seams> {
+    /// What is `held` beside the equations decides what is free: a map with the same charts that holds the same has the same
+    /// free unknowns.
+    pub fn new(mesh: &TriMesh, adjacency: &Adjacency, lines: &[bool], charts: &Charts, held: Held) -> Option<Seams> {
+        let held = match held {
+            Held::Origin => None,
+            Held::At(uv) => Some((uv, false)),
+            Held::Whole(uv) => Some((uv, true)),
+        };
+        let exact = |at: DVec2| if held.is_some_and(|h| h.1) { at.round() } else { at };
         let (place, count) = places(adjacency, charts, mesh.triangles.len());
         let cuts: Vec<u32> = (0..charts.cut.len() as u32)
             .filter(|&h| charts.cut[h as usize] && h < adjacency.opposite[h as usize])
@@ -48,24 +60,24 @@ impl Seams {
         let mut system = Elimination::new((coordinates + 2 * cuts.len() as u32) as usize, coordinates);
         let corner = |h: u32, axis: u32| 2 * place[h as usize / 3][h as usize % 3] + axis;
         let mut consistent = true;
-        if let Some(uv) = integers {
+        if let Some((uv, _)) = held {
             for (v, _) in charts.corners().into_iter().enumerate().filter(|c| c.1) {
                 let h = adjacency.outgoing[v];
-                let at = uv[h as usize / 3][h as usize % 3].round();
+                let at = exact(uv[h as usize / 3][h as usize % 3]);
                 consistent &= system.demand(vec![(corner(h, 0), 1.0)], -at.x);
                 consistent &= system.demand(vec![(corner(h, 1), 1.0)], -at.y);
             }
         }
-        for place in origins(adjacency, &place, charts, integers.is_some()) {
+        for place in origins(adjacency, &place, charts, held.is_some()) {
             consistent &= system.demand(vec![(2 * place, 1.0)], 0.0);
             consistent &= system.demand(vec![(2 * place + 1, 1.0)], 0.0);
         }
         for (i, &h) in cuts.iter().enumerate() {
             let o = adjacency.opposite[h as usize];
             let moved = coordinates + 2 * i as u32;
-            if let Some(uv) = integers {
+            if let Some((uv, _)) = held {
                 let [here, there] = [h, next(o)].map(|h| uv[h as usize / 3][h as usize % 3]);
-                let t = (there - quarter_turn(here, charts.jump[h as usize])).round();
+                let t = exact(there - quarter_turn(here, charts.jump[h as usize]));
                 consistent &= system.demand(vec![(moved, 1.0)], -t.x);
                 consistent &= system.demand(vec![(moved + 1, 1.0)], -t.y);
             }
@@ -92,8 +104,8 @@ impl Seams {
                 let across = 1 - quarters.rem_euclid(2) as u32;
                 let terms = vec![(corner(h, across), 1.0), (corner(next(h), across), -1.0)];
                 consistent &= system.demand(terms, 0.0);
-                if let Some(uv) = integers {
-                    let level = uv[h as usize / 3][h as usize % 3][across as usize].round();
+                if let Some((uv, _)) = held {
+                    let level = exact(uv[h as usize / 3][h as usize % 3])[across as usize];
                     consistent &= system.demand(vec![(corner(h, across), 1.0)], -level);
                 }
             }
@@ -127,6 +139,17 @@ impl Seams {
             seams.start.push(seams.terms.len() as u32);
         }
         seams
+    }
+
+    /// The equations on the way from these to `to`, which hold the same at other places.
+    pub fn between(&self, to: &Seams, part: f64) -> Seams {
+        let constant = self.constant.iter().zip(&to.constant).map(|(a, b)| a + part * (b - a)).collect();
+        Seams { constant, ..to.clone() }
+    }
+
+    /// How far the coordinates move from here to `to` while all that is free stays.
+    pub fn moved(&self, to: &Seams) -> Vec<f64> {
+        self.constant.iter().zip(&to.constant).map(|(a, b)| b - a).collect()
     }
 
     /// Number of free unknowns.

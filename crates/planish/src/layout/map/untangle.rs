@@ -62,6 +62,17 @@ pub(super) fn untangle(
     Ok(least > 0.0)
 }
 
+/// Lowers the barrier energy of an injective map by one round of steps.
+pub(super) fn settle(
+    maps: &Maps,
+    laplacian: &SparseCholesky,
+    free: &mut Vec<f64>,
+    hold: f64,
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
+    descend(maps, laplacian, free, 0.0, hold, observer).map(drop)
+}
+
 /// One round; returns the energy at its end.
 fn descend(
     maps: &Maps,

@@ -71,8 +71,8 @@ pub(super) struct Melt<'a> {
     /// Faces around each vertex; none around one that is gone.
     pub around: Vec<Vec<u32>>,
     kind: Vec<Kind>,
-    /// Length of an edge wanted.
-    edge: f64,
+    /// Length of an edge wanted at each vertex.
+    edge: Vec<f64>,
     /// Least shape of a new face, of [`LEAST_FACE_SHAPES`].
     least: f64,
     pub steps: Vec<Step>,
@@ -83,7 +83,8 @@ pub(super) struct Melt<'a> {
 impl<'a> Melt<'a> {
     /// * `tagged` - half-edges on lines and on the boundary, the former from both sides
     /// * `corners` - vertices of lines that stay
-    pub fn new(mesh: &'a TriMesh, tagged: Vec<bool>, corners: &[bool], edge: f64) -> Melt<'a> {
+    /// * `edge` - length of an edge wanted at each vertex
+    pub fn new(mesh: &'a TriMesh, tagged: Vec<bool>, corners: &[bool], edge: Vec<f64>) -> Melt<'a> {
         let mut around = vec![Vec::new(); mesh.points.len()];
         for (f, t) in mesh.triangles.iter().enumerate() {
             t.iter().for_each(|&v| around[v as usize].push(f as u32));
@@ -183,7 +184,7 @@ impl<'a> Melt<'a> {
 
     /// How crowded a vertex is, if it may go at all.
     fn crowd(&self, v: u32) -> Option<f64> {
-        let reach = CROWD_REACH * self.edge;
+        let reach = CROWD_REACH * self.edge[v as usize];
         let here = self.at(v);
         let one = |w: u32| (1.0 - self.at(w).distance(here) / reach).max(0.0).powi(CROWD_POWER);
         match self.kind[v as usize] {
@@ -214,7 +215,7 @@ impl<'a> Melt<'a> {
             Some(_) => return None,
             None => (0..n).collect(),
         };
-        let near = NEAR * self.edge;
+        let near = NEAR * self.edge[v as usize];
         let mut best: Option<(f64, usize)> = None;
         for apex in apexes.into_iter().filter(|&i| at(i).distance(here) < near) {
             let beat = best.map_or(0.0, |b| b.0);
@@ -241,7 +242,7 @@ impl<'a> Melt<'a> {
         };
         let (to, chord) = (self.at(v) - self.at(a), self.at(b) - self.at(a));
         let within = to.dot(chord) > 0.0 && to.dot(chord) < chord.length_squared();
-        let detail = within && to.cross(chord).length() < LINE_DETAIL * self.edge * chord.length();
+        let detail = within && to.cross(chord).length() < LINE_DETAIL * self.edge[v as usize] * chord.length();
         detail || turn([a, v, b]) && still(a, b) && still(b, a)
     }
 
@@ -276,7 +277,7 @@ impl<'a> Melt<'a> {
                 return None;
             }
         }
-        let longest = LONGEST * self.edge;
+        let longest = LONGEST * self.edge[star.vertex as usize];
         let spans = |i: usize| {
             let lines = self.on_line(name(0)) && self.on_line(name(i)) && far != Some(i);
             top.distance(at(i)) < longest && !lines && !self.joined(name(0), name(i))

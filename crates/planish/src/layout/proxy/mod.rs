@@ -19,10 +19,17 @@ use crate::layout::{carry, network};
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::Network;
 use crate::observe::Observer;
+use glam::DVec3;
 use std::collections::HashSet;
 
 /// Longest edge of the refined mesh in edges of the proxy: short enough to choose from.
 const FINE: f64 = 0.6;
+
+/// Area of an equilateral triangle with edges of length 1.
+const EQUILATERAL: f64 = 0.433_012_701_892_219_3;
+
+/// How fast edges get longer away from a spot: neighbours differ by a third, which leaves room for good triangles.
+const GRADE: f64 = 0.3;
 
 /// Rounds of splitting; each halves an edge.
 const SPLIT_ROUNDS: usize = 14;
@@ -43,7 +50,43 @@ pub(super) struct Proxy {
     face: Vec<u32>,
 }
 
-/// A proxy of `mesh` with about `wanted` triangles: fewer are not possible where lines are dense.
+/// How long the edges of a proxy are to be.
+#[derive(Clone, Debug)]
+pub(super) struct Sizing {
+    /// Far from all spots.
+    edge: f64,
+    /// Places with shorter edges.
+    spots: Vec<(DVec3, f64)>,
+}
+
+impl Sizing {
+    /// Edges for so many even triangles.
+    pub fn even(mesh: &TriMesh, triangles: usize) -> Sizing {
+        let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
+        Sizing { edge: (area / (EQUILATERAL * triangles.max(1) as f64)).sqrt(), spots: Vec::new() }
+    }
+
+    /// Asks for shorter edges at a place, and for longer ones again at a distance.
+    pub fn shorten(&mut self, place: DVec3, edge: f64) {
+        self.spots.push((place, edge));
+    }
+
+    /// Length wanted at a place.
+    pub fn at(&self, place: DVec3) -> f64 {
+        self.spots.iter().map(|&(p, edge)| edge + GRADE * p.distance(place)).fold(self.edge, f64::min)
+    }
+
+    /// Triangles of these edges that cover `mesh`.
+    fn triangles(&self, mesh: &TriMesh) -> usize {
+        let count = |f: usize| {
+            let [a, b, c] = mesh.corners(f);
+            mesh.area(f) / (EQUILATERAL * self.at((a + b + c) / 3.0).powi(2))
+        };
+        (0..mesh.triangles.len()).map(count).sum::<f64>().round() as usize
+    }
+}
+
+/// A proxy of `mesh` with edges of about this length: longer ones are not possible where lines are dense.
 ///
 /// No edge but those of lines and of the boundary joins two vertices on them, and no triangle has two edges on them.
 /// * `sharp` - for each half-edge whether it is on a sharp line
@@ -54,21 +97,19 @@ pub(super) fn proxy(
     mesh: &TriMesh,
     sharp: &[bool],
     corners: &[bool],
-    wanted: usize,
+    sizing: &Sizing,
     observer: &dyn Observer,
 ) -> Option<Proxy> {
-    let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
-    // The area of an equilateral triangle is its edge squared times the root of 3 by 4.
-    let edge = (4.0 / 3f64.sqrt() * area / wanted.max(1) as f64).sqrt();
-    if !(edge.is_finite() && edge > 0.0) {
+    if !(sizing.edge.is_finite() && sizing.edge > 0.0) {
         return None;
     }
-    let work = refined(mesh, sharp, FINE * edge);
+    let work = refined(mesh, sharp, |p| FINE * sizing.at(p));
     let work_adjacency = Adjacency::new(&work.mesh);
     let tagged = tags(&work, &work_adjacency, sharp);
     observer.progress(0.2);
+    let edge = work.mesh.points.iter().map(|&p| sizing.at(p)).collect();
     let mut melt = Melt::new(&work.mesh, tagged, corners, edge);
-    melt.run(wanted, observer);
+    melt.run(sizing.triangles(&work.mesh), observer);
     if observer.cancelled() {
         return None;
     }
@@ -114,8 +155,8 @@ impl Proxy {
     }
 }
 
-/// The input without edges longer than `longest`, those apart that no split shortens, and without what a map cannot use.
-fn refined(mesh: &TriMesh, sharp: &[bool], longest: f64) -> Refined {
+/// The input without edges longer than `longest` at their middle, those apart that no split shortens, and without what a map cannot use.
+fn refined(mesh: &TriMesh, sharp: &[bool], longest: impl Fn(DVec3) -> f64) -> Refined {
     let mut work = Refined::new(mesh);
     let adjacency = Adjacency::new(mesh);
     let bound = |tagged: &[bool], f: u32| (0..3).all(|k| tagged[3 * f as usize + k]);
@@ -134,7 +175,11 @@ fn refined(mesh: &TriMesh, sharp: &[bool], longest: f64) -> Refined {
     work = refine::split(&work, |a, b| on_line[a as usize] && on_line[b as usize] && !edges.contains(&[a, b])).0;
     for _ in 0..SPLIT_ROUNDS {
         let points = &work.mesh.points;
-        let (finer, from) = refine::split(&work, |a, b| points[a as usize].distance(points[b as usize]) > longest);
+        let long = |a: u32, b: u32| {
+            let (a, b) = (points[a as usize], points[b as usize]);
+            a.distance(b) > longest(a.midpoint(b))
+        };
+        let (finer, from) = refine::split(&work, long);
         if from.len() == work.parent.len() {
             break;
         }
@@ -167,7 +212,7 @@ mod tests {
 
     fn made(mesh: &TriMesh, wanted: usize) -> Proxy {
         let sharp = sharp_edges(mesh, &Adjacency::new(mesh), 40.0);
-        proxy(mesh, &sharp, &[], wanted, &Silent).expect("a proxy")
+        proxy(mesh, &sharp, &[], &Sizing::even(mesh, wanted), &Silent).expect("a proxy")
     }
 
     /// Half-edges on lines and on the boundary.
