@@ -40,7 +40,7 @@ pub fn check(command: &Command) -> Result<(), Failure> {
         }
         Command::Edit(a) => a.stages.params(None).map(drop),
         Command::Export(a) => splines(a),
-        Command::Compare(_) | Command::Info(_) => Ok(()),
+        Command::Compare(_) | Command::Info(_) | Command::Studio(_) => Ok(()),
     }
 }
 

@@ -71,6 +71,8 @@ fn files(command: &Command) -> (&Common, Vec<PathBuf>, Vec<PathBuf>) {
         }
         Command::Compare(a) => (&a.common, vec![a.a.clone(), a.b.clone()], Vec::new()),
         Command::Info(a) => (&a.common, vec![a.file.clone()], Vec::new()),
+        // A project is worked on where it is; that of a mesh or a scan gets a name that no file has.
+        Command::Studio(a) => (&a.common, a.file.iter().cloned().collect(), Vec::new()),
     }
 }
 

@@ -14,6 +14,7 @@ mod mesh;
 mod missed;
 mod run;
 mod smooth;
+mod studio;
 
 use crate::args::{Cli, Command, Common};
 use crate::check;
@@ -52,6 +53,7 @@ pub fn run(cli: Cli) -> Result<Status, Failure> {
         Command::Export(args) => export::export(&Session::new(&args.common)?, &args),
         Command::Compare(args) => compare::compare(&Session::new(&args.common)?, &args),
         Command::Info(args) => info::info(&Session::new(&args.common)?, &args),
+        Command::Studio(args) => studio::studio(&Session::new(&args.common)?, &args),
     }
 }
 
