@@ -236,8 +236,8 @@ function Faults({ app }: { app: App }) {
       <ul class="faults">
         {faults.slice(0, 8).map((fault) => (
           <li key={fault.why.message}>
-            <p>{short(fault.why.message)}</p>
-            {fault.why.hint && <p class="faint">{fault.why.hint}</p>}
+            <p>{capital(short(fault.why.message))}</p>
+            {fault.why.hint && <p class="faint">{capital(fault.why.hint)}</p>}
             <div class="row">
               {fault.why.place && (
                 <button type="button" class="small" onClick={() => app.fly(fault.why.place!)}>
@@ -263,9 +263,15 @@ export function short(message: string): string {
   return message.replace(/ ?(at |around )?\(-?[\d.e-]+, -?[\d.e-]+, -?[\d.e-]+\)/g, '');
 }
 
+/** The first letter large. */
+export function capital(text: string): string {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
 function Network({ app }: { app: App }) {
   const state = store.state.value;
   const has = state.curves.length > 0;
+  const finished = state.patches.length > 0 && state.faults.length === 0;
   return (
     <Section title="Network">
       <Slider
@@ -280,9 +286,11 @@ function Network({ app }: { app: App }) {
         }}
       />
       <div class="row">
-        <button type="button" onClick={() => void app.complete(patches.value, sharp.value)}>
-          {has ? 'Complete the rest' : 'Lay out patches'}
-        </button>
+        {!finished && (
+          <button type="button" onClick={() => void app.complete(patches.value, sharp.value)}>
+            {has ? 'Complete the rest' : 'Lay out patches'}
+          </button>
+        )}
         {has && (
           <button type="button" onClick={() => void app.edit({ edit: 'relax' })}>
             Relax all

@@ -4,7 +4,7 @@ import { useEffect, useRef } from 'preact/hooks';
 import type { App } from '../app';
 import * as store from '../model/store';
 import { FORMATS, KEYS, SHADINGS, SHAPES, TOOLS } from '../model/texts';
-import { short } from './edit';
+import { capital, short } from './edit';
 
 /** What was told goes by itself after this, milliseconds; what was refused stays. */
 const TOLD = 4000;
@@ -38,26 +38,27 @@ export function Toasts({ app }: { app: App }) {
   );
 }
 
-function capital(text: string): string {
-  return text.charAt(0).toUpperCase() + text.slice(1);
-}
-
 function close(): void {
   store.overlay.value = 'none';
 }
 
 function Dialog({ label, children }: { label: string; children: preact.ComponentChildren }) {
   const dialog = useRef<HTMLDialogElement>(null);
+  // One that has gone tells that it was closed when another one may be open already.
+  const gone = useRef(false);
   useEffect(() => {
     const shown = dialog.current;
     shown?.showModal();
-    return () => shown?.close();
+    return () => {
+      gone.current = true;
+      shown?.close();
+    };
   }, []);
   return (
     <dialog
       ref={dialog}
       aria-label={label}
-      onClose={close}
+      onClose={() => gone.current || close()}
       onClick={(e) => e.target === dialog.current && close()}
       onKeyDown={(e) => e.key === 'Escape' && close()}
     >

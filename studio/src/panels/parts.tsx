@@ -17,7 +17,7 @@ export function Choice<T extends string>(props: {
   onPick: (value: T) => void;
 }) {
   return (
-    <div class="choice" role="radiogroup" aria-label={props.label}>
+    <div class={props.options.length > 4 ? 'choice many' : 'choice'} role="radiogroup" aria-label={props.label}>
       {props.options.map(([value, name]) => (
         // biome-ignore lint/a11y/useSemanticElements: a row of buttons, one of them on
         <button

@@ -615,6 +615,48 @@ export type StageName = ("scan" | "mesh" | "curves" | "patches" | "surfaces");
 /** How a stage stands. */
 export type Standing = ("empty" | "partial" | "fresh" | "stale" | "running" | "failed");
 
+/** Everything but geometry. */
+export type State = {
+  /** Corners of the network. */
+  corners: [number, number, number][];
+  /** Curves of the network. */
+  curves: Curve[];
+  /** Edits that can be taken back, oldest first. */
+  done: Step[];
+  /** What is to be put right before all of the mesh is patches. */
+  faults: Fault[];
+  /** Feature curves: the patch that each is of. */
+  features: number[];
+  /** Figures of quality; keys are those of the report. */
+  figures: { [key: string]: number };
+  /** Projects in the folder, for the start page. */
+  files: string[];
+  /** Running jobs. */
+  jobs: Job[];
+  /** Geometry that there is, each with its name of now. */
+  layers: { [key: string]: string };
+  /** True if surfaces follow every edit. */
+  live: boolean;
+  /** Patches of the network. */
+  patches: Patch[];
+  /** The project; absent on the start page. */
+  project?: (Project | null);
+  /** How fine surfaces are. */
+  resolution: Resolution;
+  /** Rises with every change of the drawing. */
+  revision: number;
+  /** Seams, worst first. */
+  seams: Seam2[];
+  /** The stages in the order of the pipeline. */
+  stages: Stage[];
+  /** Point and normal of the plane of symmetry. */
+  symmetry?: [[number, number, number], [number, number, number]] | null;
+  /** Edits that can be made again, the next one last. */
+  undone: Step[];
+  /** What the user should know of the surfaces. */
+  warnings: string[];
+};
+
 /** An edit of the history. */
 export type Step = {
   /** Corners, curves and patches after it. */
@@ -647,5 +689,3 @@ export type Why = {
   /** Where, world units. */
   place?: [number, number, number] | null;
 };
-
-export type State = Omit<Extract<Message, { type: 'state' }>, 'type'>;

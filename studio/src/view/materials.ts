@@ -5,7 +5,7 @@ export const MODES = { clay: 0, patches: 1, deviation: 2, curvature: 2, zebra: 3
 
 const VERTEX = /* glsl */ `
 attribute float value;
-attribute float patch;
+attribute float patchOf;
 varying vec3 vNormal;
 varying vec3 vEye;
 varying vec3 vPlace;
@@ -17,7 +17,7 @@ void main() {
   vEye = eye.xyz;
   vPlace = position;
   vValue = value;
-  vPatch = patch;
+  vPatch = patchOf;
   gl_Position = projectionMatrix * eye;
 }`;
 
@@ -68,7 +68,7 @@ void main() {
   float fill = max(0.0, dot(n, normalize(vec3(0.8, -0.15, 0.4))));
   float rim = pow(1.0 - max(0.0, dot(n, toEye)), 3.0);
   float sheen = pow(max(0.0, dot(n, normalize(normalize(vec3(-0.45, 0.65, 0.75)) + toEye))), 40.0);
-  vec3 color = base * (0.30 + 0.66 * key + 0.16 * fill * vec3(0.85, 0.93, 1.0)) + 0.07 * rim + 0.10 * sheen;
+  vec3 color = base * (0.44 + 0.52 * key + 0.18 * fill * vec3(0.85, 0.93, 1.0)) + 0.07 * rim + 0.10 * sheen;
   if (mode == 2) color = base * (0.62 + 0.40 * key);
   if (mode == 3) {
     vec3 r = reflect(-toEye, n);
@@ -115,7 +115,7 @@ varying vec3 vColor;
 void main() {
   vColor = color;
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
-  gl_Position.z -= 0.0006 * gl_Position.w;
+  gl_Position.z -= 0.002 * gl_Position.w;
   gl_PointSize = size;
 }`;
 

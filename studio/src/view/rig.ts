@@ -85,7 +85,7 @@ export class Rig {
   /** Shows a ball whole. */
   fit(center: Vector3, radius: number, aspect: number): void {
     this.target.copy(center);
-    this.half = (1.04 * radius) / Math.min(1, aspect);
+    this.half = (0.9 * radius) / Math.min(1, aspect);
   }
 
   /** Looks from a side. */

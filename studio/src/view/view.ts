@@ -3,6 +3,8 @@ import {
   BufferAttribute,
   BufferGeometry,
   Color,
+  ColorManagement,
+  LinearSRGBColorSpace,
   Mesh,
   OrthographicCamera,
   PerspectiveCamera,
@@ -25,6 +27,8 @@ import { HALF_FOV, Rig } from './rig';
 const STILL = 150;
 /** Renderers that draw with the processor: fewer pixels for them. */
 const SLOW = /swiftshader|llvmpipe|software|basic render/i;
+
+ColorManagement.enabled = false;
 
 export interface Hit {
   /** World units, relative to the middle. */
@@ -78,6 +82,8 @@ export class View {
     probe?.getExtension('WEBGL_lose_context')?.loseContext();
     const slow = SLOW.test(name);
     this.renderer = new WebGLRenderer({ canvas, antialias: !slow, preserveDrawingBuffer: true });
+    // Colours are written as they are named.
+    this.renderer.outputColorSpace = LinearSRGBColorSpace;
     this.renderer.setPixelRatio(slow ? 1 : Math.min(2, window.devicePixelRatio));
     this.coarseSurface = this.surface;
     for (const line of Object.values(this.lines)) this.scene.add(line.object);
@@ -161,8 +167,8 @@ export class View {
   private updateCamera(): void {
     const { rig } = this;
     const eye = rig.toEye();
-    const far = rig.distance() + 4 * rig.radius;
-    const near = Math.max(rig.distance() - 4 * rig.radius, far * 1e-4);
+    const far = rig.distance() + 3 * rig.radius;
+    const near = Math.max(rig.distance() - 2 * rig.radius, 0.02 * rig.distance());
     const place = rig.target.clone().addScaledVector(eye, rig.distance());
     for (const camera of [this.perspective, this.flat]) {
       camera.position.copy(place);
@@ -339,7 +345,7 @@ export class View {
       this.shownTree = { geometry: this.shown.geometry, bvh: new MeshBVH(this.shown.geometry, { indirect: true }) };
     }
     const alone = this.surface.uniforms.alone!.value as number;
-    const patch = this.shown.geometry.getAttribute('patch');
+    const patch = this.shown.geometry.getAttribute('patchOf');
     const hits = this.shownTree.bvh.raycast(this.ray(x, y), 2).sort((a, b) => a.distance - b.distance);
     for (const hit of hits) {
       const found = Math.round(patch.getX(hit.face?.a ?? 0));
@@ -378,7 +384,7 @@ function buffersOf(geometry: Geometry): BufferGeometry {
   buffers.setIndex(new BufferAttribute(geometry.numbers.get('index')!, 1));
   const vertices = buffers.getAttribute('position').count;
   const patch = geometry.floats.get('patch') ?? new Float32Array(vertices).fill(-2);
-  buffers.setAttribute('patch', new BufferAttribute(patch, 1));
+  buffers.setAttribute('patchOf', new BufferAttribute(patch, 1));
   return buffers;
 }
 

@@ -1,6 +1,6 @@
 // A program, a browser, and a page on it. Pages that complain in their console fail their test.
 import { type ChildProcess, spawn } from 'node:child_process';
-import { existsSync, mkdirSync, mkdtempSync, rmSync } from 'node:fs';
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { type Browser, chromium, type Page } from 'playwright-core';
@@ -16,6 +16,11 @@ export const SHOTS = join(ROOT, 'out/studio');
 export const chromiumPath = process.env.PLANISH_CHROMIUM ?? BROWSERS.find((p) => existsSync(p));
 if (!chromiumPath) console.log('skipped: the tests in a browser; there is no chromium');
 
+/** While the page is worked on: it comes from `studio/dist`, and the program need not be built again. */
+const PAGE_FROM_DIST = process.env.PLANISH_PAGE === 'dist';
+const DIST = join(ROOT, 'studio/dist');
+const TYPES: Record<string, string> = { html: 'text/html', js: 'text/javascript', css: 'text/css' };
+
 let browser: Browser;
 
 /** Opens the browser for the tests of a file. */
@@ -26,6 +31,7 @@ export function withBrowser(): void {
       executablePath: chromiumPath!,
       args: [
         '--no-sandbox',
+        ...(PAGE_FROM_DIST ? ['--disable-features=LocalNetworkAccessChecks'] : []),
         '--disable-quic',
         '--no-first-run',
         '--use-angle=swiftshader',
@@ -98,6 +104,15 @@ export class Studio {
 
   static async open(url: string, size = { width: 1280, height: 800 }): Promise<Studio> {
     const studio = new Studio(await browser.newPage({ viewport: size, acceptDownloads: true }));
+    if (PAGE_FROM_DIST) {
+      await studio.page.route(/\/(studio\.(js|css))?$/, async (route) => {
+        const name = new URL(route.request().url()).pathname.slice(1) || 'index.html';
+        await route.fulfill({
+          body: readFileSync(join(DIST, name)),
+          contentType: TYPES[name.split('.').pop()!] ?? 'text/plain',
+        });
+      });
+    }
     await studio.page.goto(url);
     return studio;
   }
@@ -135,8 +150,7 @@ export class Studio {
   async pixel(p: readonly number[]): Promise<{ x: number; y: number }> {
     const box = (await this.page.locator('canvas').boundingBox())!;
     const at = await this.page.evaluate(
-      (q) =>
-        (window as never as { __studio: { project(p: number[]): { x: number; y: number } } }).__studio.project(q),
+      (q) => (window as never as { __studio: { project(p: number[]): { x: number; y: number } } }).__studio.project(q),
       [...p],
     );
     return { x: box.x + at.x, y: box.y + at.y };

@@ -13,7 +13,9 @@ pub fn studio(session: &Session, args: &Studio) -> Result<Status, Failure> {
         return Err(Failure::usage(report, "the studio writes its report from the page").hint("leave --report out"));
     }
     if let Some(file) = args.file.as_ref().filter(|f| !f.is_file()) {
-        return Err(Failure::usage(file, "is no file").hint("check the name, or leave it out and drop a file on the page"));
+        return Err(
+            Failure::usage(file, "is no file").hint("check the name, or leave it out and drop a file on the page")
+        );
     }
     if !has_page() {
         return Err(told(StudioError::NoPage));

@@ -103,7 +103,8 @@ impl<'env> Table<'_, '_, 'env> {
             let observer: &dyn Observer = watch;
             let made = pipeline::mesh_scan(&scan, &params, observer).map_err(|e| e.to_string()).and_then(|made| {
                 let suited = pipeline::params_for(&made);
-                let (mesh, _) = planish::mend::repair(&made.meshed.extracted.mesh, observer).map_err(|e| e.to_string())?;
+                let (mesh, _) =
+                    planish::mend::repair(&made.meshed.extracted.mesh, observer).map_err(|e| e.to_string())?;
                 Ok(Box::new((mesh, suited)))
             });
             Outcome::Meshed(made)
@@ -135,14 +136,10 @@ impl<'env> Table<'_, '_, 'env> {
     fn take_over(&mut self, outcome: Outcome, asked: &Option<(Client, u32)>) -> (Answer, Option<Content>) {
         let done = || Answer::Done(String::new());
         match outcome {
-            Outcome::Opened(Ok(project)) => {
-                (Answer::Done(project.notice.clone()), Some(Content::Project(project)))
-            }
+            Outcome::Opened(Ok(project)) => (Answer::Done(project.notice.clone()), Some(Content::Project(project))),
             Outcome::Meshed(Ok(made)) => {
                 let (mesh, params) = *made;
-                let next = self.project.take().map(|project| {
-                    Content::Project(Box::new(project.meshed(mesh, params)))
-                });
+                let next = self.project.take().map(|project| Content::Project(Box::new(project.meshed(mesh, params))));
                 (done(), next)
             }
             Outcome::Meshed(Err(why)) => {
@@ -205,4 +202,3 @@ pub(super) fn with(params: &pipeline::PipelineParams, resolution: &Resolution) -
     params.fit.resolution = resolution.clone();
     params
 }
-

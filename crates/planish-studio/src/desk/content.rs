@@ -1,14 +1,14 @@
 //! What comes onto the desk: nothing, or a project from a file, a scan, a mesh or a made part.
 
+use super::jobs::Outcome;
 use super::journal;
 use super::project::Project;
-use super::jobs::Outcome;
 use super::{Desk, Upload};
 use crate::protocol::Sample;
+use planish::mesh::TriMesh;
 use planish::model::{Model, Units};
 use planish::observe::Observer;
 use planish::synthetic::{self, ScannerParams, virtual_scan};
-use planish::mesh::TriMesh;
 use planish_io::{FileUnits, ScanOptions};
 use std::path::{Path, PathBuf};
 

@@ -51,7 +51,8 @@ impl<'env> Table<'_, '_, 'env> {
     }
 
     fn start_edit(&mut self, edit: Edit) -> u32 {
-        let (drawing, revision) = self.project.as_ref().map_or_else(Default::default, |p| (p.model.drawing(), p.revision));
+        let (drawing, revision) =
+            self.project.as_ref().map_or_else(Default::default, |p| (p.model.drawing(), p.revision));
         let title = title(&edit);
         let Some(ground) = self.ground else { return 0 };
         self.desk.jobs.start(self.scope, ("edit", title), move |watch| {
@@ -113,13 +114,21 @@ impl<'env> Table<'_, '_, 'env> {
     pub(super) fn fit(&mut self) -> Result<u32, Why> {
         let Some(project) = self.project else { return Err(Why::of(NO_PROJECT)) };
         if !project.is_finished() {
-            let why = project.faults.first().map_or_else(|| "there are no patches yet - hint: draw curves".into(), |f| f.to_string());
+            let why = project
+                .faults
+                .first()
+                .map_or_else(|| "there are no patches yet - hint: draw curves".into(), |f| f.to_string());
             return Err(Why::of(why));
         }
         let (revision, mesh) = (project.revision, Arc::clone(&project.mesh));
         let Model { network, sketch, units, shift, .. } = &project.model;
-        let mut model =
-            Model { network: network.clone(), sketch: sketch.clone(), units: *units, shift: *shift, ..Model::default() };
+        let mut model = Model {
+            network: network.clone(),
+            sketch: sketch.clone(),
+            units: *units,
+            shift: *shift,
+            ..Model::default()
+        };
         let params = with(&project.params, &self.desk.resolution);
         model.params = serde_json::to_string(&params).unwrap_or_default();
         let earlier = project.fit.as_ref().and_then(|f| f.earlier.clone());

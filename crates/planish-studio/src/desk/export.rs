@@ -182,4 +182,3 @@ fn as_toml(value: &serde_json::Value) -> Option<toml::Value> {
         }
     })
 }
-

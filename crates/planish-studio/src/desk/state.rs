@@ -38,9 +38,13 @@ impl Table<'_, '_, '_> {
             features: sketch.features.iter().map(|f| f.patch).collect(),
             faults: project.faults.iter().map(fault).collect(),
             symmetry: sketch.symmetry.map(|p| [p.point.to_array(), p.normal.to_array()]),
-            done: project.model.undo.windows(2).map(|w| step(&w[0], Some(&w[1].other))).chain(
-                project.model.undo.last().map(|s| step(s, Some(&project.model.drawing()))),
-            ).collect(),
+            done: project
+                .model
+                .undo
+                .windows(2)
+                .map(|w| step(&w[0], Some(&w[1].other)))
+                .chain(project.model.undo.last().map(|s| step(s, Some(&project.model.drawing()))))
+                .collect(),
             undone: project.model.redo.iter().map(|s| step(s, Some(&s.other))).collect(),
             layers: self.desk.layers.names(project),
             resolution,
@@ -87,9 +91,13 @@ impl Table<'_, '_, '_> {
         let points = scan.map_or(0, |s| s.points.len());
         vec![
             standing(StageName::Scan, there(scan.is_some()), count(points, "point")),
-            standing(StageName::Mesh, there(!project.mesh.triangles.is_empty()), count(project.mesh.triangles.len(), "triangle")),
+            standing(
+                StageName::Mesh,
+                there(!project.mesh.triangles.is_empty()),
+                count(project.mesh.triangles.len(), "triangle"),
+            ),
             standing(StageName::Curves, there(curves > 0), count(curves, "curve")),
-            standing(StageName::Patches, parted, format!("{}, {faults} to put right", count(patches, "patch").replace("patchs", "patches"))),
+            standing(StageName::Patches, parted, parted_note(patches, faults)),
             standing(StageName::Surfaces, fitted, count(surfaces, "surface")),
         ]
     }
@@ -130,6 +138,11 @@ fn facts(project: &Project) -> state::Project {
     }
 }
 
+fn parted_note(patches: usize, faults: usize) -> String {
+    let words = format!("{patches} {}", if patches == 1 { "patch" } else { "patches" });
+    if faults > 0 { format!("{words}, {faults} to put right") } else { words }
+}
+
 fn curve(mesh: &TriMesh, curve: &network::Curve) -> Curve {
     let at: Vec<DVec3> = curve.points.iter().map(|p| p.position(mesh)).collect();
     let kind = match curve.kind {
@@ -146,7 +159,8 @@ fn patches(network: &network::Network, fit: Option<&Fit>) -> Vec<Patch> {
         let (surface, found) = fit.and_then(|f| Some((f.model.surfaces.get(p)?, f.deviations.get(p)?)))?;
         Some(Fitted { control: [surface.cols as u32, surface.rows as u32], rms: found.rms, max: found.max })
     };
-    let patch = |(p, patch): (usize, &network::Patch)| Patch { curves: patch.sides.map(|s| s.curve), fitted: fitted(p) };
+    let patch =
+        |(p, patch): (usize, &network::Patch)| Patch { curves: patch.sides.map(|s| s.curve), fitted: fitted(p) };
     network.patches.iter().enumerate().map(patch).collect()
 }
 

@@ -284,7 +284,10 @@ mod tests {
     fn a_refusal_keeps_message_hint_and_place_apart() {
         let why = Why::of("no curves run around (1.5, -2, 0.25) yet - hint: draw some");
         assert_eq!(why.place, Some([1.5, -2.0, 0.25]));
-        assert_eq!((why.message.as_str(), why.hint.as_str()), ("no curves run around (1.5, -2, 0.25) yet", "draw some"));
+        assert_eq!(
+            (why.message.as_str(), why.hint.as_str()),
+            ("no curves run around (1.5, -2, 0.25) yet", "draw some")
+        );
         assert_eq!(Why::of("it is a folder (byte 0)").place, None);
         assert_eq!(Why::of("step 1 (paint) at (1, 2, 3)").place, Some([1.0, 2.0, 3.0]));
     }

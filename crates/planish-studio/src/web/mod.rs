@@ -15,11 +15,11 @@ use axum::Router;
 use axum::routing::{get, post};
 use hub::Hub;
 use planish::model::Units;
+use std::future::IntoFuture;
 use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
-use std::future::IntoFuture;
 use std::time::Duration;
 
 /// How the studio is served.
