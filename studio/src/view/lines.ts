@@ -48,6 +48,9 @@ export function share(all: Courses, curve: number, segment: number, part: number
   return whole > 0 ? before / whole : 0;
 }
 
+/** Lines wider than this mark others, pixels. */
+const OVER = 4;
+
 /** Thick lines of one colour. */
 export class Thick {
   readonly object: LineSegments2;
@@ -55,6 +58,10 @@ export class Thick {
 
   constructor(color: string, width: number, inFront = false) {
     this.material = new LineMaterial({ color, linewidth: width, depthTest: !inFront, transparent: inFront });
+    // What is pointed at lies over the line that it is.
+    this.material.polygonOffset = width > OVER;
+    this.material.polygonOffsetFactor = -2;
+    this.material.polygonOffsetUnits = -8;
     this.object = new LineSegments2(new LineSegmentsGeometry(), this.material);
     this.object.frustumCulled = false;
     this.object.visible = false;

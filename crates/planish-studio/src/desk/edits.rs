@@ -9,10 +9,13 @@ use crate::protocol::state::StageName;
 use crate::protocol::{Message, Why};
 use crate::web::hub::Client;
 use planish::edit::{ApplyError, Edit, Made, apply, preview};
+use planish::mesh::FacePoint;
 use planish::model::{Drawing, Model};
+use planish::network::Network;
 use planish::observe::{Observer, Silent};
 use planish::pipeline::{self, Earlier, PipelineObserver};
 use planish::surface::Resolution;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 impl<'env> Table<'_, '_, 'env> {
@@ -99,10 +102,12 @@ impl<'env> Table<'_, '_, 'env> {
             Err(e) => return self.refuse(client, id, Why::of(e)),
         };
         let mesh = &project.mesh;
-        let course = |points: &[planish::mesh::FacePoint]| -> Vec<f32> {
+        let course = |points: &[FacePoint]| -> Vec<f32> {
             points.iter().flat_map(|p| p.position(mesh).to_array()).map(|x| x as f32).collect()
         };
-        let network = made.curves.iter().map(|&c| course(&drawing.network.curves[c as usize].points));
+        let old = Places::of(&project.model.network);
+        let is_new = |c: &&u32| !old.has_course(&drawing.network.curves[**c as usize].points);
+        let network = made.curves.iter().filter(is_new).map(|&c| course(&drawing.network.curves[c as usize].points));
         let features = made.features.iter().map(|&f| course(&drawing.sketch.features[f as usize].points));
         let curves = network.chain(features).collect();
         let corner = |c: &u32| drawing.network.corners[*c as usize].place.position(mesh).as_vec3().to_array();
@@ -164,6 +169,25 @@ impl<'env> Table<'_, '_, 'env> {
             }
         }
     }
+}
+
+/// All places of the curves of a network. A curve that is divided leaves pieces that are new curves, and nothing new to see.
+struct Places(HashSet<(u32, [u64; 3])>);
+
+impl Places {
+    fn of(network: &Network) -> Places {
+        Places(network.curves.iter().flat_map(|c| &c.points).map(key).collect())
+    }
+
+    /// True if a curve runs along curves that were there: its inner places are theirs.
+    fn has_course(&self, points: &[FacePoint]) -> bool {
+        let inner = points.get(1..points.len().saturating_sub(1)).unwrap_or_default();
+        !inner.is_empty() && inner.iter().all(|p| self.0.contains(&key(p)))
+    }
+}
+
+fn key(place: &FacePoint) -> (u32, [u64; 3]) {
+    (place.face, place.bary.map(f64::to_bits))
 }
 
 /// Edits that look at the whole mesh.
