@@ -114,6 +114,7 @@ export class Studio {
       });
     }
     await studio.page.goto(url);
+    await studio.page.waitForFunction(() => '__studio' in window);
     return studio;
   }
 
