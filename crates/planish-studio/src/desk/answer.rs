@@ -2,7 +2,7 @@
 
 use super::content::{self, Content};
 use super::jobs::Outcome;
-use super::project::Project;
+use super::project::{NO_PROJECT, Project};
 use super::{Table, export};
 use crate::protocol::state::StageName;
 use crate::protocol::{Message, Request, Why};
@@ -172,9 +172,6 @@ pub(super) enum Answer {
     /// Told already, or later.
     Given,
 }
-
-/// What is told where a project is wanted.
-pub(super) const NO_PROJECT: &str = "no project is open - hint: drop a file on the page";
 
 /// Fewest and most control points along a curve.
 const CONTROL: std::ops::RangeInclusive<usize> = 4..=512;

@@ -99,7 +99,7 @@ fn of_mesh(mut mesh: TriMesh, units: Units, file: PathBuf, observer: &dyn Observ
     let shift = planish_io::shift_of(&mesh.bounds());
     mesh.points.iter_mut().for_each(|p| *p -= shift);
     let (mesh, _) = planish::mend::repair(&mesh, observer).map_err(|e| e.to_string())?;
-    Ok(Project::of_model(Model { mesh, units, shift, ..Model::default() }, file, String::new()).as_new())
+    Ok(Project::of_model(Model { mesh, units, shift, ..Model::default() }, file, String::new()).unsaved())
 }
 
 fn made(sample: Sample, folder: &Path, observer: &dyn Observer) -> Result<Project, String> {

@@ -2,9 +2,9 @@
 //! surfaces that follow them.
 
 use super::Table;
-use super::answer::{Answer, NO_PROJECT, with};
+use super::answer::{Answer, with};
 use super::jobs::Outcome;
-use super::project::{Fit, deviations};
+use super::project::{Fit, NO_PROJECT, deviations};
 use crate::protocol::state::StageName;
 use crate::protocol::{Message, Why};
 use crate::web::hub::Client;

@@ -31,7 +31,7 @@ pub enum Outcome {
     /// Surfaces were fitted.
     Fitted(Result<Box<Fit>, String>),
     /// A file was made: the request, and where it is fetched.
-    Exported(Result<super::export::Ready, String>),
+    Exported(Result<super::exports::Ready, String>),
     /// It came to an end that nobody foresaw.
     Fault(String),
 }

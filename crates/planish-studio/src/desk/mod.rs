@@ -8,6 +8,7 @@ mod answer;
 mod content;
 mod edits;
 mod export;
+mod exports;
 mod jobs;
 mod journal;
 mod layers;
@@ -16,7 +17,7 @@ mod save;
 mod state;
 mod tessellate;
 
-pub use export::Exports;
+pub use exports::Exports;
 
 use crate::StudioError;
 use crate::protocol::{Layer, Message, Request, Why};

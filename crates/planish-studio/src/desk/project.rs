@@ -13,6 +13,9 @@ use planish::surface::{Deviation, SeamQuality, deviation_of};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// What is told where a project is wanted.
+pub const NO_PROJECT: &str = "no project is open - hint: drop a file on the page";
+
 /// A project.
 pub struct Project {
     /// The mesh, which no edit changes; empty while there is a scan alone.
@@ -111,11 +114,11 @@ impl Project {
 
     /// The project of a scan with the mesh that was made of it.
     pub fn meshed(self, mesh: TriMesh, params: PipelineParams) -> Project {
-        Project { mesh: Arc::new(mesh), params, ..self }.as_new()
+        Project { mesh: Arc::new(mesh), params, ..self }.unsaved()
     }
 
     /// One that no file holds yet.
-    pub fn as_new(mut self) -> Project {
+    pub fn unsaved(mut self) -> Project {
         self.saver.changed();
         self
     }

@@ -28,10 +28,6 @@ pub fn points(cloud: &Cloud, center: DVec3) -> Arrays {
     let mut arrays = Arrays::default();
     let shown = cloud.points.iter().step_by(step);
     arrays.floats("position", 3, shown.flat_map(|p| relative(*p, center)));
-    if let Some(normals) = cloud.attribute("normal", 3) {
-        let rows = normals.values.chunks_exact(3).step_by(step);
-        arrays.floats("normal", 3, rows.flat_map(|n| [n[0] as f32, n[1] as f32, n[2] as f32]));
-    }
     arrays
 }
 
