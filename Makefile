@@ -2,6 +2,7 @@
 #
 #   make demo    build the program and run everything on a synthetic part: products in out/demo
 #   make test    all tests: the library, the program, files read back by other programs' libraries
+#   make studio  the page of the studio, which the program has inside
 #   make wheel   the Python package with the program inside: out/wheels
 #   make fuzz    damaged files for ten minutes a format, 300 killed sessions, hostile shapes through every command
 #   make lint    formatting and clippy, warnings are errors
@@ -18,29 +19,37 @@ PYTHON  := .venv/bin/python
 DATA    := $(or $(PLANISH_DATA),../shared/data)
 
 .NOTPARALLEL:
-.PHONY: build demo wheel fuzz deny test test-rust test-readers test-python lint bench figures docs clean
+.PHONY: build demo studio wheel fuzz deny test test-rust test-readers test-studio test-python lint bench figures docs clean
 .DELETE_ON_ERROR:
 
-build: .stamp/packages
+build: .stamp/packages .stamp/page
 	$(CARGO) build --release --locked --workspace
 
 demo: build
 	$(PLANISH) demo -o out/demo
 	@echo "open out/demo/report.html"
 
-test: test-rust test-readers
+test: test-rust test-readers test-studio
+
+studio: .stamp/page
 
 # PLANISH_PYTHON: tests of the file formats read their files back with other libraries, too.
-test-rust: .stamp/packages .stamp/readers
+test-rust: .stamp/packages .stamp/readers .stamp/page
 	@test -d "$(DATA)" || echo "skipped: the tests on measured meshes; there is no $(DATA), and PLANISH_DATA names none"
 	PLANISH_PYTHON=$(abspath $(PYTHON)) $(CARGO) test --release --locked --workspace --no-fail-fast
 
 # The program as the tests above have built it; `build` would compile what depends on test-only features again.
-test-readers: .stamp/packages .stamp/readers
+test-readers: .stamp/packages .stamp/readers .stamp/page
 	$(CARGO) test --release --locked --workspace --no-run --quiet
 	$(PYTHON) -m pytest -q -rs tests/readers
 
-wheel: .stamp/packages .stamp/python
+# The page by itself, then with the program in a browser; without a browser the second half is skipped.
+test-studio: .stamp/packages .stamp/page .stamp/browser
+	cd studio && ../.ci/node npm test --silent
+	$(CARGO) test --release --locked --workspace --no-run --quiet
+	cd studio && ../.ci/node npm run --silent e2e
+
+wheel: .stamp/packages .stamp/python .stamp/page
 	rm -rf out/wheels
 	.venv/bin/maturin build --locked --quiet --out out/wheels
 
@@ -61,7 +70,8 @@ deny:
 	@if $(CARGO) deny --version >/dev/null 2>&1; then $(CARGO) deny --locked check licenses sources bans; \
 	else echo "skipped: licences and sources; cargo-deny is not installed"; fi
 
-lint: .stamp/packages deny
+lint: .stamp/packages .stamp/node deny
+	cd studio && ../.ci/node npm run --silent check
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
 
@@ -84,12 +94,27 @@ docs: build
 	  cp out/docs/head/$$p.png docs/pictures/head-$$p.png; done
 
 clean:
-	rm -rf out .stamp .venv
+	rm -rf out .stamp .venv studio/dist studio/node_modules
 
 # System packages, only those that are missing.
 .stamp/packages: .ci/packages
 	@mkdir -p .stamp
 	.ci/packages build
+	@touch $@
+
+# What builds the page and tests it.
+.stamp/node: studio/package-lock.json .ci/node
+	@mkdir -p .stamp
+	cd studio && ../.ci/node npm ci --no-audit --no-fund --silent
+	@touch $@
+
+.stamp/page: .stamp/node studio/index.html studio/vite.config.ts $(shell find studio/src -type f)
+	cd studio && ../.ci/node npm run --silent build
+	@touch $@
+
+.stamp/browser: .ci/packages
+	@mkdir -p .stamp
+	.ci/packages browser || echo "skipped: the tests in a browser; there is no chromium, and none can be installed"
 	@touch $@
 
 # The libraries that read the products back.

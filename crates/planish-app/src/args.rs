@@ -75,6 +75,8 @@ pub enum Command {
     Transform(Transform),
     /// What is in a file, and what is wrong with it
     Info(Info),
+    /// Draw patches on a scan or a mesh in the browser, and watch the surface follow
+    Studio(Studio),
 }
 
 /// An axis that points up.
@@ -445,4 +447,27 @@ fn percent(text: &str) -> Result<f64, String> {
         Ok(x) if x > 0.0 && x <= 100.0 => Ok(x),
         _ => Err("a share above 0 and up to 100 percent is needed".into()),
     }
+}
+
+/// `planish studio`
+#[derive(Args, Debug)]
+pub struct Studio {
+    /// A project (.planish), a mesh or a scan; its project file is beside it. Without one the page takes files that are
+    /// dropped on it, and their projects are in the current folder
+    pub file: Option<PathBuf>,
+    /// Port to serve at [default: any that is free]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    pub port: u16,
+    /// Do not open the browser; the address is printed
+    #[arg(long)]
+    pub no_open: bool,
+    /// Interface to serve at: another one than the loopback interface shows project and files to everybody in the network who
+    /// has the token, and what is sent can be read on its way
+    #[arg(long, value_name = "IP", default_value = "127.0.0.1")]
+    pub host: std::net::IpAddr,
+    /// A token of your own, 16 letters or digits at least, for --host [default: a random one]
+    #[arg(long, value_name = "TOKEN")]
+    pub token: Option<String>,
+    #[command(flatten)]
+    pub common: Common,
 }

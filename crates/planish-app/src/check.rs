@@ -48,7 +48,7 @@ pub fn check(command: &Command) -> Result<(), Failure> {
         Command::Export(a) => splines(a),
         Command::Compare(a) => columns(&a.scan),
         Command::Transform(a) => columns(&a.scan),
-        Command::Deform(_) | Command::Info(_) => Ok(()),
+        Command::Deform(_) | Command::Info(_) | Command::Studio(_) => Ok(()),
     }
 }
 

@@ -92,6 +92,8 @@ fn files(command: &Command) -> (&Common, Vec<PathBuf>, Vec<PathBuf>) {
             (&a.common, std::iter::once(a.input.clone()).chain(named).collect(), vec![a.output.clone()])
         }
         Command::Info(a) => (&a.common, vec![a.file.clone()], Vec::new()),
+        // A project is worked on where it is; that of a mesh or a scan gets a name that no file has.
+        Command::Studio(a) => (&a.common, a.file.iter().cloned().collect(), Vec::new()),
     }
 }
 

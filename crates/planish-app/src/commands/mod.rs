@@ -15,6 +15,7 @@ mod missed;
 mod relief;
 mod run;
 mod smooth;
+mod studio;
 mod transform;
 
 use crate::args::{Cli, Command, Common};
@@ -60,6 +61,7 @@ pub fn run(cli: Cli) -> Result<Status, Failure> {
         Command::Compare(args) => compare::compare(&Session::new(&args.common)?, &args),
         Command::Transform(args) => transform::transform(&Session::new(&args.common)?, &args),
         Command::Info(args) => info::info(&Session::new(&args.common)?, &args),
+        Command::Studio(args) => studio::studio(&Session::new(&args.common)?, &args),
     }
 }
 

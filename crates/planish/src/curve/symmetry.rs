@@ -13,14 +13,17 @@ use crate::mesh::{Adjacency, FacePoint, TriMesh};
 use crate::observe::Observer;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A plane through `point` with unit normal `normal`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Plane {
     /// A point of the plane, world units.
+    #[schemars(with = "[f64; 3]")]
     pub point: DVec3,
     /// Unit normal.
+    #[schemars(with = "[f64; 3]")]
     pub normal: DVec3,
 }
 

@@ -1,4 +1,4 @@
-//! One edit made on a drawing, whole or not at all.
+//! One edit made on a drawing, whole or not at all, or tried on a copy of it.
 //!
 //! See `docs/methods/curves.md`, "Networks", and `docs/guide/edit.md`.
 
@@ -43,4 +43,27 @@ pub fn apply(
         }
     }
     Ok(Made { relaxed, faults, ..Made::between(&before, drawing) })
+}
+
+/// What an edit would make of a drawing: the drawing and what differs, without a word on what is left to put right. It leaves out
+/// what takes time on the whole mesh, so that it follows a hand.
+/// * `others` - models that [`Edit::Carry`] names
+/// # Errors
+/// See [`ApplyError`].
+pub fn preview(
+    drawing: &Drawing,
+    edit: &Edit,
+    ground: &Ground,
+    others: &Others,
+    observer: &dyn Observer,
+) -> Result<(Drawing, Made), ApplyError> {
+    let command = edit.command();
+    command.check()?;
+    let mut tried = drawing.clone();
+    let mut work = Work { ground, drawing: &mut tried, others, observer, relaxed: Vec::new(), images: None };
+    command.apply(&mut work)?;
+    observer.check()?;
+    let relaxed = std::mem::take(&mut work.relaxed);
+    let made = Made { relaxed, ..Made::between(drawing, &tried) };
+    Ok((tried, made))
 }

@@ -2,10 +2,11 @@
 
 use super::work::Work;
 use super::{ApplyError, Command};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Takes back the last edits.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Undo {
     /// How many.
@@ -14,7 +15,7 @@ pub struct Undo {
 }
 
 /// Makes edits again that were taken back.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Redo {
     /// How many.

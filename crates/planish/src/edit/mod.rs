@@ -23,7 +23,7 @@ mod pull;
 mod stroke;
 mod work;
 
-pub use apply::apply;
+pub use apply::{apply, preview};
 pub use change::{
     AddCorner, Clear, Continuity, DeleteCorner, DeleteCurves, DragCorner, DragCurve, Join, Mirror, Relax, Seam, Spline,
     SplitCurve, SplitRegion, Symmetry, mirror_network,
@@ -38,11 +38,12 @@ pub use pull::{Forces, Magnetism, Pull, Scalar, SplineMove};
 pub use work::Ground;
 
 use crate::model::Drawing;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use work::Work;
 
 /// One edit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "edit", rename_all = "snake_case")]
 pub enum Edit {
     /// A stroke through picks.

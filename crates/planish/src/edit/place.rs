@@ -1,10 +1,11 @@
 //! Places, corners and curves as a script names them (`docs/guide/edit.md`).
 
 use crate::mesh::FacePoint;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A place as a script names it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(
     untagged,
     deny_unknown_fields,
@@ -23,7 +24,7 @@ pub enum Spot {
 }
 
 /// A corner, a curve of the network or a feature curve as a script names it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, deny_unknown_fields, expecting = "a number counted from 0, or { near = [x, y, z] }, is wanted")]
 pub enum Name {
     /// By its number.
@@ -36,7 +37,7 @@ pub enum Name {
 }
 
 /// A curve as a script names it: one of the network, or a feature curve.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(
     untagged,
     deny_unknown_fields,
@@ -53,7 +54,7 @@ pub enum CurveName {
 }
 
 /// A curve by its number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CurveNumber {
     /// One of the network.

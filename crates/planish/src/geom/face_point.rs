@@ -1,9 +1,10 @@
 //! Places on triangles: a face and barycentric coordinates, the face points of [K98] §3.1.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A place on a mesh: a face and barycentric coordinates that are not negative and sum to one.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FacePoint {
     /// Index of the triangle.
     pub face: u32,

@@ -4,10 +4,11 @@ use crate::edit::check::{self, Range, within};
 use crate::edit::place::usual_snap;
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, Spot};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A corner; on a curve it divides it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AddCorner {
     /// Where.

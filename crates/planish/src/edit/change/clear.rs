@@ -3,10 +3,11 @@
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command};
 use crate::network::Network;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Deletes all corners and curves.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Clear {}
 

@@ -4,11 +4,12 @@ use crate::edit::check;
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, Name};
 use crate::network::CurveKind;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Makes the seams along curves smooth or sharp, whatever the mesh has there. A sharp curve counts as one on a sharp edge:
 /// it stays where it is until it is made smooth.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Continuity {
     /// The curves; none of them on the boundary of the mesh.
@@ -18,7 +19,7 @@ pub struct Continuity {
 }
 
 /// How two patches meet along their curve.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Seam {
     /// With one tangent plane, as nearly as the patches can.

@@ -3,10 +3,11 @@
 use crate::edit::check;
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, Name};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Deletes a corner without curves or between two.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeleteCorner {
     /// The corner.

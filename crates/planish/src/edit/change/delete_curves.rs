@@ -3,11 +3,12 @@
 use crate::edit::check;
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, CurveName, CurveNumber, feature};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
 /// Deletes curves.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeleteCurves {
     /// The curves, numbered as before the edit; feature curves among them.

@@ -5,10 +5,11 @@
 use crate::edit::check::{self, Range, within};
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, CurveNumber, Forces, Name, RelaxedCurve, Spot};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Moves a corner; its curves follow.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DragCorner {
     /// The corner.

@@ -6,10 +6,11 @@ use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, CurveName, CurveNumber, Forces, RelaxedCurve};
 use crate::mesh::move_point_on_surface;
 use crate::observe::Observer;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Pulls a point of a curve; a section around it relaxes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DragCurve {
     /// The curve.

@@ -8,10 +8,11 @@ use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, Ground, Images};
 use crate::mesh::FacePoint;
 use crate::network::{Corner, Curve, Network};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Replaces the curves, feature curves and sections behind the plane of symmetry by mirror images of those before it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mirror {
     /// True for the other way round.

@@ -8,10 +8,11 @@ use crate::edit::network::{EditError, Holds, Stretch};
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, CurveName, CurveNumber, Forces, Pull, RelaxedCurve};
 use crate::network::CurveKind;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Relaxes a curve, a section of it, or all curves.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Relax {
     /// The curve; absent for all of the network that are free to move and do not lie in the plane of symmetry. Of

@@ -5,6 +5,7 @@ use crate::edit::check::{self, Range, within};
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, CurveName, SplineMove};
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Control vertices of a cubic space curve.
@@ -13,7 +14,7 @@ const FEWEST_CONTROL: usize = 4;
 const MOST_CONTROL: usize = 1000;
 
 /// Fits a space curve with some control vertices, moves it, and lets the curve follow. Without moves it smooths.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Spline {
     /// The curve.

@@ -3,10 +3,11 @@
 use crate::edit::check::{self, Range, within};
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, CurveName, CurveNumber};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Divides a curve at a share of its length.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SplitCurve {
     /// The curve.

@@ -3,10 +3,11 @@
 use crate::edit::check;
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, Spot};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Splits a region of 3, 5 or 6 sides into four-sided patches.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SplitRegion {
     /// A place in the region.

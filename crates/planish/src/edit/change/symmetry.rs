@@ -4,10 +4,11 @@ use crate::curve::symmetry::{self, Plane};
 use crate::edit::check;
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Sets the plane of symmetry, or finds it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Symmetry {
     /// The plane; absent to find it.

@@ -2,10 +2,11 @@
 
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The boundaries of the mesh as curves, where there are none yet.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Boundaries {}
 

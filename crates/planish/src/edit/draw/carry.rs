@@ -12,10 +12,11 @@ use crate::mesh::{Adjacency, TriMesh, sharp_edges};
 use crate::network::{Corner, Curve, CurveKind, Network};
 use crate::observe::Observer;
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Carries the network of another model over, by landmarks on both.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Carry {
     /// The other model, as the script names it.

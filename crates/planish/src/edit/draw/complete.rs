@@ -4,10 +4,11 @@ use crate::edit::check::{Range, count, within};
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command};
 use crate::layout::LayoutParams;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Lays out everything that is not parted yet.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Complete {
     /// Patches to aim at, over the whole mesh.

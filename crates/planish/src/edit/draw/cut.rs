@@ -7,10 +7,11 @@ use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, Spot};
 use crate::network::CurveKind;
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The cut by a plane, as a curve.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cut {
     /// A place on the cut.

@@ -7,10 +7,11 @@ use crate::edit::stroke::Brush;
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, CurveName, CurveNumber, Magnetism, Spot};
 use crate::network::CurveKind;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Leads a curve on from its free end through more picks, as [`super::Paint`] would.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Extend {
     /// The curve; the end that it was painted towards is meant if both are free, and of a feature curve always.

@@ -7,11 +7,12 @@ use crate::edit::{ApplyError, Command};
 use crate::geom::tolerance;
 use crate::mesh::{FacePoint, TriMesh, sharp_edges};
 use crate::network::{CurveKind, Network};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
 /// Edges sharper than an angle as curves.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FeatureLines {
     /// Degrees.

@@ -7,11 +7,12 @@ use crate::edit::stroke::Brush;
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, Magnetism, Spot};
 use crate::network::CurveKind;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Paints a curve through picks. Picks go to corners, curves and sharp edges within `snap` of the diagonal; where
 /// the curve meets others, corners divide both.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Paint {
     /// The picks, in order.

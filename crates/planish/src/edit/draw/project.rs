@@ -7,10 +7,11 @@ use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command};
 use crate::network::CurveKind;
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A polyline brought onto the mesh: along `direction`, or to the nearest places.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Project {
     /// World positions.

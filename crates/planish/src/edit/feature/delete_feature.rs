@@ -4,10 +4,11 @@ use super::forget_cells;
 use crate::edit::check;
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, Name};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Deletes a feature curve.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeleteFeature {
     /// Its number.

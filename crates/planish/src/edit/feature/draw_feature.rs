@@ -7,10 +7,11 @@ use crate::edit::stroke::Brush;
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, Magnetism, Spot};
 use crate::grid::{Family, FeatureCurve, family_of};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A feature curve of a patch, painted through picks.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Feature {
     /// The picks, from side to side; the patch is that of the middle one.

@@ -4,13 +4,14 @@ use crate::edit::check;
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, Spot};
 use crate::grid;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Cells of a section at most: a grid as fine as the finest displacement maps.
 const MOST_CELLS: usize = 2048;
 
 /// Gives the numbers of cells between the feature curves of a patch; empty lists take them back.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sections {
     /// A place in the patch.

@@ -1,0 +1,201 @@
+//! Answers to requests, and what becomes of jobs that end.
+
+use super::content::{self, Content};
+use super::jobs::Outcome;
+use super::project::{NO_PROJECT, Project};
+use super::{Table, export};
+use crate::protocol::state::StageName;
+use crate::protocol::{Message, Request, Why};
+use crate::web::hub::Client;
+use planish::observe::Observer;
+use planish::pipeline::{self, ScanParams};
+use planish::surface::Resolution;
+use std::path::Path;
+
+impl<'env> Table<'_, '_, 'env> {
+    /// Answers a request; tells if something else comes onto the desk.
+    pub(super) fn answer(&mut self, client: &Client, request: Request) -> Option<Content> {
+        let id = request.id();
+        match request {
+            Request::Edit { edit, .. } => self.edit(client, id, edit),
+            Request::Try { edit, .. } => self.try_out(client, id, edit),
+            Request::Fit { .. } => match self.fit() {
+                Ok(job) => self.wait_for(client, id, job),
+                Err(why) => self.refuse(client, id, why),
+            },
+            Request::Setting { resolution, live, .. } => self.set(client, id, resolution, live),
+            Request::Mesh { close, resolution, .. } => self.mesh(client, id, close, resolution),
+            Request::Cancel { job, .. } => match self.desk.jobs.stop(job) {
+                true => self.done(client, id, String::new()),
+                false => self.refuse(client, id, Why::of("this job has ended already")),
+            },
+            Request::Get { layer, .. } => self.geometry(client, id, layer),
+            Request::Export { format, .. } => self.export(client, id, format),
+            Request::Script { .. } => match self.project.as_ref().map(|p| export::script(&p.model)) {
+                Some(Ok(text)) => self.desk.hub.tell(client, &Message::Script { id, text }),
+                Some(Err(why)) => self.refuse(client, id, Why::of(why)),
+                None => self.refuse(client, id, Why::of(NO_PROJECT)),
+            },
+            Request::Sample { sample, .. } => {
+                let job = self.desk.sample(sample);
+                self.wait_for(client, id, job);
+            }
+            Request::Open { file, .. } => self.open_project(client, id, &file),
+            Request::Close { .. } => {
+                self.done(client, id, String::new());
+                return Some(Content::Nothing);
+            }
+        }
+        None
+    }
+
+    pub(super) fn done(&self, client: &Client, id: u32, told: String) {
+        self.desk.hub.tell(client, &Message::Done { id, job: None, told });
+    }
+
+    /// The request is done once the job is.
+    pub(super) fn wait_for(&mut self, client: &Client, id: u32, job: u32) {
+        self.desk.jobs.asked_by(job, client, id);
+        self.tell_state();
+    }
+
+    fn open_project(&mut self, client: &Client, id: u32, file: &str) {
+        let is_bare = Path::new(file).file_name() == Some(file.as_ref());
+        let path = self.desk.folder.join(file);
+        if !is_bare || !content::is_project(&path) || !path.is_file() {
+            return self.refuse(client, id, Why::of(format!("{file} is no project of this folder")));
+        }
+        let job = self.desk.read(path);
+        self.wait_for(client, id, job);
+    }
+
+    fn set(&mut self, client: &Client, id: u32, resolution: Resolution, live: bool) {
+        if let Err(why) = suits(&resolution, self.project.as_ref()) {
+            return self.refuse(client, id, Why::of(why));
+        }
+        let changed = self.desk.resolution != resolution;
+        self.desk.resolution = resolution;
+        self.desk.live = live;
+        let finished = self.project.as_ref().is_some_and(Project::is_finished);
+        let is_stale = self.project.as_ref().is_some_and(|p| p.fit.as_ref().is_none_or(|f| f.revision != p.revision));
+        if finished && (changed || (live && is_stale)) {
+            match self.fit() {
+                Ok(job) => return self.wait_for(client, id, job),
+                Err(why) => self.refuse(client, id, why),
+            }
+        } else {
+            self.done(client, id, String::new());
+        }
+        self.tell_state();
+    }
+
+    fn mesh(&mut self, client: &Client, id: u32, close: Option<bool>, resolution: Option<usize>) {
+        let Some(scan) = self.project.as_ref().and_then(|p| p.scan.clone()) else {
+            return self.refuse(client, id, Why::of("there is no scan here - hint: drop one on the page"));
+        };
+        if !self.project.as_ref().is_some_and(|p| p.model.network.curves.is_empty()) {
+            let why = "curves are drawn on the mesh that is there - hint: put the project away and open the scan again";
+            return self.refuse(client, id, Why::of(why));
+        }
+        let cells = resolution.map(planish::field::Spacing::Resolution);
+        let params = ScanParams { close, cells, ..ScanParams::default() };
+        let job = self.desk.jobs.start(self.scope, ("mesh", "Making a mesh of the scan"), move |watch| {
+            let observer: &dyn Observer = watch;
+            let made = pipeline::mesh_scan(&scan, &params, observer).map_err(|e| e.to_string()).and_then(|made| {
+                let suited = pipeline::params_for(&made);
+                let (mesh, _) =
+                    planish::mend::repair(&made.meshed.extracted.mesh, observer).map_err(|e| e.to_string())?;
+                Ok(Box::new((mesh, suited)))
+            });
+            Outcome::Meshed(made)
+        });
+        self.wait_for(client, id, job);
+    }
+
+    /// Takes over what a job has made, and answers who asked for it.
+    pub(super) fn ended(&mut self, job: u32, outcome: Outcome) -> Option<Content> {
+        let (asked, stopped) = self.desk.jobs.end(job);
+        if stopped {
+            if let Some((client, id)) = &asked {
+                self.refuse(client, *id, Why::of("it was stopped"));
+            }
+            self.tell_state();
+            return None;
+        }
+        let (answer, next) = self.take_over(outcome, &asked);
+        match (answer, &asked) {
+            (Answer::Done(told), Some((client, id))) => self.done(client, *id, told),
+            (Answer::Refused(why), Some((client, id))) => self.refuse(client, *id, why),
+            (Answer::Refused(why), None) => self.desk.hub.tell_all(&Message::Refused { id: 0, why }),
+            (Answer::Done(_), None) | (Answer::Given, _) => {}
+        }
+        self.tell_state();
+        next
+    }
+
+    fn take_over(&mut self, outcome: Outcome, asked: &Option<(Client, u32)>) -> (Answer, Option<Content>) {
+        let done = || Answer::Done(String::new());
+        match outcome {
+            Outcome::Opened(Ok(project)) => (Answer::Done(project.notice.clone()), Some(Content::Project(project))),
+            Outcome::Meshed(Ok(made)) => {
+                let (mesh, params) = *made;
+                let next = self.project.take().map(|project| Content::Project(Box::new(project.meshed(mesh, params))));
+                (done(), next)
+            }
+            Outcome::Meshed(Err(why)) => {
+                self.desk.failed = Some((StageName::Mesh, why.clone()));
+                (Answer::Refused(Why::of(why)), None)
+            }
+            Outcome::Edited(revision, edit, result) => (self.edited(revision, edit, *result, asked), None),
+            Outcome::Fitted(result) => (self.fitted(result).map_or_else(Answer::Refused, |()| done()), None),
+            Outcome::Exported(Ok(ready)) => {
+                let Some((client, id)) = asked else { return (Answer::Given, None) };
+                let (url, name, bytes) = self.desk.exports.keep(ready);
+                self.desk.hub.tell(client, &Message::Exported { id: *id, url, name, bytes });
+                (Answer::Given, None)
+            }
+            Outcome::Opened(Err(why)) | Outcome::Exported(Err(why)) => (Answer::Refused(Why::of(why)), None),
+            Outcome::Fault(text) => {
+                let why = format!("an internal fault: {text} - hint: please report it");
+                (Answer::Refused(Why::of(why)), None)
+            }
+        }
+    }
+}
+
+/// What the one who asked for a job is told at its end.
+pub(super) enum Answer {
+    /// It is done, in words.
+    Done(String),
+    /// It failed.
+    Refused(Why),
+    /// Told already, or later.
+    Given,
+}
+
+/// Fewest and most control points along a curve.
+const CONTROL: std::ops::RangeInclusive<usize> = 4..=512;
+
+/// Looks whether a choice can be met.
+fn suits(resolution: &Resolution, project: Option<&Project>) -> Result<(), String> {
+    let curves = project.map_or(0, |p| p.model.network.curves.len());
+    let range = || format!("control points along a curve are between {} and {}", CONTROL.start(), CONTROL.end());
+    match resolution {
+        Resolution::Tolerance(t) if !(*t > 0.0 && *t < 1.0) => {
+            Err("a tolerance is a share of the diagonal, above 0 and below 1".into())
+        }
+        Resolution::Control(both) if !both.iter().all(|c| CONTROL.contains(c)) => Err(range()),
+        Resolution::PerCurve(list) if !list.iter().all(|c| CONTROL.contains(c)) => Err(range()),
+        Resolution::PerCurve(list) if list.len() != curves => {
+            Err(format!("{} numbers were given for {curves} curves", list.len()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Parameters of a fit with a choice in place.
+pub(super) fn with(params: &pipeline::PipelineParams, resolution: &Resolution) -> pipeline::PipelineParams {
+    let mut params = params.clone();
+    params.fit.resolution = resolution.clone();
+    params
+}

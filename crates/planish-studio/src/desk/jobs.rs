@@ -1,0 +1,219 @@
+//! Jobs: what takes long, each on a thread of its own with a copy of what it works on. They tell how far they are, and stop
+//! when they are told.
+
+use super::project::Fit;
+use super::{Letter, Project};
+use crate::StudioError;
+use crate::protocol::state::Job;
+use planish::edit::{ApplyError, Edit, Made};
+use planish::mesh::TriMesh;
+use planish::model::Drawing;
+use planish::observe::Observer;
+use planish::pipeline::{PipelineObserver, PipelineParams, StageRecord};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Mutex};
+use std::thread::Scope;
+use std::time::{Duration, Instant};
+
+/// Pages hear of the progress of a job this often.
+const TELL_EVERY: Duration = Duration::from_millis(100);
+
+/// What came of a job.
+pub enum Outcome {
+    /// A file was read, or a part made.
+    Opened(Result<Box<Project>, String>),
+    /// A scan was meshed: with the parameters that suit it.
+    Meshed(Result<Box<(TriMesh, PipelineParams)>, String>),
+    /// An edit was made on the drawing of a revision.
+    Edited(u64, Edit, Box<Result<(Drawing, Made), ApplyError>>),
+    /// Surfaces were fitted.
+    Fitted(Result<Box<Fit>, String>),
+    /// A file was made: the request, and where it is fetched.
+    Exported(Result<super::exports::Ready, String>),
+    /// It came to an end that nobody foresaw.
+    Fault(String),
+}
+
+/// A running job.
+struct Running {
+    kind: &'static str,
+    job: Job,
+    /// Who asked for it: page and number of the request.
+    asked: Option<(crate::web::hub::Client, u32)>,
+    stop: Arc<AtomicBool>,
+}
+
+/// All running jobs.
+pub struct Jobs {
+    post: Sender<Letter>,
+    pool: Arc<rayon::ThreadPool>,
+    running: Arc<Mutex<Vec<Running>>>,
+    last: u32,
+}
+
+impl Jobs {
+    /// No jobs. One core stays for edits.
+    pub fn new(post: Sender<Letter>) -> Result<Jobs, StudioError> {
+        let threads = rayon::current_num_threads().saturating_sub(1).max(1);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = Arc::new(pool.map_err(|e| StudioError::System(e.to_string()))?);
+        Ok(Jobs { post, pool, running: Arc::default(), last: 0 })
+    }
+
+    /// Starts a job that borrows what lies on the desk.
+    pub fn start<'scope, 'env>(
+        &mut self,
+        scope: &'scope Scope<'scope, 'env>,
+        (kind, title): (&'static str, &str),
+        work: impl FnOnce(&Watch) -> Outcome + Send + 'scope,
+    ) -> u32 {
+        let (number, whole) = self.prepare(kind, title, work);
+        scope.spawn(whole);
+        number
+    }
+
+    /// Starts a job that needs nothing of the desk.
+    pub fn start_free(
+        &mut self,
+        kind: &'static str,
+        title: &str,
+        work: impl FnOnce(&Watch) -> Outcome + Send + 'static,
+    ) -> u32 {
+        let (number, whole) = self.prepare(kind, title, work);
+        std::thread::spawn(whole);
+        number
+    }
+
+    fn prepare<'w>(
+        &mut self,
+        kind: &'static str,
+        title: &str,
+        work: impl FnOnce(&Watch) -> Outcome + Send + 'w,
+    ) -> (u32, impl FnOnce() + Send + 'w) {
+        self.last += 1;
+        let number = self.last;
+        let stop = Arc::new(AtomicBool::new(false));
+        let job = Job { job: number, title: title.into(), stage: String::new(), fraction: 0.0, can_stop: true };
+        let watch = Watch {
+            number,
+            stop: stop.clone(),
+            running: self.running.clone(),
+            post: Mutex::new(self.post.clone()),
+            told: Mutex::new(Instant::now()),
+        };
+        self.lock().push(Running { kind, job, asked: None, stop });
+        let (post, pool) = (self.post.clone(), self.pool.clone());
+        let whole = move || {
+            let made = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&watch))));
+            let outcome = made.unwrap_or_else(|panic| {
+                let text = panic.downcast_ref::<String>().cloned();
+                Outcome::Fault(text.or(panic.downcast_ref::<&str>().map(|s| s.to_string())).unwrap_or_default())
+            });
+            let _ = post.send(Letter::Ended(number, outcome));
+        };
+        (number, whole)
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Running>> {
+        self.running.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    /// Who is answered when a job ends.
+    pub fn asked_by(&mut self, number: u32, client: &crate::web::hub::Client, id: u32) {
+        if let Some(running) = self.lock().iter_mut().find(|r| r.job.job == number) {
+            running.asked = Some((client.clone(), id));
+        }
+    }
+
+    /// Takes a job that has ended from the list: who asked for it, and whether it was told to stop.
+    pub fn end(&mut self, number: u32) -> (Option<(crate::web::hub::Client, u32)>, bool) {
+        let mut running = self.lock();
+        let Some(at) = running.iter().position(|r| r.job.job == number) else { return (None, true) };
+        let ended = running.remove(at);
+        (ended.asked, ended.stop.load(Ordering::Relaxed))
+    }
+
+    /// Tells a job to stop. False if there is none of this number.
+    pub fn stop(&self, number: u32) -> bool {
+        let running = self.lock();
+        let found = running.iter().find(|r| r.job.job == number);
+        found.inspect(|r| r.stop.store(true, Ordering::Relaxed)).is_some()
+    }
+
+    /// Tells all jobs of a kind to stop.
+    pub fn stop_kind(&self, kind: &str) {
+        self.lock().iter().filter(|r| r.kind == kind).for_each(|r| r.stop.store(true, Ordering::Relaxed));
+    }
+
+    /// Tells all jobs to stop; what they still make is of nothing on the desk.
+    pub fn stop_all(&self) {
+        let mut running = self.lock();
+        running.iter().for_each(|r| r.stop.store(true, Ordering::Relaxed));
+        running.clear();
+    }
+
+    /// True if a job of this kind runs and was not told to stop.
+    pub fn has(&self, kind: &str) -> bool {
+        self.lock().iter().any(|r| r.kind == kind && !r.stop.load(Ordering::Relaxed))
+    }
+
+    /// All of them.
+    pub fn list(&self) -> Vec<Job> {
+        self.lock().iter().map(|r| r.job.clone()).collect()
+    }
+}
+
+/// Watches one job.
+pub struct Watch {
+    number: u32,
+    stop: Arc<AtomicBool>,
+    running: Arc<Mutex<Vec<Running>>>,
+    post: Mutex<Sender<Letter>>,
+    told: Mutex<Instant>,
+}
+
+impl Watch {
+    fn tell(&self, change: impl FnOnce(&mut Job)) {
+        let mut running = self.running.lock().unwrap_or_else(|e| e.into_inner());
+        if let Some(running) = running.iter_mut().find(|r| r.job.job == self.number) {
+            change(&mut running.job);
+        }
+        drop(running);
+        let mut told = self.told.lock().unwrap_or_else(|e| e.into_inner());
+        if told.elapsed() >= TELL_EVERY {
+            *told = Instant::now();
+            let _ = self.post.lock().unwrap_or_else(|e| e.into_inner()).send(Letter::Progress);
+        }
+    }
+}
+
+impl Observer for Watch {
+    fn progress(&self, fraction: f64) {
+        self.tell(|job| job.fraction = fraction);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+impl PipelineObserver for Watch {
+    fn begins(&self, name: &'static str, of_run: f64) {
+        self.tell(|job| {
+            job.stage = name.into();
+            job.fraction = of_run;
+        });
+    }
+
+    fn progress(&self, _of_stage: f64, of_run: f64) {
+        self.tell(|job| job.fraction = of_run);
+    }
+
+    fn ends(&self, _record: &StageRecord) {}
+
+    fn cancelled(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}

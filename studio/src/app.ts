@@ -1,0 +1,361 @@
+// Binds model, view and server: what the state says is shown, what a hand does is asked for.
+import { effect } from '@preact/signals';
+import { Vector3 } from 'three';
+import * as store from './model/store';
+import type { Answer, Body } from './protocol/client';
+import { Client, Refused } from './protocol/client';
+import type { Edit, Format, Layer, Resolution, Sample, Why } from './protocol/types';
+import { AddCorner, Erase, erase, Measure, Select, Split } from './tools/clicks';
+import { Cut } from './tools/cut';
+import { Pull } from './tools/pull';
+import { Stroke } from './tools/stroke';
+import type { Bench, Tool } from './tools/tool';
+import { courses } from './view/lines';
+import type { View } from './view/view';
+
+const NOTHING = new Float32Array();
+const CORNER = [0.93, 0.97, 0.97];
+const CORNER_HOT = [0.06, 0.72, 0.68];
+const CORNER_CHOSEN = [0.98, 0.62, 0.12];
+const FAULT = [0.86, 0.15, 0.15];
+
+export class App implements Bench {
+  readonly client: Client;
+  readonly tools: Record<store.ToolId, Tool>;
+  private asked = new Map<Layer, string>();
+  private open = 0;
+  private wantedTry: Edit | null = null;
+  private trying = false;
+  private fitted = '';
+
+  constructor(
+    readonly view: View,
+    token: string,
+  ) {
+    this.client = new Client(token, {
+      state: (state) => store.takeState(state),
+      progress: (jobs) => {
+        store.jobs.value = jobs;
+      },
+      geometry: (geometry) => {
+        if (store.state.value.layers[geometry.layer] !== geometry.name) return;
+        store.geometry.value = new Map(store.geometry.value).set(geometry.layer, geometry);
+      },
+      connection: (connection) => {
+        store.connection.value = connection;
+        if (connection !== 'open') this.asked.clear();
+      },
+      refused: (why) => store.toast('refused', why),
+      restarted: () => {
+        this.asked.clear();
+        store.geometry.value = new Map();
+        store.state.value = store.EMPTY;
+      },
+    });
+    this.tools = {
+      select: new Select(this),
+      paint: new Stroke(this, 'paint'),
+      feature: new Stroke(this, 'feature'),
+      cut: new Cut(this),
+      drag: new Pull(this),
+      corner: new AddCorner(this),
+      split: new Split(this),
+      erase: new Erase(this),
+      measure: new Measure(this),
+    };
+    this.follow();
+  }
+
+  tool(): Tool {
+    return this.tools[store.tool.value];
+  }
+
+  choose(tool: store.ToolId): void {
+    if (tool === store.tool.value) return;
+    this.tool().leave?.();
+    this.view.setMarks(NOTHING, NOTHING);
+    store.toolHint.value = '';
+    store.tool.value = tool;
+    store.tab.value = 'edit';
+  }
+
+  world(place: Vector3): [number, number, number] {
+    const c = store.state.value.project?.center ?? [0, 0, 0];
+    return [place.x + c[0], place.y + c[1], place.z + c[2]];
+  }
+
+  private local(p: readonly number[]): Vector3 {
+    const c = store.state.value.project?.center ?? [0, 0, 0];
+    return new Vector3(p[0]! - c[0], p[1]! - c[1], p[2]! - c[2]);
+  }
+
+  // ---- asking
+
+  /** Asks, and tells the user why not. */
+  async ask(body: Body): Promise<Answer | null> {
+    this.open++;
+    try {
+      const answer = await this.client.ask(body);
+      if (answer.type === 'done' && answer.told) store.toast('told', { message: answer.told });
+      return answer;
+    } catch (error) {
+      this.tell(error);
+      return null;
+    } finally {
+      this.open--;
+    }
+  }
+
+  private tell(error: unknown): void {
+    const why: Why = error instanceof Refused ? error.why : { message: String(error) };
+    if (why.message !== 'it was stopped') store.toast('refused', why);
+  }
+
+  async edit(edit: Edit): Promise<boolean> {
+    return (await this.ask({ type: 'edit', edit })) !== null;
+  }
+
+  preview(edit: Edit | null): void {
+    this.wantedTry = edit;
+    if (!edit) this.view.setLine('preview', NOTHING);
+    else if (!this.trying) void this.tryOut();
+  }
+
+  /** Tries the last edit that was asked for, one at a time. */
+  private async tryOut(): Promise<void> {
+    this.trying = true;
+    while (this.wantedTry) {
+      const edit = this.wantedTry;
+      try {
+        const answer = await this.client.ask({ type: 'try', edit });
+        if (answer.type === 'tried' && this.wantedTry) this.showTried(answer.curves);
+      } catch {
+        // A place where it cannot be done has no preview; the click tells why.
+        this.view.setLine('preview', NOTHING);
+      }
+      if (this.wantedTry === edit) break;
+    }
+    this.trying = false;
+  }
+
+  private showTried(curves: number[][]): void {
+    const c = store.state.value.project?.center ?? [0, 0, 0];
+    const list: number[] = [];
+    for (const course of curves) {
+      for (let p = 0; p + 5 < course.length; p += 3) {
+        for (let x = 0; x < 6; x++) list.push(course[p + x]! - c[x % 3]!);
+      }
+    }
+    this.view.setLine('preview', new Float32Array(list));
+  }
+
+  undo = () => this.edit({ edit: 'undo', count: 1 });
+  redo = () => this.edit({ edit: 'redo', count: 1 });
+  fit = () => this.ask({ type: 'fit' });
+  complete = (patches: number, sharp: number) => this.edit({ edit: 'complete', patches, sharp_angle_deg: sharp });
+  mesh = (close?: boolean) => this.ask(close === undefined ? { type: 'mesh' } : { type: 'mesh', close });
+  sample = (sample: Sample) => this.ask({ type: 'sample', sample });
+  openFile = (file: string) => this.ask({ type: 'open', file });
+  close = () => this.ask({ type: 'close' });
+  cancel = (job: number) => this.ask({ type: 'cancel', job });
+  setting = (resolution: Resolution, live: boolean) => this.ask({ type: 'setting', resolution, live });
+
+  async export(format: Format): Promise<void> {
+    const answer = await this.ask({ type: 'export', format });
+    if (answer?.type === 'exported') this.save(this.client.url(answer.url), answer.name);
+  }
+
+  async script(): Promise<void> {
+    const answer = await this.ask({ type: 'script' });
+    if (answer?.type !== 'script') return;
+    const url = URL.createObjectURL(new Blob([answer.text], { type: 'text/plain' }));
+    this.save(url, `${store.state.value.project?.name ?? 'edits'}.toml`);
+  }
+
+  picture(): void {
+    this.save(this.view.picture(), `${store.state.value.project?.name ?? 'picture'}.png`);
+  }
+
+  private save(url: string, name: string): void {
+    const link = document.createElement('a');
+    link.href = url;
+    link.download = name;
+    link.click();
+  }
+
+  async drop(file: File): Promise<void> {
+    this.open++;
+    try {
+      await this.client.upload(file);
+    } catch (error) {
+      this.tell(error);
+    } finally {
+      this.open--;
+    }
+  }
+
+  /** Deletes what is selected. */
+  remove(): void {
+    const picked = store.selected.value;
+    if (picked && picked.kind !== 'patch') void this.edit(erase(picked));
+  }
+
+  // ---- the view follows the state
+
+  home(): void {
+    this.view.rig.fit(new Vector3(), this.view.rig.radius, this.view.aspect());
+    this.view.moved();
+  }
+
+  /** Flies to a place, and marks it. */
+  fly(place: readonly number[]): void {
+    const { rig } = this.view;
+    rig.target.copy(this.local(place));
+    rig.half = Math.min(rig.half, 0.35 * rig.radius);
+    this.view.setMarks(new Float32Array(rig.target.toArray()), new Float32Array(FAULT));
+    // From outside: along the surface's own direction as far as that is known.
+    if (!this.view.isSeen(rig.target)) rig.from(rig.target.clone().addScaledVector(rig.up, 0.2 * rig.radius));
+    this.view.moved();
+  }
+
+  /** True once nothing is asked for, shown or moving. */
+  isIdle(): boolean {
+    const shown = store.wanted.value.every((l) => store.geometry.value.get(l)?.name === store.state.value.layers[l]);
+    const quiet = this.open === 0 && !this.trying && store.jobs.value.length === 0;
+    return quiet && shown && !this.view.isQueued && store.connection.value === 'open';
+  }
+
+  private follow(): void {
+    const { view } = this;
+    effect(() => {
+      store.geometry.value;
+      for (const layer of store.missing(this.asked)) {
+        this.asked.set(layer, store.state.value.layers[layer]!);
+        this.client.get(layer).catch(() => this.asked.delete(layer));
+      }
+    });
+    effect(() => {
+      const project = store.state.value.project;
+      const key = project ? `${project.file} ${project.diagonal}` : '';
+      if (!project || key === this.fitted) return;
+      this.fitted = key;
+      view.rig.radius = project.diagonal / 2;
+      view.rig.look('corner');
+      this.home();
+    });
+    let mesh: unknown = null;
+    let coarse: unknown = null;
+    effect(() => {
+      const layers = store.geometry.value;
+      if (layers.get('mesh') !== mesh) view.setMesh(layers.get('mesh'));
+      if (layers.get('coarse') !== coarse) view.setCoarse(layers.get('coarse'));
+      mesh = layers.get('mesh');
+      coarse = layers.get('coarse');
+    });
+    let points: unknown = null;
+    let shown = '';
+    let surface: unknown = null;
+    effect(() => {
+      const shape = store.shape.value;
+      const shading = store.shading.value;
+      const layers = store.geometry.value;
+      const cloud = shape === 'points' ? layers.get('points') : undefined;
+      if (cloud !== points) view.showPoints(cloud);
+      points = cloud;
+      const now = shape === 'points' ? undefined : layers.get(shape);
+      const value = shading === 'deviation' || shading === 'curvature' ? shading : null;
+      if (now !== surface || `${value}` !== shown) view.showSurface(now, value);
+      surface = now;
+      shown = `${value}`;
+      const most = value ? usualMost(now?.floats.get(value)) : 1;
+      store.scaleFound.value = most;
+      view.shade(shading, most);
+    });
+    effect(() => {
+      const { curves, isolines, nets } = store.show.value;
+      const layers = store.geometry.value;
+      view.curves = courses(layers.get('curves'));
+      view.features = courses(layers.get('features'));
+      const state = store.state.value;
+      const of = (kind: string) =>
+        state.curves.flatMap((c, k) => (c.kind === kind && k + 1 < view.curves.offset.length ? [k] : []));
+      view.setLine('smooth', curves ? view.piecesOf('curve', of('smooth')) : NOTHING);
+      view.setLine('sharp', curves ? view.piecesOf('curve', of('feature')) : NOTHING);
+      view.setLine('boundary', curves ? view.piecesOf('curve', of('boundary')) : NOTHING);
+      const features = Array.from({ length: view.features.offset.length - 1 }, (_, k) => k);
+      view.setLine('features', curves ? view.piecesOf('feature', features) : NOTHING);
+      const all = (layer: Layer) => {
+        const lines = courses(layers.get(layer));
+        return { lines, which: Array.from({ length: lines.offset.length - 1 }, (_, k) => k) };
+      };
+      for (const [layer, on] of [
+        ['isolines', isolines],
+        ['nets', nets],
+      ] as const) {
+        const { lines, which } = all(layer);
+        view.setLine(layer, on ? piecesOf(lines, which) : NOTHING);
+      }
+    });
+    effect(() => {
+      const [hovered, selected] = [store.hovered.value, store.selected.value];
+      store.geometry.value;
+      const line = (picked: store.Picked | null) =>
+        picked && (picked.kind === 'curve' || picked.kind === 'feature')
+          ? view.piecesOf(picked.kind, [picked.index])
+          : NOTHING;
+      const danger = store.tool.value === 'erase';
+      view.setLine('hover', danger ? NOTHING : line(hovered));
+      view.setLine('erase', danger ? line(hovered) : NOTHING);
+      view.setLine('chosen', line(selected));
+      const patch = (picked: store.Picked | null) => (picked?.kind === 'patch' ? picked.index : -1);
+      view.mark(patch(hovered), patch(selected), store.isolated.value ?? -1);
+      this.corners();
+    });
+    effect(() => {
+      const { on, axis, at, flip } = store.section.value;
+      const sign = flip ? -1 : 1;
+      const normal = new Vector3().setComponent(axis, on ? sign : 0);
+      const reach = view.rig.radius;
+      view.cut(normal, on ? sign * (2 * at - 1) * reach : 1);
+    });
+    effect(() => {
+      view.setParallel(store.parallel.value);
+      view.rig.up.set(0, store.up.value === 'y' ? 1 : 0, store.up.value === 'z' ? 1 : 0);
+    });
+    effect(() => view.setBackground(store.dark.value ? '#171b21' : '#eef1f3'));
+  }
+
+  private corners(): void {
+    const { corners } = store.state.value;
+    const is = (picked: store.Picked | null, k: number) => picked?.kind === 'corner' && picked.index === k;
+    if (!store.show.value.corners) return this.view.setCorners(NOTHING, NOTHING);
+    const positions = new Float32Array(corners.flatMap((c) => this.local(c).toArray()));
+    const color = (k: number) =>
+      is(store.selected.value, k) ? CORNER_CHOSEN : is(store.hovered.value, k) ? CORNER_HOT : CORNER;
+    this.view.setCorners(positions, new Float32Array(corners.flatMap((_, k) => color(k))));
+  }
+}
+
+function piecesOf(lines: { position: Float32Array; offset: Uint32Array }, which: number[]): Float32Array {
+  let count = 0;
+  for (const k of which) count += Math.max(0, lines.offset[k + 1]! - lines.offset[k]! - 1);
+  const out = new Float32Array(6 * count);
+  let at = 0;
+  for (const k of which) {
+    for (let p = lines.offset[k]!; p + 1 < lines.offset[k + 1]!; p++) {
+      out.set(lines.position.subarray(3 * p, 3 * p + 6), at);
+      at += 6;
+    }
+  }
+  return out;
+}
+
+/** The size that 98 of 100 values do not pass: single ones would make all others look alike. */
+export function usualMost(values: Float32Array | undefined): number {
+  if (!values || values.length === 0) return 1;
+  const step = Math.max(1, Math.floor(values.length / 20_000));
+  const sizes: number[] = [];
+  for (let k = 0; k < values.length; k += step) sizes.push(Math.abs(values[k]!));
+  sizes.sort((a, b) => a - b);
+  return sizes[Math.floor(0.98 * (sizes.length - 1))] || sizes[sizes.length - 1] || 1;
+}

@@ -1,0 +1,148 @@
+// What the page knows and what is chosen in it: signals, no DOM, no three.
+import { computed, signal } from '@preact/signals';
+import type { Connection } from '../protocol/client';
+import type { Geometry } from '../protocol/frames';
+import type { Job, Layer, State, Why } from '../protocol/types';
+
+export const EMPTY: State = {
+  revision: 0,
+  project: null,
+  files: [],
+  stages: [],
+  corners: [],
+  curves: [],
+  patches: [],
+  features: [],
+  faults: [],
+  symmetry: null,
+  done: [],
+  undone: [],
+  layers: {},
+  resolution: { tolerance: 0.001 },
+  live: true,
+  figures: {},
+  seams: [],
+  warnings: [],
+  jobs: [],
+};
+
+export type ToolId = 'select' | 'paint' | 'feature' | 'cut' | 'drag' | 'corner' | 'split' | 'erase' | 'measure';
+export type PaintMode = 'straight' | 'geodesic' | 'magnetic';
+export type Shading = 'clay' | 'patches' | 'deviation' | 'curvature' | 'zebra';
+export type Picked = { kind: 'corner' | 'curve' | 'patch' | 'feature'; index: number };
+export type Shape = 'mesh' | 'surfaces' | 'displaced' | 'points';
+export type Tab = 'edit' | 'surface' | 'view' | 'history';
+
+export const state = signal<State>(EMPTY);
+export const jobs = signal<Job[]>([]);
+export const connection = signal<Connection>('connecting');
+export const geometry = signal<ReadonlyMap<Layer, Geometry>>(new Map());
+
+export const tool = signal<ToolId>('select');
+export const tab = signal<Tab>('edit');
+export const selected = signal<Picked | null>(null);
+export const hovered = signal<Picked | null>(null);
+export const paintMode = signal<PaintMode>('straight');
+export const dragWidth = signal(0.5);
+/** What the tool waits for, where its usual hint does not tell. */
+export const toolHint = signal('');
+export const cursor = signal<[number, number, number] | null>(null);
+
+export const shape = signal<Shape>('mesh');
+export const shading = signal<Shading>('clay');
+export const show = signal({ curves: true, corners: true, isolines: false, nets: false, faults: true });
+export const section = signal<{ on: boolean; axis: 0 | 1 | 2; at: number; flip: boolean }>({
+  on: false,
+  axis: 0,
+  at: 0.5,
+  flip: false,
+});
+export const isolated = signal<number | null>(null);
+export const parallel = signal(false);
+export const orbit = signal<'turntable' | 'free'>('turntable');
+export const up = signal<'y' | 'z'>('z');
+/** Largest deviation of what is shown, and of the colour scale, world units. */
+export const scaleFound = signal(0);
+export const dark = signal(false);
+export const overlay = signal<'none' | 'keys' | 'palette'>('none');
+
+export type Toast = { id: number; kind: 'refused' | 'told'; why: Why };
+export const toasts = signal<Toast[]>([]);
+let lastToast = 0;
+
+/** Shows a message; the same one is shown once. */
+export function toast(kind: Toast['kind'], why: Why): void {
+  const others = toasts.value.filter((t) => t.why.message !== why.message).slice(-2);
+  toasts.value = [...others, { id: ++lastToast, kind, why }];
+}
+
+export function dismiss(id: number): void {
+  toasts.value = toasts.value.filter((t) => t.id !== id);
+}
+
+/** Takes over a state; what is chosen stays if it is still there. */
+export function takeState(next: State): void {
+  const before = state.value;
+  state.value = next;
+  jobs.value = next.jobs;
+  const sizes = { corner: next.corners, curve: next.curves, patch: next.patches, feature: next.features };
+  const isGone = (picked: Picked | null) => picked !== null && picked.index >= sizes[picked.kind].length;
+  const renumbered = before.curves.length !== next.curves.length || before.patches.length !== next.patches.length;
+  if (renumbered || isGone(selected.value)) selected.value = null;
+  if (renumbered || isGone(hovered.value)) hovered.value = null;
+  if (renumbered) isolated.value = null;
+  if (next.layers.points && !next.layers.mesh) shape.value = 'points';
+  else if (!before.layers.mesh && shape.value === 'points') shape.value = 'mesh';
+  if (!next.layers.surfaces && (shape.value === 'surfaces' || shape.value === 'displaced')) shape.value = 'mesh';
+  if (!canShade(shading.value, shape.value)) shading.value = 'clay';
+  const kept = [...geometry.value].filter(([layer]) => next.layers[layer]);
+  if (kept.length !== geometry.value.size) geometry.value = new Map(kept);
+}
+
+/** Whether a shading is of use on a shape. */
+export function canShade(how: Shading, of: Shape): boolean {
+  switch (how) {
+    case 'clay':
+      return true;
+    case 'zebra':
+      return of !== 'points';
+    case 'curvature':
+      return of === 'mesh' || of === 'surfaces';
+    case 'patches':
+      return of === 'surfaces' || of === 'displaced';
+    case 'deviation':
+      return of === 'surfaces';
+  }
+}
+
+/** Shows a shape, with a shading that is of use on it. */
+export function showShape(of: Shape): void {
+  shape.value = of;
+  if (!canShade(shading.value, of)) shading.value = 'clay';
+}
+
+/** Layers that are to be shown now. */
+export const wanted = computed<Layer[]>(() => {
+  const there = state.value.layers;
+  const want: Layer[] = [];
+  const add = (layer: Layer) => {
+    if (there[layer]) want.push(layer);
+  };
+  if (shape.value === 'points') add('points');
+  // Picks are on the mesh, whatever is shown.
+  add('mesh');
+  add('coarse');
+  add('curves');
+  add('features');
+  if (shape.value === 'surfaces') add('surfaces');
+  if (shape.value === 'displaced') add('displaced');
+  if (show.value.isolines) add('isolines');
+  if (show.value.nets) add('nets');
+  return want;
+});
+
+/** Layers that are to be asked for: those that are neither there nor asked for by the name of now. */
+export function missing(asked: ReadonlyMap<Layer, string>): Layer[] {
+  const names = state.value.layers;
+  return wanted.value.filter((l) => geometry.value.get(l)?.name !== names[l] && asked.get(l) !== names[l]);
+}

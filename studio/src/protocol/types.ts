@@ -1,0 +1,691 @@
+// Written from the Rust types by a test of planish-studio (PLANISH_TYPES=write): not by hand.
+
+/** An array of a layer. */
+export type Array = {
+  /** Items. */
+  count: number;
+  /** Type of its numbers. */
+  kind: Kind2;
+  /** What it holds: `position`, `normal`, `index`, `offset` ... */
+  name: string;
+  /** Numbers per item. */
+  width: number;
+};
+
+/** A curve of the network. */
+export type Curve = {
+  /** Control points along it, if it has surfaces. */
+  control?: number | null;
+  /** Corners at its ends. */
+  ends: [number, number];
+  /** What it follows. */
+  kind: Kind;
+  /** World units. */
+  length: number;
+};
+
+/** A curve as a script names it: one of the network, or a feature curve. */
+export type CurveName = (Name | {
+  /** Which one. */
+  feature: Name;
+});
+
+/** One edit. */
+export type Edit = ({
+  /** True for a closed curve. */
+  closed?: boolean;
+  edit: "paint";
+  /** What a magnetic stroke is drawn to. */
+  magnet?: (Magnetism | null);
+  /** How the way between picks is found. */
+  mode?: PaintMode;
+  /** The picks, in order. */
+  picks: Spot[];
+  /** Share of the diagonal. */
+  snap?: number;
+} | {
+  /** True to lead it on to its own other end. */
+  closed?: boolean;
+  /** The curve; the end that it was painted towards is meant if both are free, and of a feature curve always. */
+  curve: CurveName;
+  edit: "extend";
+  /** What a magnetic stroke is drawn to. */
+  magnet?: (Magnetism | null);
+  /** How the way between picks is found. */
+  mode?: PaintMode;
+  /** The picks, in order. */
+  picks?: Spot[];
+  /** Share of the diagonal. */
+  snap?: number;
+} | {
+  edit: "cut";
+  /** Normal of the plane. */
+  normal: [number, number, number];
+  /** Share of the diagonal. */
+  snap?: number;
+  /** A place on the cut. */
+  through: Spot;
+} | {
+  /** Zero for the nearest places. */
+  direction?: [number, number, number];
+  edit: "project";
+  /** World positions. */
+  points: [number, number, number][];
+  /** Share of the diagonal. */
+  snap?: number;
+} | {
+  edit: "boundaries";
+} | {
+  /** Degrees. */
+  angle_deg: number;
+  edit: "feature_lines";
+  /** Lines shorter than this share of the diagonal are left out. */
+  shortest?: number;
+} | {
+  /** Where. */
+  at: Spot;
+  edit: "add_corner";
+  /** Share of the diagonal. */
+  snap?: number;
+} | {
+  /** 0 to 1. */
+  at: number;
+  /** The curve. */
+  curve: CurveName;
+  edit: "split_curve";
+} | {
+  /** The corner. */
+  corner: Name;
+  edit: "join";
+} | {
+  /** The curves, numbered as before the edit; feature curves among them. */
+  curves: CurveName[];
+  edit: "delete_curves";
+} | {
+  /** The corner. */
+  corner: Name;
+  edit: "delete_corner";
+} | {
+  edit: "clear";
+} | {
+  /** The corner. */
+  corner: Name;
+  edit: "drag_corner";
+  /** How it relaxes. */
+  forces?: Forces;
+  /** Share of each curve that relaxes. */
+  reach?: number;
+  /** Where to. */
+  to: Spot;
+} | {
+  /** The curves; none of them on the boundary of the mesh. */
+  curves: Name[];
+  edit: "continuity";
+  /** What their seams are to be. */
+  seam: Seam;
+} | {
+  /** Share of its length; 0 or 1 for an end of a feature curve, which then goes along its side. */
+  at: number;
+  /** World units. */
+  by: [number, number, number];
+  /** The curve. */
+  curve: CurveName;
+  edit: "drag_curve";
+  /** How it relaxes. */
+  forces?: Forces;
+  /** Shares of the length where the curve stays where it is. */
+  pins?: number[];
+  /** Stretches with weights of their own. */
+  stiffness?: Stretch[];
+  /** Share of the length that relaxes. */
+  width?: number;
+} | {
+  /** The curve; absent for all of the network that are free to move and do not lie in the plane of symmetry. Of these one stays as it is where it would run into another. */
+  curve?: (CurveName | null);
+  edit: "relax";
+  /** How it relaxes. */
+  forces?: Forces;
+  /** Shares of the length where the curve stays where it is. */
+  pins?: number[];
+  /** What it is drawn to. */
+  pull?: (Pull | null);
+  /** Middle and width of the section, shares of the length. */
+  section?: [number, number] | null;
+  /** Stretches with weights of their own. */
+  stiffness?: Stretch[];
+} | {
+  /** Control vertices. */
+  control: number;
+  /** The curve. */
+  curve: CurveName;
+  edit: "spline";
+  /** Moves, one after the other. */
+  moves?: SplineMove[];
+} | {
+  /** A place in the region. */
+  at: Spot;
+  edit: "split_region";
+  /** Turns the split; absent for the flattest corner. */
+  from?: number | null;
+} | {
+  edit: "complete";
+  /** Patches to aim at, over the whole mesh. */
+  patches: number;
+  /** Edges sharper than this become curves, degrees. */
+  sharp_angle_deg?: number;
+} | {
+  edit: "feature";
+  /** Which iso-curves it is one of; absent to tell it by the sides that its ends lie nearest to. */
+  family?: (Family | null);
+  /** What a magnetic stroke is drawn to. */
+  magnet?: (Magnetism | null);
+  /** How the way between picks is found. */
+  mode?: PaintMode;
+  /** The picks, from side to side; the patch is that of the middle one. */
+  picks: Spot[];
+} | {
+  edit: "delete_feature";
+  /** Its number. */
+  feature: Name;
+} | {
+  /** A place in the patch. */
+  at: Spot;
+  edit: "sections";
+  /** Along u. */
+  u?: number[];
+  /** Along v. */
+  v?: number[];
+} | {
+  edit: "symmetry";
+  /** The plane; absent to find it. */
+  plane?: (Plane | null);
+} | {
+  edit: "mirror";
+  /** True for the other way round. */
+  swap?: boolean;
+} | {
+  edit: "carry";
+  /** The other model, as the script names it. */
+  from: string;
+  /** Positions on it with those on this one. */
+  landmarks: [[number, number, number], [number, number, number]][];
+} | {
+  /** How many. */
+  count?: number;
+  edit: "undo";
+} | {
+  /** How many. */
+  count?: number;
+  edit: "redo";
+});
+
+/** A place on a mesh: a face and barycentric coordinates that are not negative and sum to one. */
+export type FacePoint = {
+  /** Weights of its three corners. */
+  bary: [number, number, number];
+  /** Index of the triangle. */
+  face: number;
+};
+
+/** Which iso-curves a feature curve is one of. */
+export type Family = ("u" | "v");
+
+/** Something to be put right. */
+export type Fault = {
+  /** An edit that puts it right. */
+  offer?: (Offer | null);
+  /** What, where and how. */
+  why: Why;
+};
+
+/** The surface of a patch. */
+export type Fitted = {
+  /** Control points along u and v. */
+  control: [number, number];
+  /** Largest distance, world units. */
+  max: number;
+  /** Root of the mean square distance to the mesh, world units. */
+  rms: number;
+};
+
+/** How curves relax. */
+export type Forces = {
+  /** Weight of even spacing. */
+  arc_length?: number;
+  /** Weight of stiffness. */
+  curvature?: number;
+  /** Weight of shortness. */
+  fairness?: number;
+  /** Done when no point moves further in a sweep than this share of their distance. */
+  settle?: number;
+  /** How points are moved. */
+  sweep?: Sweep;
+  /** Sweeps at most. */
+  sweeps?: number;
+};
+
+/** A file to be made. */
+export type Format = ("step" | "iges" | "usd" | "glb" | "ply" | "report");
+
+/** What a frame holds. */
+export type Header = {
+  /** The arrays, one after the other, each from a multiple of four bytes on. */
+  arrays: Array[];
+  /** Which geometry. */
+  layer: Layer;
+  /** Its name: the same name is the same geometry. */
+  name: string;
+  /** Where in all its bytes this piece begins. */
+  offset: number;
+  /** All its bytes. */
+  total: number;
+};
+
+/** A running job. */
+export type Job = {
+  /** True if it can be ended early. */
+  can_stop: boolean;
+  /** 0 to 1. */
+  fraction: number;
+  /** Its number. */
+  job: number;
+  /** The stage that it is at. */
+  stage: string;
+  /** What it makes. */
+  title: string;
+};
+
+/** What a curve follows. */
+export type Kind = ("smooth" | "feature" | "boundary");
+
+/** Type of the numbers of an array, little-endian. */
+export type Kind2 = ("f32" | "u32");
+
+/** Geometry that a view shows. */
+export type Layer = ("points" | "mesh" | "coarse" | "curves" | "features" | "surfaces" | "displaced" | "isolines" | "nets");
+
+/** What a magnetic stroke is drawn to. */
+export type Magnetism = ({
+  sharp: number;
+} | "creases" | {
+  scalar: Scalar;
+});
+
+/** What the server says. */
+export type Message = ({
+  /** Version of the protocol. */
+  protocol: number;
+  /** Names this run of the server: names of geometry are of one run. */
+  run: string;
+  type: "welcome";
+  /** Version of the program. */
+  version: string;
+} | {
+  /** Corners of the network. */
+  corners: [number, number, number][];
+  /** Curves of the network. */
+  curves: Curve[];
+  /** Edits that can be taken back, oldest first. */
+  done: Step[];
+  /** What is to be put right before all of the mesh is patches. */
+  faults: Fault[];
+  /** Feature curves: the patch that each is of. */
+  features: number[];
+  /** Figures of quality; keys are those of the report. */
+  figures: { [key: string]: number };
+  /** Projects in the folder, for the start page. */
+  files: string[];
+  /** Running jobs. */
+  jobs: Job[];
+  /** Geometry that there is, each with its name of now. */
+  layers: { [key: string]: string };
+  /** True if surfaces follow every edit. */
+  live: boolean;
+  /** Patches of the network. */
+  patches: Patch[];
+  /** The project; absent on the start page. */
+  project?: (Project | null);
+  /** How fine surfaces are. */
+  resolution: Resolution;
+  /** Rises with every change of the drawing. */
+  revision: number;
+  /** Seams, worst first. */
+  seams: Seam2[];
+  /** The stages in the order of the pipeline. */
+  stages: Stage[];
+  /** Point and normal of the plane of symmetry. */
+  symmetry?: [[number, number, number], [number, number, number]] | null;
+  type: "state";
+  /** Edits that can be made again, the next one last. */
+  undone: Step[];
+  /** What the user should know of the surfaces. */
+  warnings: string[];
+} | {
+  /** Number of the request. */
+  id: number;
+  /** The job that goes on with it. */
+  job?: number | null;
+  /** What it did, in words. */
+  told?: string;
+  type: "done";
+} | {
+  /** Number of the request; 0 for what nobody asked for. */
+  id: number;
+  type: "refused";
+  /** What is wrong and what to do. */
+  why: Why;
+} | {
+  /** Corners that would be new or moved. */
+  corners: [number, number, number][];
+  /** Courses of curves that would be new or changed, x, y and z in turn. */
+  curves: number[][];
+  /** Number of the request. */
+  id: number;
+  type: "tried";
+} | {
+  /** All running jobs. */
+  jobs: Job[];
+  type: "progress";
+} | {
+  /** Number of the request. */
+  id: number;
+  /** TOML for `planish edit`. */
+  text: string;
+  type: "script";
+} | {
+  /** Its size, bytes. */
+  bytes: number;
+  /** Number of the request. */
+  id: number;
+  /** Its name. */
+  name: string;
+  type: "exported";
+  /** Where it is fetched. */
+  url: string;
+});
+
+/** A corner, a curve of the network or a feature curve as a script names it. */
+export type Name = (number | {
+  /** World units. */
+  near: [number, number, number];
+});
+
+/** An edit that puts a fault right. */
+export type Offer = ("split_region" | "boundaries" | "delete_corner");
+
+/** How the way between two picks is found. */
+export type PaintMode = ("straight" | "geodesic" | "magnetic");
+
+/** A patch of the network. */
+export type Patch = {
+  /** Its curves. */
+  curves: [number, number, number, number];
+  /** Its surface, if it has one. */
+  fitted?: (Fitted | null);
+};
+
+/** A plane through `point` with unit normal `normal`. */
+export type Plane = {
+  /** Unit normal. */
+  normal: [number, number, number];
+  /** A point of the plane, world units. */
+  point: [number, number, number];
+};
+
+/** A project. */
+export type Project = {
+  /** Middle of the box; geometry is sent relative to it. */
+  center: [number, number, number];
+  /** Diagonal of the box. */
+  diagonal: number;
+  /** Its file. */
+  file: string;
+  /** Its name. */
+  name: string;
+  /** What to know of how it was opened. */
+  notice: string;
+  /** Points of the scan. */
+  points: number;
+  /** True if the file holds all that was done. */
+  saved: boolean;
+  /** Triangles of the mesh. */
+  triangles: number;
+  /** Symbol of the unit of length. */
+  units: string;
+  /** Why it cannot be saved. */
+  unsaved?: string | null;
+};
+
+/** What a curve is drawn to. */
+export type Pull = {
+  /** Rounds of blending with the neighbours before, which reach about the root of them in edges. */
+  blending?: number;
+  /** True to go to low values. */
+  low?: boolean;
+  /** The scalar; curves go to high values. */
+  scalar: Scalar;
+  /** Weight against the forces of the curve. */
+  weight?: number;
+};
+
+/** What the page asks for. Every request is answered once, by `done`, `refused`, `tried`, `script` or `exported`. */
+export type Request = ({
+  /** The edit, as a script has it. */
+  edit: Edit;
+  /** Number of the request. */
+  id: number;
+  type: "edit";
+} | {
+  /** The edit. */
+  edit: Edit;
+  /** Number of the request. */
+  id: number;
+  type: "try";
+} | {
+  /** Number of the request. */
+  id: number;
+  type: "fit";
+} | {
+  /** Number of the request. */
+  id: number;
+  /** True to make surfaces anew after every edit. */
+  live: boolean;
+  /** How many control points. */
+  resolution: Resolution;
+  type: "setting";
+} | {
+  /** Holes closed (true), left open (false) or as the scan is (absent). */
+  close?: boolean | null;
+  /** Number of the request. */
+  id: number;
+  /** Cells along the longest side; those that suit the scan if absent. */
+  resolution?: number | null;
+  type: "mesh";
+} | {
+  /** Number of the request. */
+  id: number;
+  /** The job. */
+  job: number;
+  type: "cancel";
+} | {
+  /** Number of the request. */
+  id: number;
+  /** Which. */
+  layer: Layer;
+  type: "get";
+} | {
+  /** What kind of file. */
+  format: Format;
+  /** Number of the request. */
+  id: number;
+  type: "export";
+} | {
+  /** Number of the request. */
+  id: number;
+  type: "script";
+} | {
+  /** Number of the request. */
+  id: number;
+  /** Which. */
+  sample: Sample;
+  type: "sample";
+} | {
+  /** Its file name. */
+  file: string;
+  /** Number of the request. */
+  id: number;
+  type: "open";
+} | {
+  /** Number of the request. */
+  id: number;
+  type: "close";
+});
+
+/** How fine the control nets are. */
+export type Resolution = ({
+  control: [number, number];
+} | {
+  per_curve: number[];
+} | {
+  tolerance: number;
+});
+
+/** A made part. */
+export type Sample = ("part" | "scan" | "bracket");
+
+/** A scalar by its name. */
+export type Scalar = ("luminance" | {
+  channel: {
+  /** Name of the attribute. */
+  attribute: string;
+  /** Channel. */
+  channel: number;
+};
+} | "mean_curvature" | "gaussian_curvature" | "maximum_curvature" | {
+  values: number[];
+});
+
+/** How two patches meet along their curve. */
+export type Seam = ("smooth" | "sharp");
+
+/** A seam between two patches. */
+export type Seam2 = {
+  /** Largest angle, degrees. */
+  angle_deg: number;
+  /** Its curve. */
+  curve: number;
+  /** Largest gap, world units. */
+  gap: number;
+  /** True if it is sharp on purpose. */
+  sharp: boolean;
+};
+
+/** A move of a space curve. */
+export type SplineMove = ({
+  /** World units. */
+  by: [number, number, number];
+  /** The control vertex. */
+  vertex: number;
+} | {
+  /** 0 to 1. */
+  at: number;
+  /** World units. */
+  by: [number, number, number];
+});
+
+/** A place as a script names it. */
+export type Spot = ([number, number, number] | FacePoint | {
+  /** Its number. */
+  corner: number;
+});
+
+/** A stage of the pipeline. */
+export type Stage = {
+  /** How it stands. */
+  is: Standing;
+  /** Which. */
+  name: StageName;
+  /** In words: how many, or why it failed. */
+  note: string;
+};
+
+/** Stages that the strip shows. */
+export type StageName = ("scan" | "mesh" | "curves" | "patches" | "surfaces");
+
+/** How a stage stands. */
+export type Standing = ("empty" | "partial" | "fresh" | "stale" | "running" | "failed");
+
+/** Everything but geometry. */
+export type State = {
+  /** Corners of the network. */
+  corners: [number, number, number][];
+  /** Curves of the network. */
+  curves: Curve[];
+  /** Edits that can be taken back, oldest first. */
+  done: Step[];
+  /** What is to be put right before all of the mesh is patches. */
+  faults: Fault[];
+  /** Feature curves: the patch that each is of. */
+  features: number[];
+  /** Figures of quality; keys are those of the report. */
+  figures: { [key: string]: number };
+  /** Projects in the folder, for the start page. */
+  files: string[];
+  /** Running jobs. */
+  jobs: Job[];
+  /** Geometry that there is, each with its name of now. */
+  layers: { [key: string]: string };
+  /** True if surfaces follow every edit. */
+  live: boolean;
+  /** Patches of the network. */
+  patches: Patch[];
+  /** The project; absent on the start page. */
+  project?: (Project | null);
+  /** How fine surfaces are. */
+  resolution: Resolution;
+  /** Rises with every change of the drawing. */
+  revision: number;
+  /** Seams, worst first. */
+  seams: Seam2[];
+  /** The stages in the order of the pipeline. */
+  stages: Stage[];
+  /** Point and normal of the plane of symmetry. */
+  symmetry?: [[number, number, number], [number, number, number]] | null;
+  /** Edits that can be made again, the next one last. */
+  undone: Step[];
+  /** What the user should know of the surfaces. */
+  warnings: string[];
+};
+
+/** An edit of the history. */
+export type Step = {
+  /** Corners, curves and patches after it. */
+  counts: [number, number, number];
+  /** Its name in a script. */
+  edit: string;
+};
+
+/** A stretch of a curve with weights of its own. */
+export type Stretch = {
+  /** Factor on the weight of curvature. */
+  curvature?: number;
+  /** Factor on the weight of fairness. */
+  fairness?: number;
+  /** Its start as a share of the length of the curve. */
+  from: number;
+  /** Its end as a share of the length. */
+  to: number;
+};
+
+/** How points are moved in one sweep. */
+export type Sweep = ("single" | "coarse_to_fine" | "solve");
+
+/** Why something was refused. */
+export type Why = {
+  /** The way out; empty if there is none. */
+  hint?: string;
+  /** What is wrong. */
+  message: string;
+  /** Where, world units. */
+  place?: [number, number, number] | null;
+};

@@ -1,0 +1,397 @@
+// The view: the scene, its camera, when it is drawn. It shows what the model says and knows nothing of tools.
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  ColorManagement,
+  LinearSRGBColorSpace,
+  Mesh,
+  OrthographicCamera,
+  PerspectiveCamera,
+  Points,
+  Ray,
+  Scene,
+  type ShaderMaterial,
+  Vector2,
+  Vector3,
+  Vector4,
+  WebGLRenderer,
+} from 'three';
+import { MeshBVH } from 'three-mesh-bvh';
+import type { Geometry } from '../protocol/frames';
+import { type Courses, courses, pieces, Thick, Thin } from './lines';
+import { cloudMaterial, dotMaterial, MODES, surfaceMaterial } from './materials';
+import { HALF_FOV, Rig } from './rig';
+
+/** The full mesh comes back so long after the last move, milliseconds. */
+const STILL = 150;
+/** Renderers that draw with the processor: fewer pixels for them. */
+const SLOW = /swiftshader|llvmpipe|software|basic render/i;
+
+ColorManagement.enabled = false;
+
+export interface Hit {
+  /** World units, relative to the middle. */
+  place: Vector3;
+  face: number;
+}
+
+export class View {
+  readonly rig = new Rig();
+  readonly canvas: HTMLCanvasElement;
+  readonly scene = new Scene();
+  private readonly renderer: WebGLRenderer;
+  private readonly perspective = new PerspectiveCamera((2 * HALF_FOV * 180) / Math.PI, 1, 0.01, 100);
+  private readonly flat = new OrthographicCamera();
+  private isParallel = false;
+  private readonly surface = surfaceMaterial();
+  private readonly coarseSurface: ShaderMaterial;
+  private readonly cloud = cloudMaterial();
+  private shown: Mesh | null = null;
+  private coarse: Mesh | null = null;
+  private points: Points | null = null;
+  private pickable: { geometry: BufferGeometry; bvh: MeshBVH | null } | null = null;
+  readonly lines = {
+    isolines: new Thin('#1f2937', 0.42),
+    nets: new Thin('#7c3aed', 0.75),
+    smooth: new Thick('#12343b', 2.2),
+    sharp: new Thick('#c2410c', 2.6),
+    boundary: new Thick('#4d5560', 2.2),
+    features: new Thick('#7e22ce', 2),
+    hover: new Thick('#0ea5a0', 4.5),
+    chosen: new Thick('#f59e0b', 4.5),
+    erase: new Thick('#dc2626', 4.5),
+    preview: new Thick('#0891b2', 3, true),
+    helper: new Thick('#0f172a', 1.5, true),
+  };
+  private readonly corners = new Points(new BufferGeometry(), dotMaterial(9, '#12343b'));
+  private readonly marks = new Points(new BufferGeometry(), dotMaterial(12, '#ffffff'));
+  curves: Courses = courses(undefined);
+  features: Courses = courses(undefined);
+  private moving = false;
+  private stillTimer = 0;
+  private queued = false;
+  private frames = 0;
+  onFrame: (() => void) | null = null;
+
+  constructor(canvas: HTMLCanvasElement) {
+    this.canvas = canvas;
+    const probe = document.createElement('canvas').getContext('webgl2');
+    const info = probe?.getExtension('WEBGL_debug_renderer_info');
+    const name = info && probe ? String(probe.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
+    probe?.getExtension('WEBGL_lose_context')?.loseContext();
+    const slow = SLOW.test(name);
+    this.renderer = new WebGLRenderer({ canvas, antialias: !slow, preserveDrawingBuffer: true });
+    // Colours are written as they are named.
+    this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    this.renderer.setPixelRatio(slow ? 1 : Math.min(2, window.devicePixelRatio));
+    this.coarseSurface = this.surface;
+    for (const line of Object.values(this.lines)) this.scene.add(line.object);
+    for (const dots of [this.corners, this.marks]) {
+      dots.frustumCulled = false;
+      dots.visible = false;
+      this.scene.add(dots);
+    }
+    this.marks.renderOrder = 11;
+    (this.marks.material as ShaderMaterial).depthTest = false;
+    this.rig.look('corner');
+  }
+
+  /** Draws soon. */
+  draw(): void {
+    if (this.queued) return;
+    this.queued = true;
+    requestAnimationFrame(() => {
+      this.queued = false;
+      this.frames++;
+      this.updateCamera();
+      this.renderer.render(this.scene, this.camera());
+      this.onFrame?.();
+    });
+  }
+
+  get drawn(): number {
+    return this.frames;
+  }
+
+  get isQueued(): boolean {
+    return this.queued || this.moving;
+  }
+
+  camera(): PerspectiveCamera | OrthographicCamera {
+    return this.isParallel ? this.flat : this.perspective;
+  }
+
+  resize(width: number, height: number): void {
+    this.renderer.setSize(width, height, false);
+    for (const line of Object.values(this.lines)) {
+      if (line instanceof Thick) line.material.resolution.set(width, height);
+    }
+    this.draw();
+  }
+
+  aspect(): number {
+    return this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
+  }
+
+  /** The view moves: the mesh of fewer triangles is shown until it rests. */
+  moved(): void {
+    this.moving = true;
+    this.swap();
+    clearTimeout(this.stillTimer);
+    this.stillTimer = window.setTimeout(() => {
+      this.moving = false;
+      this.swap();
+      this.draw();
+    }, STILL);
+    this.draw();
+  }
+
+  private swap(): void {
+    const light = this.moving && this.coarse !== null && this.shownIsMesh;
+    if (this.shown) this.shown.visible = !light;
+    if (this.coarse) this.coarse.visible = light;
+  }
+
+  setParallel(on: boolean): void {
+    this.isParallel = on;
+    this.surface.uniforms.parallel!.value = on;
+    this.draw();
+  }
+
+  setBackground(color: string): void {
+    this.scene.background = new Color(color);
+    this.draw();
+  }
+
+  private updateCamera(): void {
+    const { rig } = this;
+    const eye = rig.toEye();
+    const far = rig.distance() + 3 * rig.radius;
+    const near = Math.max(rig.distance() - 2 * rig.radius, 0.02 * rig.distance());
+    const place = rig.target.clone().addScaledVector(eye, rig.distance());
+    for (const camera of [this.perspective, this.flat]) {
+      camera.position.copy(place);
+      camera.quaternion.copy(rig.turn);
+      camera.near = near;
+      camera.far = far;
+    }
+    this.perspective.aspect = this.aspect();
+    this.flat.top = rig.half;
+    this.flat.bottom = -rig.half;
+    this.flat.right = rig.half * this.aspect();
+    this.flat.left = -this.flat.right;
+    this.flat.near = -4 * rig.radius;
+    for (const camera of [this.perspective, this.flat]) {
+      camera.updateProjectionMatrix();
+      camera.updateMatrixWorld();
+    }
+  }
+
+  // ---- what is shown
+
+  private shownIsMesh = false;
+  private shownTree: { geometry: BufferGeometry; bvh: MeshBVH } | null = null;
+
+  /** Shows a surface; `value` names what colours it. */
+  showSurface(geometry: Geometry | undefined, value: string | null): void {
+    if (this.shown) {
+      this.scene.remove(this.shown);
+      if (this.shown.geometry !== this.pickable?.geometry) this.shown.geometry.dispose();
+      this.shown = null;
+    }
+    this.shownIsMesh = geometry?.layer === 'mesh';
+    if (geometry) {
+      const buffers = this.shownIsMesh && this.pickable ? this.pickable.geometry : buffersOf(geometry);
+      const values = value ? geometry.floats.get(value) : undefined;
+      const vertices = buffers.getAttribute('position').count;
+      buffers.setAttribute('value', new BufferAttribute(values ?? new Float32Array(vertices), 1));
+      this.shown = new Mesh(buffers, this.surface);
+      this.scene.add(this.shown);
+    }
+    this.swap();
+    this.draw();
+  }
+
+  /** The mesh that picks are on, and the stand-in for it. */
+  setMesh(geometry: Geometry | undefined): void {
+    this.pickable?.geometry.dispose();
+    this.pickable = geometry ? { geometry: buffersOf(geometry), bvh: null } : null;
+    if (this.pickable) {
+      const pickable = this.pickable;
+      // Picks are wanted soon, but the picture first.
+      setTimeout(() => this.tree(pickable), 60);
+    }
+  }
+
+  private tree(pickable: { geometry: BufferGeometry; bvh: MeshBVH | null }): MeshBVH {
+    pickable.bvh ??= new MeshBVH(pickable.geometry, { indirect: true });
+    return pickable.bvh;
+  }
+
+  setCoarse(geometry: Geometry | undefined): void {
+    if (this.coarse) {
+      this.scene.remove(this.coarse);
+      this.coarse.geometry.dispose();
+      this.coarse = null;
+    }
+    if (geometry) {
+      const buffers = buffersOf(geometry);
+      buffers.setAttribute('value', new BufferAttribute(new Float32Array(buffers.getAttribute('position').count), 1));
+      this.coarse = new Mesh(buffers, this.coarseSurface);
+      this.coarse.visible = false;
+      this.scene.add(this.coarse);
+    }
+  }
+
+  showPoints(geometry: Geometry | undefined): void {
+    if (this.points) {
+      this.scene.remove(this.points);
+      this.points.geometry.dispose();
+      this.points = null;
+    }
+    if (geometry) {
+      const buffers = new BufferGeometry();
+      buffers.setAttribute('position', new BufferAttribute(geometry.floats.get('position')!, 3));
+      this.points = new Points(buffers, this.cloud);
+      this.points.frustumCulled = false;
+      buffers.computeBoundingBox();
+      const z = this.rig.up.z === 1;
+      const box = buffers.boundingBox!;
+      this.cloud.uniforms.low!.value = z ? box.min.z : box.min.y;
+      this.cloud.uniforms.high!.value = z ? box.max.z : box.max.y;
+      this.cloud.uniforms.upZ!.value = z;
+      this.scene.add(this.points);
+    }
+    this.draw();
+  }
+
+  shade(mode: keyof typeof MODES, most: number): void {
+    this.surface.uniforms.mode!.value = MODES[mode];
+    this.surface.uniforms.most!.value = Math.max(most, 1e-30);
+    this.draw();
+  }
+
+  mark(hovered: number, chosen: number, alone: number): void {
+    this.surface.uniforms.hovered!.value = hovered;
+    this.surface.uniforms.chosen!.value = chosen;
+    this.surface.uniforms.alone!.value = alone;
+    this.draw();
+  }
+
+  cut(normal: Vector3, at: number): void {
+    const cut = new Vector4(normal.x, normal.y, normal.z, at);
+    this.surface.uniforms.cut!.value = cut;
+    this.cloud.uniforms.cut!.value = cut;
+    this.draw();
+  }
+
+  setCorners(positions: Float32Array, colors: Float32Array): void {
+    setDots(this.corners, positions, colors);
+    this.draw();
+  }
+
+  /** Dots of a tool, over everything. */
+  setMarks(positions: Float32Array, colors: Float32Array): void {
+    setDots(this.marks, positions, colors);
+    this.draw();
+  }
+
+  setLine(name: keyof View['lines'], positions: Float32Array): void {
+    this.lines[name].set(positions);
+    const line = this.lines[name];
+    if (line instanceof Thick) line.material.resolution.set(this.canvas.clientWidth, this.canvas.clientHeight);
+    this.draw();
+  }
+
+  piecesOf(kind: 'curve' | 'feature', which: Iterable<number>): Float32Array {
+    return pieces(kind === 'curve' ? this.curves : this.features, which);
+  }
+
+  // ---- what is under the cursor
+
+  /** Pixels of the canvas to device coordinates. */
+  private device(x: number, y: number): Vector2 {
+    return new Vector2((2 * x) / this.canvas.clientWidth - 1, 1 - (2 * y) / this.canvas.clientHeight);
+  }
+
+  ray(x: number, y: number): Ray {
+    this.updateCamera();
+    const p = this.device(x, y);
+    const camera = this.camera();
+    const near = new Vector3(p.x, p.y, -1).unproject(camera);
+    const far = new Vector3(p.x, p.y, 1).unproject(camera);
+    return new Ray(near, far.sub(near).normalize());
+  }
+
+  /** The place of the mesh under a pixel; what is cut off is not there. */
+  pick(x: number, y: number): Hit | null {
+    if (!this.pickable) return null;
+    const ray = this.ray(x, y);
+    const cut = this.surface.uniforms.cut!.value as Vector4;
+    const bvh = this.tree(this.pickable);
+    const hits = bvh.raycast(ray, 2).sort((a, b) => a.distance - b.distance);
+    for (const hit of hits) {
+      const p = hit.point;
+      if (cut.x * p.x + cut.y * p.y + cut.z * p.z <= cut.w) return { place: p, face: hit.faceIndex ?? 0 };
+    }
+    return null;
+  }
+
+  /** The patch under a pixel, where surfaces are shown. */
+  pickPatch(x: number, y: number): number | null {
+    if (!this.shown || this.shownIsMesh) return null;
+    if (this.shownTree?.geometry !== this.shown.geometry) {
+      this.shownTree = { geometry: this.shown.geometry, bvh: new MeshBVH(this.shown.geometry, { indirect: true }) };
+    }
+    const alone = this.surface.uniforms.alone!.value as number;
+    const patch = this.shown.geometry.getAttribute('patchOf');
+    const hits = this.shownTree.bvh.raycast(this.ray(x, y), 2).sort((a, b) => a.distance - b.distance);
+    for (const hit of hits) {
+      const found = Math.round(patch.getX(hit.face?.a ?? 0));
+      if (alone < 0 || found === alone) return found;
+    }
+    return null;
+  }
+
+  /** Pixel of a place, and its depth. */
+  project(place: Vector3): { x: number; y: number; z: number } {
+    this.updateCamera();
+    const p = place.clone().project(this.camera());
+    return { x: ((p.x + 1) / 2) * this.canvas.clientWidth, y: ((1 - p.y) / 2) * this.canvas.clientHeight, z: p.z };
+  }
+
+  /** True if nothing of the mesh lies before a place. */
+  isSeen(place: Vector3): boolean {
+    const p = this.project(place);
+    const hit = this.pick(p.x, p.y);
+    if (!hit) return true;
+    const eye = this.rig.toEye();
+    return hit.place.clone().sub(place).dot(eye) < 0.02 * this.rig.radius;
+  }
+
+  picture(): string {
+    this.updateCamera();
+    this.renderer.render(this.scene, this.camera());
+    return this.canvas.toDataURL('image/png');
+  }
+}
+
+function buffersOf(geometry: Geometry): BufferGeometry {
+  const buffers = new BufferGeometry();
+  buffers.setAttribute('position', new BufferAttribute(geometry.floats.get('position')!, 3));
+  buffers.setAttribute('normal', new BufferAttribute(geometry.floats.get('normal')!, 3));
+  buffers.setIndex(new BufferAttribute(geometry.numbers.get('index')!, 1));
+  const vertices = buffers.getAttribute('position').count;
+  const patch = geometry.floats.get('patch') ?? new Float32Array(vertices).fill(-2);
+  buffers.setAttribute('patchOf', new BufferAttribute(patch, 1));
+  return buffers;
+}
+
+function setDots(dots: Points, positions: Float32Array, colors: Float32Array): void {
+  dots.geometry.dispose();
+  dots.geometry = new BufferGeometry();
+  dots.geometry.setAttribute('position', new BufferAttribute(positions, 3));
+  dots.geometry.setAttribute('color', new BufferAttribute(colors, 3));
+  dots.visible = positions.length > 0;
+}
