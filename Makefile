@@ -102,10 +102,10 @@ clean:
 	.ci/packages build
 	@touch $@
 
-# What builds the page and tests it.
+# What builds the page and tests it. `npm ci` refuses registries that lack the builds of a package for other systems.
 .stamp/node: studio/package-lock.json .ci/node
 	@mkdir -p .stamp
-	cd studio && ../.ci/node npm ci --no-audit --no-fund --silent
+	cd studio && ../.ci/node npm install --no-save --no-audit --no-fund --silent
 	@touch $@
 
 .stamp/page: .stamp/node studio/index.html studio/vite.config.ts $(shell find studio/src -type f)

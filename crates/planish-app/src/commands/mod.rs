@@ -2,7 +2,6 @@
 
 mod clean;
 mod compare;
-mod contents;
 mod decimate;
 mod demo;
 mod edit;

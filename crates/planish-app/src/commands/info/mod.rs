@@ -1,6 +1,8 @@
 //! `planish info`: what is in a file, and what is wrong with it.
 
-use super::contents::{self, Contents};
+mod contents;
+
+use self::contents::Contents;
 use super::{Session, commit_report};
 use crate::args::{Info, ScanArgs};
 use crate::failure::{Failure, Status};

@@ -1,6 +1,6 @@
 //! `planish info` of files that are no mesh, scan or model: volumes, scripts, networks, reports, STEP, displacement maps.
 
-use super::edit;
+use crate::commands::edit;
 use crate::failure::Failure;
 use crate::summary::Summary;
 use planish::DVec3;
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What is in a file.
-pub struct Contents {
+pub(super) struct Contents {
     /// As an input.
     pub input: Input,
     /// In words, after what the file is.
@@ -45,7 +45,7 @@ impl Contents {
 }
 
 /// A corner of a box, to a millionth of its diagonal.
-pub fn corner(p: DVec3, diagonal: f64) -> String {
+pub(super) fn corner(p: DVec3, diagonal: f64) -> String {
     let decimals = if diagonal > 0.0 { (6.0 - diagonal.log10().ceil()).clamp(0.0, 12.0) as usize } else { 6 };
     let short = |x: f64| {
         let text = format!("{x:.decimals$}");
@@ -60,7 +60,7 @@ pub fn corner(p: DVec3, diagonal: f64) -> String {
 /// * `units` - of files that tell none
 /// # Errors
 /// If it is damaged, or a JSON file of another program.
-pub fn of(path: &Path, units: Option<Units>) -> Result<Option<Contents>, Failure> {
+pub(super) fn of(path: &Path, units: Option<Units>) -> Result<Option<Contents>, Failure> {
     if path.is_dir() && path.join(RELIEF_SIDECAR).is_file() {
         return maps(path).map(Some);
     }
