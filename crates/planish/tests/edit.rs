@@ -4,7 +4,7 @@ mod common;
 
 use planish::curve::{SnakeParams, SurfaceCurve, section};
 use planish::edit::network::{EditError, Editor, Holds};
-use planish::edit::{ApplyError, Carry, Edit, Ground, apply};
+use planish::edit::{ApplyError, Carry, Edit, Ground, apply, preview};
 use planish::geom::Bvh;
 use planish::grid::{self, Family, FeatureCurve, FeatureError, GridParams, Sections, relax_with_features};
 use planish::layout::{Known, LayoutParams, layout};
@@ -740,4 +740,25 @@ fn a_seam_over_a_crease_of_23_degrees_is_sharp_or_smooth_as_it_is_told() {
         format!(r#"{{"edit":"continuity","curves":[{{"near":[{},0,-0.2]}}],"seam":"smooth"}}"#, mesh.bounds().min.x);
     let wrong = apply(&mut start.clone(), &json(&rim), &ground, &|_| Err("no other".into()), &Silent).unwrap_err();
     assert!(matches!(wrong, ApplyError::NoSeam { .. }), "{wrong}");
+}
+
+#[test]
+fn a_preview_is_what_the_edit_makes_then_and_leaves_the_drawing_as_it_is() {
+    let mesh = shapes::rectangle(2.0, 1.0, 20, 10);
+    let ground = Ground::new(&mesh);
+    let others = |_: &str| Err("no other".into());
+    let start = Drawing { network: one_patch(&mesh), ..Drawing::default() };
+    let b = mesh.bounds();
+    let (x, y) = (b.center().x, b.center().y);
+    let cut = json(&format!(r#"{{"edit":"cut","through":[{x},{y},0],"normal":[1,0,0]}}"#));
+    let before = start.clone();
+    let (tried, told) = preview(&start, &cut, &ground, &others, &Silent).unwrap();
+    assert_eq!(start, before);
+    let mut drawing = start.clone();
+    let made = apply(&mut drawing, &cut, &ground, &others, &Silent).unwrap();
+    assert_eq!((tried.network.corners, tried.network.curves), (drawing.network.corners, drawing.network.curves));
+    assert_eq!((told.corners, told.curves, told.faults), (made.corners, made.curves, None));
+    assert!(made.faults.is_some());
+    let wrong = json(r#"{"edit":"split_curve","curve":99,"at":0.5}"#);
+    assert!(preview(&start, &wrong, &ground, &others, &Silent).is_err());
 }
