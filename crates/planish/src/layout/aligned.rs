@@ -14,7 +14,7 @@ use super::integers::{self, QuantizeError, Scale};
 use super::map::{self, Charts, SeamlessMap};
 use super::proxy::{self, Proxy, Sizing};
 use super::recut::Bench;
-use super::{LayoutParams, improve};
+use super::{LayoutParams, SETTLING_PER_SMOOTHING, improve};
 use crate::mesh::{NONE, TriMesh, next};
 use crate::network::Network;
 use crate::network::field::{self, FieldParams};
@@ -268,7 +268,7 @@ impl Aligned {
             observer.progress(0.3 + 0.6 * i as f64 / NEAR_ASKED.len() as f64);
             let coarsest = growth == 1.0 && params.patches == 0;
             let scale = if coarsest { Scale::Coarsest } else { scale(growth, least) };
-            match self.laid(scale, params.coarsest, observer) {
+            match self.laid(scale, params, observer) {
                 Err(AlignError::Cancelled(cancelled)) => return Err(cancelled.into()),
                 Err(e) => why = e,
                 Ok(laid) => {
@@ -285,12 +285,12 @@ impl Aligned {
         Err(why)
     }
 
-    /// The network at a scale, if its patches are well shaped or `any` will do.
-    fn laid(&self, scale: Scale, any: bool, observer: &dyn Observer) -> Result<Laid, AlignError> {
+    /// The network at a scale, if its patches are well shaped or the coarsest is asked for.
+    fn laid(&self, scale: Scale, params: &LayoutParams, observer: &dyn Observer) -> Result<Laid, AlignError> {
         let mapped = self.integers(scale, observer)?;
         match mapped.faults() {
-            0 if any || self.fitness(&mapped.map).is_good() => {
-                let network = self.network(&mapped.map, observer)?;
+            0 if params.coarsest || self.fitness(&mapped.map).is_good() => {
+                let network = self.network(&mapped.map, params, observer)?;
                 let cones = self.charts.index.iter().filter(|i| **i != 0).count();
                 Ok(Laid { network, cones, deviation_deg: mapped.deviation_deg })
             }
@@ -314,15 +314,16 @@ impl Aligned {
             // Change of the surface, and of its normal, by u and v.
             let by_uv = DMat2::from_cols(*b - *a, *c - *a).inverse();
             let surface = DMat2::from_cols(q - p, r - p) * by_uv;
-            let area = mesh.area(f);
+            // By patches, not by area: a squeezed one counts as much as a wide one.
+            let part = (*b - *a).perp_dot(*c - *a);
             let off = surface.x_axis.angle_to(surface.y_axis).abs() - FRAC_PI_2;
-            skew.push((off.abs().to_degrees(), area));
+            skew.push((off.abs().to_degrees(), part));
             let on_line = mesh.triangles[f].iter().any(|&v| on_line[v as usize]);
             let [l, m, n] = mesh.triangles[f].map(|v| normals[v as usize]);
             let (along, across) = (m - l, n - l);
             let change = [by_uv.x_axis, by_uv.y_axis].map(|d| (along * d.x + across * d.y).length());
             // Normals of vertices on lines are means over both sides.
-            turn.push((if on_line { 0.0 } else { change[0].max(change[1]) }, area));
+            turn.push((if on_line { 0.0 } else { change[0].max(change[1]) }, part));
         }
         Fitness { skew_deg: kept(skew), turn: kept(turn) }
     }
@@ -367,11 +368,18 @@ impl Aligned {
         smooth.ok_or(QuantizeError::Tight)
     }
 
-    /// The network of the integer map `map`.
-    fn network(&self, map: &SeamlessMap, observer: &dyn Observer) -> Result<Network, AlignError> {
+    /// The network of the integer map `map`, settled as `params` say: what the map squeezes is spread.
+    fn network(
+        &self,
+        map: &SeamlessMap,
+        params: &LayoutParams,
+        observer: &dyn Observer,
+    ) -> Result<Network, AlignError> {
         let Proxy { mesh, adjacency, lines, .. } = &self.proxy;
         let complex = embed::embed(mesh, adjacency, lines, map)?;
-        let bench = Bench::new(mesh, adjacency, complex).ok_or(AlignError::Misplaced)?;
+        let mut bench = Bench::new(mesh, adjacency, complex).ok_or(AlignError::Misplaced)?;
+        let (patches, rounds) = (bench.complex.live_cells().count(), SETTLING_PER_SMOOTHING * params.smoothing);
+        improve::settle(&mut bench, patches, rounds, observer).map_err(|_| Cancelled)?;
         let complex = self.proxy.back(&bench.complex).ok_or(AlignError::Misplaced)?;
         let (fine, fine_adjacency) = self.proxy.fine();
         let mut bench = Bench::new(fine, fine_adjacency, complex).ok_or(AlignError::Misplaced)?;
