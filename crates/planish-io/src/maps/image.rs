@@ -305,7 +305,7 @@ fn read_tiff(bytes: &[u8]) -> Result<Raster, String> {
         _ => return Err("its numbers are neither 8 or 16 bit whole ones nor 32 bit floats".into()),
     };
     let pixels = width * height;
-    if pixels == 0 || numbers.len() % pixels != 0 {
+    if pixels == 0 || !numbers.len().is_multiple_of(pixels) {
         return Err("its pixels do not all have the same channels".into());
     }
     Ok(without_alpha(width, height, numbers.len() / pixels, numbers))

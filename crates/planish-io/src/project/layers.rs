@@ -55,7 +55,11 @@ pub(super) fn read(
                 maps.push(Relief { rows, cols, vectors: arrays.points(vectors, None)? });
             }
             _ => {
-                return Err(damaged(format!("maps {k} of patch {p} stand where others should"), "layer_map", id as i64));
+                return Err(damaged(
+                    format!("maps {k} of patch {p} stand where others should"),
+                    "layer_map",
+                    id as i64,
+                ));
             }
         }
     }

@@ -157,7 +157,7 @@ pub(super) enum AlignError {
     Cancelled(#[from] Cancelled),
 }
 
-/// A patch whose isolines cross more than this off a right angle is hard to fit; so much of the surface may, degrees.
+/// A patch whose isolines cross more than this off a right angle is hard to fit; so many of the patches may, degrees.
 const MOST_SKEW_DEG: f64 = 35.0;
 
 /// The normal of a patch turns by at most this from side to side: a quarter and a third of it, radians.
@@ -166,7 +166,7 @@ const MOST_TURN: f64 = 2.1;
 /// What is smaller than this part of a patch's side is detail that its grid carries, and does not turn its normal.
 const DETAIL_TO_SIDE: f64 = 0.5;
 
-/// Part of the surface that has to keep both.
+/// Part of the patches that has to keep both.
 const KEPT: f64 = 0.95;
 
 /// Numbers of patches that are tried, in those of the coarsest network: as few as the form needs.
@@ -184,9 +184,9 @@ const MOST_MISSED: f64 = 0.25;
 /// How well patches are shaped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fitness {
-    /// Greatest angle off a right one between isolines, on [`KEPT`] of the surface, degrees.
+    /// Greatest angle off a right one between isolines, on [`KEPT`] of the patches, degrees.
     pub skew_deg: f64,
-    /// Greatest turn of the normal across a patch, on [`KEPT`] of the surface, radians.
+    /// Greatest turn of the normal across a patch, on [`KEPT`] of the patches, radians.
     pub turn: f64,
 }
 

@@ -15,6 +15,9 @@ const KEPT: f64 = 0.2;
 /// The map is stuck if so small a part of the way is too far.
 const LEAST_STEP: f64 = 1.0 / 256.0;
 
+/// Lowers the barrier energy of the map with these equations, by its free unknowns.
+pub(super) type Settle<'a> = dyn Fn(&Seams, &mut Vec<f64>) -> Result<(), Cancelled> + 'a;
+
 /// The free unknowns of an injective map with the equations of `maps`, from one with those of `start`; `None` if it gets
 /// stuck.
 /// * `settle` - lowers the barrier energy with given equations
@@ -22,7 +25,7 @@ pub(super) fn carry(
     maps: &Maps,
     laplacian: &SparseCholesky,
     (start, mut free): (&Seams, Vec<f64>),
-    settle: &dyn Fn(&Seams, &mut Vec<f64>) -> Result<(), Cancelled>,
+    settle: &Settle,
     observer: &dyn Observer,
 ) -> Result<Option<Vec<f64>>, Cancelled> {
     let shift = maps.shift(laplacian, &start.moved(maps.seams));
