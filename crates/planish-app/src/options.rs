@@ -552,10 +552,14 @@ mod tests {
                 let field = known.iter().find(|f| arg.get_id() == f.id.as_str());
                 let name = arg.get_value_names().and_then(|n| n.first()).map_or("", |n| n.as_str());
                 let (inside, mut wrong) = field.map_or_else(Default::default, |f| ends(&f.kind));
-                let is_number = matches!(name, "N" | "GB" | "LENGTH|%" | "%" | "AXIS" | "WORD" | "UNITS" | "PAIRS");
+                let checked = ["N", "GB", "LENGTH|%", "%", "AXIS", "WORD", "UNITS", "PAIRS", "IP"];
+                let is_number = checked.contains(&name);
                 let is_step = name.contains(',') || name == "z-to-y|y-to-z";
                 if field.is_none() && !is_number && !is_step {
-                    assert!(["DIR", "FILE", "NAMES", ".json", ".planish"].iter().any(|n| name.contains(n)), "{name}");
+                    assert!(
+                        ["DIR", "FILE", "NAMES", "TOKEN", ".json", ".planish"].iter().any(|n| name.contains(n)),
+                        "{name}"
+                    );
                     continue;
                 }
                 wrong.extend(
