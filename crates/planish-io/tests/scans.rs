@@ -3,7 +3,7 @@
 use glam::DVec3;
 use planish::cloud::Cloud;
 use planish::mesh::Attribute;
-use planish_io::{ReadError, ScanOptions, is_scan, read_scan, write_scan};
+use planish_io::{Place, ReadError, ScanOptions, is_scan, read_scan, write_scan};
 use std::path::PathBuf;
 
 fn folder() -> tempfile::TempDir {
@@ -104,6 +104,15 @@ fn the_origin_is_the_viewpoint_of_a_pcd_whose_points_lie_before_it() {
         assert_eq!(cloud.scanners.len(), usize::from(seen), "{points}");
         assert_eq!(cloud.seen_by.len(), 2 * usize::from(seen), "{points}");
     }
+}
+
+#[test]
+fn a_pcd_whose_fields_hold_no_numbers_is_refused() {
+    let folder = folder();
+    let text = String::from_utf8(pcd("ascii", b"1\n2\n")).unwrap().replace("COUNT 1 1 1 1", "COUNT 1 0 0 0");
+    let path = folder.path().join("a.pcd");
+    std::fs::write(&path, text).unwrap();
+    assert!(matches!(read(&path), Err(ReadError::Header { place: Place::Line(6), .. })));
 }
 
 #[test]

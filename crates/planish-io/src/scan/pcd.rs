@@ -71,7 +71,7 @@ fn header(lines: &mut Lines) -> Result<Header, ReadError> {
                 let n = numbers.filter(|n| n.len() == fields.len());
                 let n = n.ok_or_else(|| fault(format!("{key} does not match FIELDS"), at))?;
                 for (f, n) in fields.iter_mut().zip(n) {
-                    if n > 1 << 20 || (key == "SIZE" && ![1, 2, 4, 8].contains(&n)) {
+                    if n == 0 || n > 1 << 20 || (key == "SIZE" && ![1, 2, 4, 8].contains(&n)) {
                         return Err(fault(format!("{key} {n} is no size"), at));
                     }
                     *(if key == "SIZE" { &mut f.size } else { &mut f.count }) = n;
