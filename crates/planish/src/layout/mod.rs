@@ -16,6 +16,7 @@ mod complex;
 mod embed;
 mod fan;
 mod fill;
+mod fitness;
 mod improve;
 mod integers;
 mod lines;
@@ -173,12 +174,12 @@ pub fn layout(
     let adjacency = Adjacency::new(mesh);
     let mut sharp = lines::feature_lines(mesh, &adjacency, tagged, params, observer)?;
     sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
-    let why = match aligned::lay(mesh, &sharp, corners, params, observer) {
-        Ok(aligned::Laid { network, cones, deviation_deg }) => {
-            return Ok(Layout { network, method: Method::Field { cones, deviation_deg } });
-        }
+    let along = aligned::lay(mesh, &sharp, corners, params, observer);
+    let (along, why) = match along {
+        Ok(laid) if params.coarsest || fitness::is_good(laid.good_part) => return Ok(laid.into()),
+        Ok(laid) => (Some(laid), "patches along its form would be covered less well by grids".to_owned()),
         Err(AlignError::Cancelled(cancelled)) => return Err(cancelled.into()),
-        Err(why) => why.to_string(),
+        Err(why) => (None, why.to_string()),
     };
     let patches = match params.patches {
         _ if params.coarsest => 1,
@@ -186,8 +187,18 @@ pub fn layout(
         patches => patches,
     };
     let params = LayoutParams { patches, ..params.clone() };
-    let network = partitioned((mesh, &adjacency), &sharp, corners, &params, observer)?;
-    Ok(Layout { network, method: Method::Partition { why } })
+    let (network, good_part) = partitioned((mesh, &adjacency), &sharp, corners, &params, observer)?;
+    match along {
+        // Where neither is good the form is followed, unless that is worse.
+        Some(laid) if laid.good_part >= good_part => Ok(laid.into()),
+        _ => Ok(Layout { network, method: Method::Partition { why } }),
+    }
+}
+
+impl From<aligned::Laid> for Layout {
+    fn from(aligned::Laid { network, cones, deviation_deg, .. }: aligned::Laid) -> Layout {
+        Layout { network, method: Method::Field { cones, deviation_deg } }
+    }
 }
 
 /// Patches that a mesh has room for: finer ones would have no two triangles each to follow.
@@ -195,14 +206,14 @@ fn most_patches(mesh: &TriMesh) -> usize {
     (mesh.triangles.len() / TRIANGLES_PER_PATCH).max(1)
 }
 
-/// The network of a partition, for meshes without a usable map.
+/// The network of a partition, and the part of its patches that a grid covers well.
 fn partitioned(
     (mesh, adjacency): (&TriMesh, &Adjacency),
     sharp: &[bool],
     corners: &[bool],
     params: &LayoutParams,
     observer: &dyn Observer,
-) -> Result<Network, LayoutError> {
+) -> Result<(Network, f64), LayoutError> {
     let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
     let side = (area / params.patches.max(1) as f64).sqrt();
     let mut edge = EDGE_TO_SIDE * side;
@@ -231,7 +242,7 @@ fn partitioned(
                 }
                 fan::spread(&mut bench);
                 observer.progress(1.0);
-                return Ok(network(&work, &work_adjacency, &bench.complex));
+                return Ok((network(&work, &work_adjacency, &bench.complex), fitness::good_part(&bench)));
             }
         }
         edge /= 2.0;

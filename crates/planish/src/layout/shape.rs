@@ -9,7 +9,7 @@ use glam::DVec3;
 const HEAD: f64 = 0.2;
 
 /// A corner further off square than this makes a surface that is hard to fit, and costs steeply.
-const STEEP_DEG: f64 = 45.0;
+pub(super) const STEEP_DEG: f64 = 45.0;
 
 /// Weight of the squared logarithms of a pair of opposite sides, against corners that are all 45 degrees off.
 const TAPER_COST: f64 = 0.5;
@@ -60,18 +60,19 @@ fn angle_cost(angle: f64) -> f64 {
 }
 
 impl Shape {
-    /// What the cell costs where patches have `mean_area`.
-    pub fn cost(&self, mean_area: f64) -> f64 {
-        let mut corners = 0.0;
-        for k in 0..4 {
+    /// The angles at the corners, radians: less than 0 where sides are turned over.
+    pub fn angles(&self) -> [f64; 4] {
+        std::array::from_fn(|k| {
             let p = self.corners[k];
             let (a, b) = (self.sides[k].heads[0] - p, self.sides[(k + 3) % 4].heads[1] - p);
-            let mut angle = self.normals[k].dot(a.cross(b)).atan2(a.dot(b));
-            if angle < -0.5 {
-                angle += std::f64::consts::TAU;
-            }
-            corners += angle_cost(angle) / 4.0;
-        }
+            let angle = self.normals[k].dot(a.cross(b)).atan2(a.dot(b));
+            if angle < -0.5 { angle + std::f64::consts::TAU } else { angle }
+        })
+    }
+
+    /// What the cell costs where patches have `mean_area`.
+    pub fn cost(&self, mean_area: f64) -> f64 {
+        let corners: f64 = self.angles().into_iter().map(|angle| angle_cost(angle) / 4.0).sum();
         let tiny = 1e-6 * mean_area.sqrt();
         let [a, b, c, d] = self.sides.map(|s| s.length.max(tiny));
         let (along, across) = ((a + c) / 2.0, (b + d) / 2.0);

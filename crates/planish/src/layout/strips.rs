@@ -4,8 +4,6 @@
 //! What is left when all such rows are gone is the base complex of the quads (Bommes, Lempfer, Kobbelt, *Global Structure
 //! Optimization of Quadrilateral Meshes*, 2011).
 
-#![allow(dead_code)] // Tests join rows; a layout will where its finer networks have more than a patch needs.
-
 use super::complex::{Arc, Complex};
 use crate::mesh::NONE;
 use crate::network::CurveKind;
@@ -21,19 +19,25 @@ struct Row {
 }
 
 /// Dissolves rows of arcs of a complex of four-sided cells, the cheapest first, until none is left that may go.
-/// * `cost` - of a row, given the complex and the pairs of cells that would become one; `None` if it must stay
-pub(super) fn join(complex: &mut Complex, cost: impl Fn(&Complex, &[[u32; 2]]) -> Option<f64>) {
+/// * `cost` - of a row, given the complex, the pairs of cells that would become one, and for each cell those that it was
+///   joined from; `None` if it must stay
+pub(super) fn join(complex: &mut Complex, cost: impl Fn(&Complex, &[[u32; 2]], &[Vec<u32>]) -> Option<f64>) {
+    let mut members: Vec<Vec<u32>> = (0..complex.cells.len() as u32).map(|c| vec![c]).collect();
     loop {
         let mut best: Option<(f64, Row)> = None;
         for row in rows(complex) {
             let pairs: Vec<[u32; 2]> = row.halves.iter().map(|&h| [complex.cell(h), complex.cell(h ^ 1)]).collect();
-            if let Some(price) = cost(complex, &pairs)
+            if let Some(price) = cost(complex, &pairs, &members)
                 && best.as_ref().is_none_or(|b| price < b.0)
             {
                 best = Some((price, row));
             }
         }
         let Some((_, row)) = best else { break };
+        for &half in &row.halves {
+            let gone = std::mem::take(&mut members[complex.cell(half ^ 1) as usize]);
+            members[complex.cell(half) as usize].extend(gone);
+        }
         dissolve(complex, &row);
     }
     compact(complex);

@@ -188,7 +188,7 @@ fn rows_of_arcs_that_no_cone_needs_go_until_a_cube_has_6_cells_and_a_torus_4() {
     for (made, squares, expected) in made {
         let fine = if made.sides == 2 { 12 } else { 8 };
         let mut complex = checked(&made, &scaled(&made, fine, squares));
-        strips::join(&mut complex, |_, _| Some(0.0));
+        strips::join(&mut complex, |_, _, _| Some(0.0));
         let count = [complex.live_cells().count(), complex.nodes.len(), complex.arcs.len()];
         assert_eq!(count, expected);
         assert!(Bench::new(&made.mesh, &made.adjacency, complex).is_some());
@@ -204,7 +204,7 @@ fn three_squares_in_a_row_become_three_two_or_one_as_the_area_allowed_for_a_cell
             let bench = Bench::new(&sheet.mesh, &sheet.adjacency, complex.clone()).expect("an embedding");
             bench.shapes()[c as usize].as_ref().map_or(0.0, |s| s.area)
         };
-        strips::join(&mut complex, |complex, pairs| {
+        strips::join(&mut complex, |complex, pairs, _| {
             let size = pairs.iter().map(|&[a, b]| area(complex, a) + area(complex, b)).fold(0.0, f64::max);
             (size < most).then_some(size)
         });

@@ -61,9 +61,6 @@ pub(super) enum QuantizeError {
         /// Triangles of the thinned mesh.
         triangles: usize,
     },
-    /// The triangles of the mesh leave no way to the whole numbers.
-    #[error("its triangles could not be brought to whole numbers - hint: a finer mesh beside cones and lines")]
-    Tight,
     /// The map does not fit along its seams.
     #[error("the map does not fit along its seams by more than rounding - hint: its jumps and corners must agree")]
     Torn,

@@ -18,8 +18,15 @@ const LEAST_STEP: f64 = 1.0 / 256.0;
 /// Lowers the barrier energy of the map with these equations, by its free unknowns.
 pub(super) type Settle<'a> = dyn Fn(&Seams, &mut Vec<f64>) -> Result<(), Cancelled> + 'a;
 
-/// The free unknowns of an injective map with the equations of `maps`, from one with those of `start`; `None` if it gets
-/// stuck.
+/// Where a map got to.
+pub(super) enum Carried {
+    /// Where it was to go: its free unknowns.
+    There(Vec<f64>),
+    /// Nowhere: these faces would lose all of their area.
+    Stuck(Vec<u32>),
+}
+
+/// The free unknowns of an injective map with the equations of `maps`, from one with those of `start`.
 /// * `settle` - lowers the barrier energy with given equations
 pub(super) fn carry(
     maps: &Maps,
@@ -27,7 +34,7 @@ pub(super) fn carry(
     (start, mut free): (&Seams, Vec<f64>),
     settle: &Settle,
     observer: &dyn Observer,
-) -> Result<Option<Vec<f64>>, Cancelled> {
+) -> Result<Carried, Cancelled> {
     let shift = maps.shift(laplacian, &start.moved(maps.seams));
     let (mut way, mut step) = (0.0, 1.0);
     settle(start, &mut free)?;
@@ -38,16 +45,17 @@ pub(super) fn carry(
         let (seams, moved) = loop {
             let seams = start.between(maps.seams, way + step);
             let moved: Vec<f64> = free.iter().zip(&shift).map(|(x, s)| x + step * s).collect();
-            if maps.least_kept(&before, &seams.coordinates(&moved)) > KEPT {
+            let lost = maps.losing(&before, &seams.coordinates(&moved), KEPT);
+            if lost.is_empty() {
                 break (seams, moved);
             }
             step /= 2.0;
             if step < LEAST_STEP {
-                return Ok(None);
+                return Ok(Carried::Stuck(lost));
             }
         };
         (free, way) = (moved, if step == 1.0 - way { 1.0 } else { way + step });
         settle(&seams, &mut free)?;
     }
-    Ok(Some(free))
+    Ok(Carried::There(free))
 }

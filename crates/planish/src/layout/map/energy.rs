@@ -119,13 +119,11 @@ impl<'a> Maps<'a> {
         free
     }
 
-    /// Least part of its determinant that a face keeps on the way from `before` to `after`.
-    pub fn least_kept(&self, before: &[f64], after: &[f64]) -> f64 {
-        (0..self.gradient.len())
-            .into_par_iter()
-            .with_min_len(512)
-            .map(|f| self.jacobian(f, after).determinant() / self.jacobian(f, before).determinant())
-            .reduce(|| f64::INFINITY, f64::min)
+    /// The faces that keep no more than `part` of their determinant on the way from `before` to `after`.
+    pub fn losing(&self, before: &[f64], after: &[f64], part: f64) -> Vec<u32> {
+        let kept = |f: usize| self.jacobian(f, after).determinant() / self.jacobian(f, before).determinant();
+        let losing = |&f: &u32| !(kept(f as usize) > part);
+        (0..self.gradient.len() as u32).into_par_iter().with_min_len(512).filter(losing).collect()
     }
 
     /// Adds the gradient by the corners of face `f` from that by its Jacobian.

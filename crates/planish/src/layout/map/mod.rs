@@ -22,6 +22,7 @@ pub(super) use cones::Charts;
 use crate::geom::predicates::orient2d;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::observe::{Cancelled, Observer};
+use carry::Carried;
 use energy::Maps;
 use glam::DVec2;
 use planish_sparse::SparseCholesky;
@@ -188,7 +189,7 @@ fn untangled(
 }
 
 /// The smoothest integer map with the integers of `whole` (corners of patches, lines and translations), which has the jumps
-/// of `charts`; `None` if the triangles do not allow it.
+/// of `charts`; else the triangles that do not allow it.
 /// * `from` - an injective seamless map of the same charts
 /// # Errors
 /// `Cancelled`.
@@ -199,25 +200,31 @@ pub(super) fn smooth_integers(
     charts: &Charts,
     (from, whole): (&[[DVec2; 3]], &[[DVec2; 3]]),
     observer: &dyn Observer,
-) -> Result<Option<Mapped>, Cancelled> {
+) -> Result<Result<Mapped, Vec<u32>>, Cancelled> {
     let area = |uv: &[[DVec2; 3]]| uv.iter().map(|[a, b, c]| (*b - *a).perp_dot(*c - *a) / 2.0).sum::<f64>();
     let growth = (area(whole) / area(from)).sqrt();
     let from: Vec<[DVec2; 3]> = from.iter().map(|corners| corners.map(|c| growth * c)).collect();
     let [from, whole] = [&from, whole].map(|uv| joined(mesh, adjacency, charts, uv));
     let seams = |held| Seams::new(mesh, adjacency, lines, charts, held);
-    let (Some(start), Some(seams)) = (seams(Held::At(&from)), seams(Held::Whole(&whole))) else { return Ok(None) };
+    let (Some(start), Some(seams)) = (seams(Held::At(&from)), seams(Held::Whole(&whole))) else {
+        return Ok(Err(Vec::new()));
+    };
     let world: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
     let scale = (area(&whole) / world).sqrt();
     let maps = Maps::new(mesh, charts, &seams, scale);
-    let (Some(laplacian), Some(free)) = (maps.laplacian(), start.read(&from)) else { return Ok(None) };
+    let (Some(laplacian), Some(free)) = (maps.laplacian(), start.read(&from)) else {
+        return Ok(Err(Vec::new()));
+    };
     let maps_at = |seams: &Seams, free: &mut Vec<f64>| {
         let there = Maps::new(mesh, charts, seams, scale);
         untangle::settle(&there, &laplacian, free, HOLD, observer)
     };
-    let free = carry::carry(&maps, &laplacian, (&start, free), &maps_at, observer)?;
-    let Some(mut free) = free else { return Ok(None) };
+    let mut free = match carry::carry(&maps, &laplacian, (&start, free), &maps_at, observer)? {
+        Carried::There(free) => free,
+        Carried::Stuck(faces) => return Ok(Err(faces)),
+    };
     untangle::untangle(&maps, &laplacian, &mut free, (0.0, HOLD), observer)?;
-    Ok(Some(certified((mesh, adjacency), &maps, charts, free)))
+    Ok(Ok(certified((mesh, adjacency), &maps, charts, free)))
 }
 
 /// The same map with the charts that are not cut apart put next to each other, and one corner of each component at an
