@@ -3,12 +3,13 @@
 use super::content::{self, Content};
 use super::jobs::Outcome;
 use super::project::{NO_PROJECT, Project};
+use super::scan::Lasso;
 use super::{Table, export};
 use crate::protocol::state::StageName;
 use crate::protocol::{Message, Request, Why};
 use crate::web::hub::Client;
-use planish::observe::Observer;
-use planish::pipeline::{self, ScanParams};
+use planish::field::Spacing;
+use planish::pipeline;
 use planish::surface::Resolution;
 use std::path::Path;
 
@@ -19,12 +20,30 @@ impl<'env> Table<'_, '_, 'env> {
         match request {
             Request::Edit { edit, .. } => self.edit(client, id, edit),
             Request::Try { edit, .. } => self.try_out(client, id, edit),
-            Request::Fit { .. } => match self.fit() {
-                Ok(job) => self.wait_for(client, id, job),
-                Err(why) => self.refuse(client, id, why),
-            },
+            Request::Fit { coarse, .. } => {
+                self.desk.coarse = coarse;
+                match self.fit() {
+                    Ok(job) => self.wait_for(client, id, job),
+                    Err(why) => self.refuse(client, id, why),
+                }
+            }
+            Request::TryPatch { patch, control, tolerance, .. } => {
+                self.try_patch(client, id, patch, control, tolerance);
+            }
+            Request::Handles { curve, control, .. } => self.handles(client, id, &curve, control),
+            Request::Map { patch, .. } => self.map(client, id, patch),
+            Request::Relief { longest, .. } => self.relief(client, id, longest),
+            Request::Clean { .. } => self.clean(client, id),
+            Request::Lasso { view, line, outside, .. } => self.lasso(client, id, &Lasso { view, line, outside }),
+            Request::TakeIn { all, .. } => self.take_in(client, id, all),
+            Request::CloseHole { hole, .. } => self.close_hole(client, id, hole),
+            Request::Peer { file, .. } => self.peer(client, id, file),
+            Request::Branch { branch, .. } => self.branch(client, id, branch),
             Request::Setting { resolution, live, .. } => self.set(client, id, resolution, live),
-            Request::Mesh { close, resolution, .. } => self.mesh(client, id, close, resolution),
+            Request::Mesh { close, resolution, voxel, .. } => match cells(resolution, voxel) {
+                Ok(cells) => self.mesh(client, id, close, cells),
+                Err(why) => self.refuse(client, id, Why::of(why)),
+            },
             Request::Cancel { job, .. } => match self.desk.jobs.stop(job) {
                 true => self.done(client, id, String::new()),
                 false => self.refuse(client, id, Why::of("this job has ended already")),
@@ -89,29 +108,6 @@ impl<'env> Table<'_, '_, 'env> {
         self.tell_state();
     }
 
-    fn mesh(&mut self, client: &Client, id: u32, close: Option<bool>, resolution: Option<usize>) {
-        let Some(scan) = self.project.as_ref().and_then(|p| p.scan.clone()) else {
-            return self.refuse(client, id, Why::of("there is no scan here - hint: drop one on the page"));
-        };
-        if !self.project.as_ref().is_some_and(|p| p.model.network.curves.is_empty()) {
-            let why = "curves are drawn on the mesh that is there - hint: put the project away and open the scan again";
-            return self.refuse(client, id, Why::of(why));
-        }
-        let cells = resolution.map(planish::field::Spacing::Resolution);
-        let params = ScanParams { close, cells, ..ScanParams::default() };
-        let job = self.desk.jobs.start(self.scope, ("mesh", "Making a mesh of the scan"), move |watch| {
-            let observer: &dyn Observer = watch;
-            let made = pipeline::mesh_scan(&scan, &params, observer).map_err(|e| e.to_string()).and_then(|made| {
-                let suited = pipeline::params_for(&made);
-                let (mesh, _) =
-                    planish::mend::repair(&made.meshed.extracted.mesh, observer).map_err(|e| e.to_string())?;
-                Ok(Box::new((mesh, suited)))
-            });
-            Outcome::Meshed(made)
-        });
-        self.wait_for(client, id, job);
-    }
-
     /// Takes over what a job has made, and answers who asked for it.
     pub(super) fn ended(&mut self, job: u32, outcome: Outcome) -> Option<Content> {
         let (asked, stopped) = self.desk.jobs.end(job);
@@ -139,8 +135,28 @@ impl<'env> Table<'_, '_, 'env> {
             Outcome::Opened(Ok(project)) => (Answer::Done(project.notice.clone()), Some(Content::Project(project))),
             Outcome::Meshed(Ok(made)) => {
                 let (mesh, params) = *made;
-                let next = self.project.take().map(|project| Content::Project(Box::new(project.meshed(mesh, params))));
-                (done(), next)
+                (done(), self.meshed(mesh, params))
+            }
+            Outcome::Cleaned(Ok(known)) => {
+                self.desk.layers.new_points();
+                if let Some(project) = &mut *self.project {
+                    project.known = Some(known);
+                }
+                (done(), None)
+            }
+            Outcome::Parted(Ok((revision, shown))) => {
+                self.parted(revision, shown);
+                (done(), None)
+            }
+            Outcome::Looked(Ok(peer)) => {
+                self.desk.layers.new_peer();
+                if let Some(project) = &mut *self.project {
+                    project.peer = Some(peer);
+                }
+                (done(), None)
+            }
+            Outcome::Cleaned(Err(why)) | Outcome::Parted(Err(why)) | Outcome::Looked(Err(why)) => {
+                (Answer::Refused(Why::of(why)), None)
             }
             Outcome::Meshed(Err(why)) => {
                 self.desk.failed = Some((StageName::Mesh, why.clone()));
@@ -171,6 +187,15 @@ pub(super) enum Answer {
     Refused(Why),
     /// Told already, or later.
     Given,
+}
+
+/// Cells of a mesh to be made: by their number along the longest side, or by their edge.
+fn cells(resolution: Option<usize>, voxel: Option<f64>) -> Result<Option<Spacing>, &'static str> {
+    match (resolution, voxel) {
+        (_, Some(edge)) if !(edge > 0.0 && edge.is_finite()) => Err("the edge of a cell is a length above 0"),
+        (_, Some(edge)) => Ok(Some(Spacing::Voxel(edge))),
+        (resolution, None) => Ok(resolution.map(Spacing::Resolution)),
+    }
 }
 
 /// Fewest and most control points along a curve.
