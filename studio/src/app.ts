@@ -390,6 +390,17 @@ export class App implements Bench {
     });
     effect(() => view.hide(store.hidden.value));
     effect(() => {
+      // Another part may be of another size: it fills the view as this one does.
+      const { peer, project } = store.state.value;
+      const diagonal = store.shape.value === 'peer' && peer ? peer.diagonal : project?.diagonal;
+      if (!diagonal || view.rig.radius === diagonal / 2) return;
+      const ratio = diagonal / 2 / view.rig.radius;
+      view.rig.half *= ratio;
+      view.rig.target.multiplyScalar(ratio);
+      view.rig.radius = diagonal / 2;
+      view.moved();
+    });
+    effect(() => {
       store.geometry.value;
       const { seams, holes } = store.state.value;
       const all = view.curves;

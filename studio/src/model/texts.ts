@@ -251,7 +251,7 @@ export const TEXT = {
     outside: 'All else',
     mesh: 'Mesh of the points',
     voxel: 'Edge of a cell',
-    usual: 'as suits the points',
+    usual: 'automatic',
     close: 'Close holes',
     open: 'Leave holes open',
     again: 'Make it anew',
