@@ -1,5 +1,6 @@
 //! Answers to requests, and what becomes of jobs that end.
 
+use super::beside::{Peer, other};
 use super::content::{self, Content};
 use super::jobs::Outcome;
 use super::project::{NO_PROJECT, Project};
@@ -12,6 +13,7 @@ use planish::field::Spacing;
 use planish::pipeline;
 use planish::surface::Resolution;
 use std::path::Path;
+use std::sync::Arc;
 
 impl<'env> Table<'_, '_, 'env> {
     /// Answers a request; tells if something else comes onto the desk.
@@ -106,6 +108,25 @@ impl<'env> Table<'_, '_, 'env> {
             self.done(client, id, String::new());
         }
         self.tell_state();
+    }
+
+    /// Looks at another project, or at none.
+    pub(super) fn peer(&mut self, client: &Client, id: u32, file: Option<String>) {
+        let Some(project) = &mut *self.project else { return self.refuse(client, id, Why::of(NO_PROJECT)) };
+        let Some(file) = file else {
+            project.peer = None;
+            self.done(client, id, String::new());
+            return self.tell_state();
+        };
+        let folder = project.file.parent().unwrap_or(Path::new("")).to_owned();
+        if !content::is_project(Path::new(&file)) || folder.join(&file) == project.file {
+            return self.refuse(client, id, Why::of(format!("{file} is no other project of this folder")));
+        }
+        let job = self.desk.jobs.start_free("peer", &format!("Reading {file}"), move |_| {
+            let read = other(&folder, &file).map_err(|e| format!("{file}: {e}"));
+            Outcome::Looked(read.map(|(mesh, drawing)| Peer { file, mesh: Arc::new(mesh), drawing: Arc::new(drawing) }))
+        });
+        self.wait_for(client, id, job);
     }
 
     /// Takes over what a job has made, and answers who asked for it.

@@ -2,6 +2,7 @@
 //! is put away.
 
 use super::Table;
+use super::beside::Branch;
 use super::project::{NO_PROJECT, Project, Refused};
 use crate::protocol::{Why, state};
 use crate::web::hub::Client;
@@ -11,9 +12,6 @@ use planish::observe::Observer;
 
 /// Ways that are kept at most; the oldest goes.
 const BRANCHES: usize = 20;
-
-/// All edits of one way, from the beginning on.
-pub type Branch = Vec<HistoryEntry>;
 
 fn path(steps: &[Step]) -> impl Iterator<Item = HistoryEntry> {
     steps.iter().map(|s| s.entry.clone())

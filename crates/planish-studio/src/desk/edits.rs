@@ -3,8 +3,8 @@
 
 use super::Table;
 use super::answer::{Answer, with};
+use super::beside::other;
 use super::jobs::Outcome;
-use super::peer::other;
 use super::project::{Fit, NO_PROJECT, deviations};
 use crate::protocol::state::StageName;
 use crate::protocol::{Message, Why};

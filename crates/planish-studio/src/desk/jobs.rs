@@ -1,10 +1,8 @@
 //! Jobs: what takes long, each on a thread of its own with a copy of what it works on. They tell how far they are, and stop
 //! when they are told.
 
-use super::layers::Shown;
-use super::peer::Peer;
+use super::beside::{Known, Peer, Shown};
 use super::project::Fit;
-use super::scan::Known;
 use super::{Letter, Project};
 use crate::StudioError;
 use crate::protocol::state::Job;

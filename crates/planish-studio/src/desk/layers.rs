@@ -8,21 +8,10 @@ use crate::protocol::{Layer, Why};
 use crate::web::hub::{Client, Hub};
 use axum::body::Bytes;
 use planish::DVec3;
-use planish::relief::Relief;
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// A mesh of more triangles has one of fewer that is shown while the view moves.
 const MANY_TRIANGLES: usize = 150_000;
-
-/// Reliefs that are shown in the place of those of the model.
-#[derive(Clone)]
-pub struct Shown {
-    /// The longest waves in them, world units.
-    pub longest: f64,
-    /// One for each patch.
-    pub maps: Arc<Vec<Relief>>,
-}
 
 /// Geometry that was asked for.
 #[derive(Default)]

@@ -1,11 +1,12 @@
 //! The desk: one thread that owns the project. Requests of all pages come to it one after the other; what takes long runs as
 //! a job beside it, on a copy, and its result is taken over if it still fits.
 //!
-//! 1. what lies on it - `content`, `project`      2. answers - `answer`, `edits`, `scan`, `patch`, `branches`, `peer`, `export`
+//! 1. what lies on it - `content`, `project`, `beside`      2. answers - `answer`, `edits`, `scan`, `patch`, `branches`, `export`
 //! 3. jobs - `jobs`
 //! 4. nothing is lost - `journal`, `save`      5. what pages see - `state`, `layers`, `tessellate`
 
 mod answer;
+mod beside;
 mod branches;
 mod content;
 mod edits;
@@ -15,7 +16,6 @@ mod jobs;
 mod journal;
 mod layers;
 mod patch;
-mod peer;
 mod project;
 mod save;
 mod scan;

@@ -1,8 +1,8 @@
 //! What is asked of single patches and curves: sizes tried on one patch, control vertices of a curve, displacement maps.
 
 use super::Table;
+use super::beside::Shown;
 use super::jobs::Outcome;
-use super::layers::Shown;
 use super::project::NO_PROJECT;
 use crate::protocol::{Message, Why};
 use crate::web::hub::Client;

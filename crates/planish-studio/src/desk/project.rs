@@ -1,11 +1,8 @@
 //! A project on the desk: a scan or a mesh with its drawing, what was fitted to it, and its file.
 
-use super::branches::Branch;
+use super::beside::{Branch, Known, Peer, Shown, other};
 use super::journal::Journal;
-use super::layers::Shown;
-use super::peer::{Peer, other};
 use super::save::Saver;
-use super::scan::Known;
 use crate::protocol::state::Hole;
 use planish::DVec3;
 use planish::cloud::Cloud;

@@ -1,18 +1,19 @@
 //! From points to a mesh, by hand: what is known of the points, points left out, holes closed one by one.
 
 use super::Table;
+use super::beside::Known;
 use super::content::Content;
 use super::jobs::Outcome;
 use super::project::{NO_PROJECT, Project};
 use crate::protocol::{Why, state};
 use crate::web::hub::Client;
 use planish::DVec3;
-use planish::cloud::{self, CleanParams, Cloud, ProjectParams, Samples};
+use planish::cloud::{self, CleanParams, Cloud, ProjectParams};
 use planish::field::Spacing;
 use planish::mend;
 use planish::mesh::{Adjacency, FeatureTags, TriMesh, boundary_loops, next};
 use planish::observe::Observer;
-use planish::pipeline::{self, ScanParams, voxel_for};
+use planish::pipeline::{self, ScanParams};
 use std::sync::Arc;
 
 /// Holes that are told at most.
@@ -20,30 +21,6 @@ const HOLES: usize = 50;
 const NO_SCAN: &str = "there is no scan here - hint: drop one on the page";
 const HAS_CURVES: &str =
     "curves are drawn on the mesh that is there - hint: put the project away and open the scan again";
-
-/// What is known of the points of a scan.
-pub struct Known {
-    /// The samples, from which the mesh is made.
-    pub samples: Samples,
-    /// The points on their surface, in the order of the scan, with their attributes.
-    pub cloud: Cloud,
-    /// Points that are outliers.
-    pub outliers: usize,
-}
-
-impl Known {
-    /// What pages are told of it.
-    pub fn told(&self) -> state::Cleaned {
-        let Samples { noise, spacing, closed, .. } = &self.samples;
-        state::Cleaned {
-            noise: *noise,
-            spacing: *spacing,
-            outliers: self.outliers as u64,
-            parts: closed.len() as u32,
-            voxel: voxel_for(&self.samples),
-        }
-    }
-}
 
 fn know(scan: &Cloud, observer: &dyn Observer) -> Result<Known, String> {
     let params = CleanParams::default();
