@@ -7,6 +7,7 @@
 #   make fuzz    damaged files for ten minutes a format, 300 killed sessions, hostile shapes through every command
 #   make lint    formatting and clippy, warnings are errors
 #   make bench   time every stage: bench/runs/<date>-<machine>.json
+#   make bench-studio  figures of the studio: opening, dragging, fitting, memory
 #   make figures headline figures of parts and measured meshes: bench/runs/<date>-<machine>-figures.json
 #   make docs    reference of the libraries, and the pictures of the guide from the demo
 #
@@ -19,7 +20,7 @@ PYTHON  := .venv/bin/python
 DATA    := $(or $(PLANISH_DATA),../shared/data)
 
 .NOTPARALLEL:
-.PHONY: build demo studio wheel fuzz deny test test-rust test-readers test-studio test-python lint bench figures docs clean
+.PHONY: build demo studio wheel fuzz deny test test-rust test-readers test-studio test-python lint bench bench-studio figures docs clean
 .DELETE_ON_ERROR:
 
 build: .stamp/packages .stamp/page
@@ -48,6 +49,10 @@ test-studio: .stamp/packages .stamp/page .stamp/browser
 	cd studio && ../.ci/node npm test --silent
 	$(CARGO) test --release --locked --workspace --no-run --quiet
 	cd studio && ../.ci/node npm run --silent e2e
+
+# Figures of the studio in a browser that draws with the processor; nothing else should run beside them.
+bench-studio: build .stamp/browser
+	cd studio && ../.ci/node npm run --silent bench
 
 wheel: .stamp/packages .stamp/python .stamp/page
 	rm -rf out/wheels

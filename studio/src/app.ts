@@ -4,13 +4,21 @@ import { Vector3 } from 'three';
 import * as store from './model/store';
 import type { Answer, Body } from './protocol/client';
 import { Client, Refused } from './protocol/client';
-import type { Edit, Format, Layer, Resolution, Sample, Why } from './protocol/types';
+import type { Geometry } from './protocol/frames';
+import type { CurveName, Edit, Format, Layer, Resolution, Sample, Why } from './protocol/types';
+import { Carry } from './tools/carry';
 import { AddCorner, Erase, erase, Measure, Select, Split } from './tools/clicks';
 import { Cut } from './tools/cut';
+import { Handles } from './tools/handles';
+import { Hold } from './tools/hold';
+import { Lasso } from './tools/lasso';
 import { Pull } from './tools/pull';
 import { Stroke } from './tools/stroke';
 import type { Bench, Tool } from './tools/tool';
+import { blend } from './view/blend';
+import { tints } from './view/cloud';
 import { courses } from './view/lines';
+import { usualMost } from './view/scale';
 import type { View } from './view/view';
 
 const NOTHING = new Float32Array();
@@ -18,6 +26,15 @@ const CORNER = [0.93, 0.97, 0.97];
 const CORNER_HOT = [0.06, 0.72, 0.68];
 const CORNER_CHOSEN = [0.98, 0.62, 0.12];
 const FAULT = [0.86, 0.15, 0.15];
+const PIN = [0.75, 0.1, 0.36];
+const HOLE = [0.76, 0.25, 0.05];
+/** Seams from no angle to the largest, and those that are sharp on purpose. */
+const FLAT = [0.05, 0.46, 0.43];
+const BENT = [0.85, 0.12, 0.1];
+const SHARP = [0.45, 0.48, 0.52];
+
+type P3 = [number, number, number];
+type Lasso16 = Extract<Body, { type: 'lasso' }>['view'];
 
 export class App implements Bench {
   readonly client: Client;
@@ -58,10 +75,14 @@ export class App implements Bench {
       feature: new Stroke(this, 'feature'),
       cut: new Cut(this),
       drag: new Pull(this),
+      hold: new Hold(this),
+      handles: new Handles(this),
       corner: new AddCorner(this),
       split: new Split(this),
       erase: new Erase(this),
       measure: new Measure(this),
+      lasso: new Lasso(this),
+      carry: new Carry(this),
     };
     this.follow();
   }
@@ -151,9 +172,44 @@ export class App implements Bench {
 
   undo = () => this.edit({ edit: 'undo', count: 1 });
   redo = () => this.edit({ edit: 'redo', count: 1 });
+  async handles(curve: CurveName, control: number): Promise<Vector3[]> {
+    const answer = await this.ask({ type: 'handles', curve, control });
+    return answer?.type === 'handles' ? answer.points.map((p) => this.local(p)) : [];
+  }
+
+  lasso = (view: number[], line: [number, number][]) =>
+    this.ask({ type: 'lasso', view: view as Lasso16, line, outside: store.lassoOutside.value });
+  takeIn = (all: boolean) => this.ask({ type: 'take_in', all });
+  clean = () => this.ask({ type: 'clean' });
+  closeHole = (hole: number) => this.ask({ type: 'close_hole', hole });
+  branch = (branch: number) => this.ask({ type: 'branch', branch });
+  relief = (longest: number | null) => this.ask(longest === null ? { type: 'relief' } : { type: 'relief', longest });
+
+  /** Looks at another project of the folder, or at none. */
+  async peer(file: string | null): Promise<void> {
+    const answer = await this.ask(file === null ? { type: 'peer' } : { type: 'peer', file });
+    if (answer && file !== null) {
+      this.choose('carry');
+      store.landmarks.value = [];
+      store.shape.value = 'peer';
+      store.shading.value = 'clay';
+    }
+  }
+
+  /** Carries the network of the other project over. */
+  async carry(): Promise<void> {
+    const from = store.state.value.peer?.file;
+    const landmarks = store.landmarks.value.flatMap((l) => (l.own ? [[l.other, l.own] as [P3, P3]] : []));
+    if (!from || !(await this.edit({ edit: 'carry', from, landmarks }))) return;
+    this.choose('select');
+    await this.peer(null);
+  }
+
   fit = () => this.ask({ type: 'fit' });
+  fitCoarse = () => this.ask({ type: 'fit', coarse: true });
   complete = (patches: number, sharp: number) => this.edit({ edit: 'complete', patches, sharp_angle_deg: sharp });
-  mesh = (close?: boolean) => this.ask(close === undefined ? { type: 'mesh' } : { type: 'mesh', close });
+  mesh = (close?: boolean, voxel?: number) =>
+    this.ask({ type: 'mesh', ...(close === undefined ? {} : { close }), ...(voxel === undefined ? {} : { voxel }) });
   sample = (sample: Sample) => this.ask({ type: 'sample', sample });
   openFile = (file: string) => this.ask({ type: 'open', file });
   close = () => this.ask({ type: 'close' });
@@ -194,10 +250,38 @@ export class App implements Bench {
     }
   }
 
+  /** The handles of a curve, with their tool. */
+  handlesOf(picked: store.Picked): void {
+    this.choose('handles');
+    store.selected.value = picked;
+    (this.tools.handles as Handles).of(picked);
+  }
+
+  /** A place of a patch that is no place of its sides: the node nearest to the middle of them all. */
+  insideOf(patch: number): [number, number, number] | null {
+    const layers = store.geometry.value;
+    const shown = layers.get('displaced') ?? layers.get('surfaces');
+    const [position, of] = [shown?.floats.get('position'), shown?.floats.get('patch')];
+    if (!position || !of) return null;
+    const nodes: Vector3[] = [];
+    of.forEach((p, k) => {
+      if (Math.round(p) === patch) nodes.push(new Vector3().fromArray(position, 3 * k));
+    });
+    const middle = nodes.reduce((sum, p) => sum.add(p), new Vector3()).divideScalar(Math.max(1, nodes.length));
+    nodes.sort((a, b) => a.distanceToSquared(middle) - b.distanceToSquared(middle));
+    return nodes[0] ? this.world(nodes[0]) : null;
+  }
+
   /** Deletes what is selected. */
   remove(): void {
     const picked = store.selected.value;
     if (picked && picked.kind !== 'patch') void this.edit(erase(picked));
+  }
+
+  /** Shows all patches again. */
+  showAll(): void {
+    store.hidden.value = new Set();
+    store.isolated.value = null;
   }
 
   // ---- the view follows the state
@@ -253,6 +337,7 @@ export class App implements Bench {
       coarse = layers.get('coarse');
     });
     let points: unknown = null;
+    let tinted = '';
     let shown = '';
     let surface: unknown = null;
     effect(() => {
@@ -260,14 +345,21 @@ export class App implements Bench {
       const shading = store.shading.value;
       const layers = store.geometry.value;
       const cloud = shape === 'points' ? layers.get('points') : undefined;
-      if (cloud !== points) view.showPoints(cloud);
+      const how = store.pointColor.value;
+      const axis = store.up.value === 'z' ? 2 : 1;
+      if (cloud !== points || tinted !== `${how} ${axis}`) {
+        view.showPoints(cloud, cloud ? tints(cloud, how, axis) : NOTHING);
+      }
       points = cloud;
-      const now = shape === 'points' ? undefined : layers.get(shape);
+      tinted = `${how} ${axis}`;
+      const plain = shape === 'points' ? undefined : layers.get(shape);
+      const { value: strength } = store.strength;
+      const now = shape === 'displaced' && plain ? this.blended(layers.get('surfaces'), plain, strength) : plain;
       const value = shading === 'deviation' || shading === 'curvature' ? shading : null;
       if (now !== surface || `${value}` !== shown) view.showSurface(now, value);
       surface = now;
       shown = `${value}`;
-      const most = value ? usualMost(now?.floats.get(value)) : 1;
+      const most = value ? usualMost(now?.floats.get(value)) * store.scaleShare.value : 1;
       store.scaleFound.value = most;
       view.shade(shading, most);
     });
@@ -295,6 +387,45 @@ export class App implements Bench {
         const { lines, which } = all(layer);
         view.setLine(layer, on ? piecesOf(lines, which) : NOTHING);
       }
+    });
+    effect(() => view.hide(store.hidden.value));
+    effect(() => {
+      // Another part may be of another size: it fills the view as this one does.
+      const { peer, project } = store.state.value;
+      const diagonal = store.shape.value === 'peer' && peer ? peer.diagonal : project?.diagonal;
+      if (!diagonal || view.rig.radius === diagonal / 2) return;
+      const ratio = diagonal / 2 / view.rig.radius;
+      view.rig.half *= ratio;
+      view.rig.target.multiplyScalar(ratio);
+      view.rig.radius = diagonal / 2;
+      view.moved();
+    });
+    effect(() => {
+      store.geometry.value;
+      const { seams, holes } = store.state.value;
+      const all = view.curves;
+      const smooth = seams.filter((s) => !s.sharp);
+      const most = Math.max(1e-6, ...smooth.map((s) => s.angle_deg));
+      store.largestAngle.value = smooth.length > 0 ? most : 0;
+      const [positions, colors]: number[][] = [[], []];
+      for (const seam of store.show.value.angles ? seams : []) {
+        if (seam.curve + 1 >= all.offset.length) continue;
+        const t = Math.min(1, seam.angle_deg / most);
+        const color = seam.sharp ? SHARP : FLAT.map((x, k) => x + t * (BENT[k]! - x));
+        const own = view.piecesOf('curve', [seam.curve]);
+        positions!.push(...own);
+        for (let k = 0; k < own.length; k += 3) colors!.push(...color);
+      }
+      view.setLine('angles', new Float32Array(positions), new Float32Array(colors));
+      const kept = store.holds.value;
+      const held = kept?.stretches.flatMap((s) => [...view.stretch(kept.picked, s.from, s.to)]) ?? [];
+      view.setLine('held', new Float32Array(held));
+      const pins = kept?.pins.map((p) => view.placeAt(kept.picked, p)) ?? [];
+      const at = holes.map((h) => this.local(h.place).toArray());
+      view.setPins(
+        new Float32Array([...pins, ...at].flat()),
+        new Float32Array([...pins.map(() => PIN), ...at.map(() => HOLE)].flat()),
+      );
     });
     effect(() => {
       const [hovered, selected] = [store.hovered.value, store.selected.value];
@@ -325,6 +456,15 @@ export class App implements Bench {
     effect(() => view.setBackground(store.dark.value ? '#171b21' : '#eef1f3'));
   }
 
+  private lastBlend: { key: string; geometry: Geometry } | null = null;
+
+  /** The displaced surfaces at a strength, made once. */
+  private blended(smooth: Geometry | undefined, displaced: Geometry, strength: number): Geometry {
+    const key = `${smooth?.name} ${displaced.name} ${strength}`;
+    if (this.lastBlend?.key !== key) this.lastBlend = { key, geometry: blend(smooth, displaced, strength) };
+    return this.lastBlend.geometry;
+  }
+
   private corners(): void {
     const { corners } = store.state.value;
     const is = (picked: store.Picked | null, k: number) => picked?.kind === 'corner' && picked.index === k;
@@ -348,14 +488,4 @@ function piecesOf(lines: { position: Float32Array; offset: Uint32Array }, which:
     }
   }
   return out;
-}
-
-/** The size that 98 of 100 values do not pass: single ones would make all others look alike. */
-export function usualMost(values: Float32Array | undefined): number {
-  if (!values || values.length === 0) return 1;
-  const step = Math.max(1, Math.floor(values.length / 20_000));
-  const sizes: number[] = [];
-  for (let k = 0; k < values.length; k += step) sizes.push(Math.abs(values[k]!));
-  sizes.sort((a, b) => a - b);
-  return sizes[Math.floor(0.98 * (sizes.length - 1))] || sizes[sizes.length - 1] || 1;
 }

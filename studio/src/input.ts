@@ -137,8 +137,9 @@ function command(app: App, e: KeyboardEvent, target: HTMLElement): boolean {
     rig.orbit(dx, dy, store.orbit.value);
     app.view.moved();
   };
-  if (tool) app.choose(tool.id);
-  else if (e.key === 'Escape') app.choose('select');
+  if (tool) {
+    if (store.canUse(tool.id, store.state.value)) app.choose(tool.id);
+  } else if (e.key === 'Escape') app.choose('select');
   else if (e.key === 'Delete') app.remove();
   else if (e.key === 'Home') app.home();
   else if (/^[1-6]$/.test(e.key)) {

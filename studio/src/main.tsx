@@ -5,31 +5,28 @@ import { useEffect, useRef } from 'preact/hooks';
 import { Vector3 } from 'three';
 import { App } from './app';
 import { listen } from './input';
-import { length } from './model/format';
+import { digits, length } from './model/format';
 import * as store from './model/store';
+import { TABS, TEXT } from './model/texts';
 import { StatusBar, ToolBar, TopBar } from './panels/bars';
 import { EditPanel } from './panels/edit';
 import { HistoryPanel, ViewPanel } from './panels/look';
 import { Connection, Keys, Palette, Toasts } from './panels/overlays';
+import { ReliefPanel } from './panels/relief';
 import { Start } from './panels/start';
 import { SurfacePanel } from './panels/surface';
 import { View } from './view/view';
 import './style.css';
 import './panels.css';
 
-const TABS: [store.Tab, string][] = [
-  ['edit', 'Draw'],
-  ['surface', 'Surface'],
-  ['view', 'View'],
-  ['history', 'History'],
-];
+const TAB_LIST = Object.entries(TABS) as [store.Tab, string][];
 
 function Side({ app }: { app: App }) {
   const tab = store.tab.value;
   return (
-    <aside class="side" aria-label="Panels">
+    <aside class="side" aria-label={TEXT.panels}>
       <div class="tabs" role="tablist">
-        {TABS.map(([id, name]) => (
+        {TAB_LIST.map(([id, name]) => (
           <button
             type="button"
             key={id}
@@ -50,6 +47,7 @@ function Side({ app }: { app: App }) {
       <div class="panel" role="tabpanel" id="panel" aria-labelledby={`tab-${tab}`} tabIndex={0}>
         {tab === 'edit' && <EditPanel app={app} />}
         {tab === 'surface' && <SurfacePanel app={app} />}
+        {tab === 'relief' && <ReliefPanel app={app} />}
         {tab === 'view' && <ViewPanel app={app} />}
         {tab === 'history' && <HistoryPanel app={app} />}
       </div>
@@ -70,7 +68,22 @@ function Legend() {
       <span>0</span>
       <i class="low" aria-hidden="true" />
       <span>−{length(most, unit)}</span>
-      <strong>{how === 'deviation' ? 'Mesh above the surface' : 'Mean curvature'}</strong>
+      <strong>{how === 'deviation' ? TEXT.legend.deviation : TEXT.legend.curvature}</strong>
+    </div>
+  );
+}
+
+/** Colours of the angles of seams. */
+function Angles() {
+  if (!store.show.value.angles || store.state.value.seams.length === 0) return null;
+  return (
+    <div class="angles">
+      <strong>{TEXT.legend.angles}</strong>
+      <span>0°</span>
+      <i aria-hidden="true" />
+      <span>{digits(store.largestAngle.value)}°</span>
+      <i class="sharp" aria-hidden="true" />
+      <span>{TEXT.legend.sharp}</span>
     </div>
   );
 }
@@ -105,8 +118,9 @@ function Page() {
       {bound && <TopBar app={bound} />}
       {bound && project && <ToolBar app={bound} />}
       <div class="stage-view">
-        <canvas ref={canvas} tabIndex={0} aria-label="View of the part" />
+        <canvas ref={canvas} tabIndex={0} aria-label={TEXT.view} />
         {project && <Legend />}
+        {project && <Angles />}
       </div>
       {bound && project && <Side app={bound} />}
       {bound && project && <StatusBar app={bound} />}

@@ -24,14 +24,37 @@ export const EMPTY: State = {
   seams: [],
   warnings: [],
   jobs: [],
+  cleaned: null,
+  left_out: 0,
+  holes: [],
+  branches: [],
+  longest: null,
+  peer: null,
 };
 
-export type ToolId = 'select' | 'paint' | 'feature' | 'cut' | 'drag' | 'corner' | 'split' | 'erase' | 'measure';
+export type ToolId =
+  | 'select'
+  | 'paint'
+  | 'feature'
+  | 'cut'
+  | 'drag'
+  | 'hold'
+  | 'handles'
+  | 'corner'
+  | 'split'
+  | 'erase'
+  | 'measure'
+  | 'lasso'
+  | 'carry';
 export type PaintMode = 'straight' | 'geodesic' | 'magnetic';
 export type Shading = 'clay' | 'patches' | 'deviation' | 'curvature' | 'zebra';
 export type Picked = { kind: 'corner' | 'curve' | 'patch' | 'feature'; index: number };
-export type Shape = 'mesh' | 'surfaces' | 'displaced' | 'points';
-export type Tab = 'edit' | 'surface' | 'view' | 'history';
+export type Shape = 'mesh' | 'surfaces' | 'displaced' | 'points' | 'peer';
+export type Tab = 'edit' | 'surface' | 'relief' | 'view' | 'history';
+/** What colours the points of a scan. */
+export type PointColor = 'height' | 'color' | 'normal' | 'noise' | 'confidence' | 'segment' | 'outlier';
+/** What a curve is held by when it relaxes or is dragged. */
+export type Holds = { picked: Picked; pins: number[]; stretches: { from: number; to: number; curvature: number }[] };
 
 export const state = signal<State>(EMPTY);
 export const jobs = signal<Job[]>([]);
@@ -50,7 +73,15 @@ export const cursor = signal<[number, number, number] | null>(null);
 
 export const shape = signal<Shape>('mesh');
 export const shading = signal<Shading>('clay');
-export const show = signal({ curves: true, corners: true, isolines: false, nets: false, faults: true });
+export const show = signal({ curves: true, corners: true, isolines: false, nets: false, angles: false });
+export const pointColor = signal<PointColor>('height');
+export const holds = signal<Holds | null>(null);
+/** How stiff the brush makes a stretch, against what is around it. */
+export const stiffness = signal(10);
+/** Control vertices of the tool with handles. */
+export const handleCount = signal(8);
+/** Pairs of places, on the other project and on this one. */
+export const landmarks = signal<{ other: [number, number, number]; own: [number, number, number] | null }[]>([]);
 export const section = signal<{ on: boolean; axis: 0 | 1 | 2; at: number; flip: boolean }>({
   on: false,
   axis: 0,
@@ -58,8 +89,18 @@ export const section = signal<{ on: boolean; axis: 0 | 1 | 2; at: number; flip: 
   flip: false,
 });
 export const isolated = signal<number | null>(null);
+/** Patches that are not shown. */
+export const hidden = signal<ReadonlySet<number>>(new Set());
+/** How strong relief is shown: 1 as it is. */
+export const strength = signal(1);
+/** End of the colour scale as chosen, as a share of what is found. */
+export const scaleShare = signal(1);
 export const parallel = signal(false);
 export const orbit = signal<'turntable' | 'free'>('turntable');
+/** True if the lasso leaves out what lies without it. */
+export const lassoOutside = signal(false);
+/** Largest angle of a smooth seam, degrees. */
+export const largestAngle = signal(0);
 export const up = signal<'y' | 'z'>('z');
 /** Largest deviation of what is shown, and of the colour scale, world units. */
 export const scaleFound = signal(0);
@@ -90,7 +131,17 @@ export function takeState(next: State): void {
   const renumbered = before.curves.length !== next.curves.length || before.patches.length !== next.patches.length;
   if (renumbered || isGone(selected.value)) selected.value = null;
   if (renumbered || isGone(hovered.value)) hovered.value = null;
-  if (renumbered) isolated.value = null;
+  if (renumbered) {
+    isolated.value = null;
+    hidden.value = new Set();
+    holds.value = null;
+  }
+  if (next.peer === null) {
+    landmarks.value = [];
+    if (shape.value === 'peer') shape.value = 'mesh';
+  }
+  if (!next.cleaned && pointColor.value !== 'color') pointColor.value = 'height';
+  if (!canUse(tool.value, next)) tool.value = 'select';
   if (next.layers.points && !next.layers.mesh) shape.value = 'points';
   else if (!before.layers.mesh && shape.value === 'points') shape.value = 'mesh';
   if (!next.layers.surfaces && (shape.value === 'surfaces' || shape.value === 'displaced')) shape.value = 'mesh';
@@ -99,13 +150,32 @@ export function takeState(next: State): void {
   if (kept.length !== geometry.value.size) geometry.value = new Map(kept);
 }
 
+/** Whether a tool has something to work on. */
+export function canUse(id: ToolId, { layers, patches, curves, files, peer }: State): boolean {
+  switch (id) {
+    case 'select':
+      return true;
+    case 'lasso':
+      return Boolean(layers.points) && !layers.mesh;
+    case 'feature':
+      return patches.length > 0;
+    case 'hold':
+    case 'handles':
+      return curves.length > 0;
+    case 'carry':
+      return Boolean(layers.mesh) && (files.length > 0 || Boolean(peer));
+    default:
+      return Boolean(layers.mesh);
+  }
+}
+
 /** Whether a shading is of use on a shape. */
 export function canShade(how: Shading, of: Shape): boolean {
   switch (how) {
     case 'clay':
       return true;
     case 'zebra':
-      return of !== 'points';
+      return of !== 'points' && of !== 'peer';
     case 'curvature':
       return of === 'mesh' || of === 'surfaces';
     case 'patches':
@@ -135,7 +205,12 @@ export const wanted = computed<Layer[]>(() => {
   add('curves');
   add('features');
   if (shape.value === 'surfaces') add('surfaces');
-  if (shape.value === 'displaced') add('displaced');
+  if (shape.value === 'displaced') {
+    add('displaced');
+    // Other strengths lie between the two.
+    if (strength.value !== 1) add('surfaces');
+  }
+  if (shape.value === 'peer') add('peer');
   if (show.value.isolines) add('isolines');
   if (show.value.nets) add('nets');
   return want;

@@ -3,7 +3,7 @@ import type { App } from '../app';
 import { count, digits } from '../model/format';
 import { next } from '../model/next';
 import * as store from '../model/store';
-import { STAGES, STANDING, TOOLS } from '../model/texts';
+import { STAGES, STANDING, TEXT, TOOLS } from '../model/texts';
 import { Icon } from './icons';
 
 export function TopBar({ app }: { app: App }) {
@@ -12,17 +12,17 @@ export function TopBar({ app }: { app: App }) {
   const saved = !project
     ? ''
     : project.unsaved
-      ? `Not saved: ${project.unsaved}`
+      ? TEXT.top.unsaved(project.unsaved)
       : project.triangles === 0
-        ? 'Saved once there is a mesh'
+        ? TEXT.top.later
         : project.saved
-          ? 'Saved'
-          : 'Saving ...';
+          ? TEXT.top.saved
+          : TEXT.top.saving;
   return (
     <header class="top">
       <div class="brand">
         <span class="mark" aria-hidden="true" />
-        planish
+        {TEXT.brand}
       </div>
       {project && (
         <div class="project">
@@ -41,8 +41,8 @@ export function TopBar({ app }: { app: App }) {
               class="flat"
               onClick={app.undo}
               disabled={state.done.length === 0}
-              title="Undo (Ctrl Z)"
-              aria-label="Undo"
+              title={TEXT.top.undoTip}
+              aria-label={TEXT.top.undo}
             >
               <Icon name="undo" />
             </button>
@@ -51,8 +51,8 @@ export function TopBar({ app }: { app: App }) {
               class="flat"
               onClick={app.redo}
               disabled={state.undone.length === 0}
-              title="Redo (Ctrl Shift Z)"
-              aria-label="Redo"
+              title={TEXT.top.redoTip}
+              aria-label={TEXT.top.redo}
             >
               <Icon name="redo" />
             </button>
@@ -60,8 +60,8 @@ export function TopBar({ app }: { app: App }) {
               type="button"
               class="flat"
               onClick={() => app.picture()}
-              title="Save a picture"
-              aria-label="Save a picture"
+              title={TEXT.top.picture}
+              aria-label={TEXT.top.picture}
             >
               <Icon name="camera" />
             </button>
@@ -73,8 +73,8 @@ export function TopBar({ app }: { app: App }) {
           onClick={() => {
             store.overlay.value = 'palette';
           }}
-          title="All commands (Ctrl K)"
-          aria-label="All commands"
+          title={TEXT.top.commandsTip}
+          aria-label={TEXT.top.commands}
         >
           <Icon name="command" />
         </button>
@@ -84,8 +84,8 @@ export function TopBar({ app }: { app: App }) {
           onClick={() => {
             store.dark.value = !store.dark.value;
           }}
-          title={store.dark.value ? 'Light' : 'Dark'}
-          aria-label={store.dark.value ? 'Light colours' : 'Dark colours'}
+          title={store.dark.value ? TEXT.top.light : TEXT.top.dark}
+          aria-label={store.dark.value ? TEXT.top.lightColours : TEXT.top.darkColours}
         >
           <Icon name={store.dark.value ? 'sun' : 'moon'} />
         </button>
@@ -95,8 +95,8 @@ export function TopBar({ app }: { app: App }) {
           onClick={() => {
             store.overlay.value = 'keys';
           }}
-          title="Keys (?)"
-          aria-label="Keys"
+          title={TEXT.top.keysTip}
+          aria-label={TEXT.top.keys}
         >
           <Icon name="help" />
         </button>
@@ -105,8 +105,8 @@ export function TopBar({ app }: { app: App }) {
             type="button"
             class="flat"
             onClick={() => void app.close()}
-            title="Put the project away"
-            aria-label="Put the project away"
+            title={TEXT.top.away}
+            aria-label={TEXT.top.away}
           >
             <Icon name="close" />
           </button>
@@ -127,7 +127,7 @@ function look(name: string): void {
 function Strip() {
   const { stages } = store.state.value;
   return (
-    <nav class="strip" aria-label="Stages">
+    <nav class="strip" aria-label={TEXT.top.stages}>
       {stages
         .filter((s) => s.name !== 'scan' || s.is !== 'empty')
         .map((s) => (
@@ -148,15 +148,10 @@ function Strip() {
 }
 
 export function ToolBar({ app }: { app: App }) {
-  const { layers } = store.state.value;
-  const hasPatches = store.state.value.patches.length > 0;
-  const offered = TOOLS.filter((t) => {
-    if (t.id === 'select') return true;
-    if (!layers.mesh) return false;
-    return t.id === 'feature' ? hasPatches : true;
-  });
+  const state = store.state.value;
+  const offered = TOOLS.filter((t) => store.canUse(t.id, state));
   return (
-    <div class="tools" role="toolbar" aria-label="Tools" aria-orientation="vertical">
+    <div class="tools" role="toolbar" aria-label={TEXT.top.tools} aria-orientation="vertical">
       {offered.map((t) => (
         <button
           type="button"
@@ -174,8 +169,8 @@ export function ToolBar({ app }: { app: App }) {
       <button
         type="button"
         class="tool"
-        aria-label="Fit the view"
-        data-tip="Fit the view  Home"
+        aria-label={TEXT.top.fit}
+        data-tip={TEXT.top.fitTip}
         onClick={() => app.home()}
       >
         <Icon name="home" />
@@ -201,7 +196,7 @@ export function StatusBar({ app }: { app: App }) {
           <progress max={1} value={job.fraction} aria-label={job.title} />
           <span class="number">{Math.round(100 * job.fraction)} %</span>
           <button type="button" class="small" onClick={() => void app.cancel(job.job)}>
-            Stop
+            {TEXT.status.stop}
           </button>
         </span>
       )}
@@ -213,8 +208,8 @@ export function StatusBar({ app }: { app: App }) {
       {state.project && (
         <span class="number faint">
           {state.project.triangles > 0
-            ? `${count(state.project.triangles)} triangles`
-            : `${count(state.project.points)} points`}
+            ? TEXT.status.triangles(count(state.project.triangles))
+            : TEXT.status.points(count(state.project.points))}
         </span>
       )}
     </footer>
@@ -231,7 +226,7 @@ export function NextStep({ app, patches }: { app: App; patches: number }) {
     if (step.step === 'export') void app.export('step');
   };
   return (
-    <section class="next" aria-label="Next step">
+    <section class="next" aria-label={TEXT.next.label}>
       <p>{step.text}</p>
       {step.action && (
         <button type="button" class="primary" onClick={go}>

@@ -1,11 +1,16 @@
 // The panel of the drawing: what is selected, the network, what is left to put right.
 import { signal } from '@preact/signals';
 import type { App } from '../app';
-import { length, plural } from '../model/format';
+import { digits } from '../model/format';
 import * as store from '../model/store';
+import { PAINT_MODES, TEXT } from '../model/texts';
 import type { Fault } from '../protocol/types';
+import type { Handles } from '../tools/handles';
 import { NextStep } from './bars';
-import { Choice, Fact, Section, Slider } from './parts';
+import { CarrySection } from './carry';
+import { Choice, Section, Slider } from './parts';
+import { HolesSection, MeshSection, PointsSection } from './scan';
+import { Selection } from './selection';
 
 const patches = signal(24);
 const sharp = signal(40);
@@ -13,64 +18,45 @@ const sharp = signal(40);
 export function EditPanel({ app }: { app: App }) {
   const state = store.state.value;
   const hasMesh = Boolean(state.layers.mesh);
+  const hasPoints = Boolean(state.layers.points);
   return (
     <>
       <NextStep app={app} patches={patches.value} />
-      {!hasMesh && <ScanSection app={app} />}
-      <ToolOptions />
+      {!hasMesh && <PointsSection app={app} />}
+      {hasPoints && state.curves.length === 0 && <MeshSection app={app} />}
+      <ToolOptions app={app} />
+      <CarrySection app={app} />
       <Selection app={app} />
+      {hasMesh && <HolesSection app={app} />}
       {hasMesh && <Faults app={app} />}
       {hasMesh && <Network app={app} />}
     </>
   );
 }
 
-function ScanSection({ app }: { app: App }) {
-  return (
-    <Section title="Mesh of the scan">
-      <p class="faint">Cells, noise and outliers are told from the points. Holes can be closed or stay open.</p>
-      <div class="row">
-        <button type="button" onClick={() => void app.mesh(true)}>
-          Close holes
-        </button>
-        <button type="button" onClick={() => void app.mesh(false)}>
-          Leave holes open
-        </button>
-      </div>
-    </Section>
-  );
-}
-
-function ToolOptions() {
+function ToolOptions({ app }: { app: App }) {
   const tool = store.tool.value;
   if (tool === 'paint' || tool === 'feature') {
+    const modes = Object.keys(PAINT_MODES) as store.PaintMode[];
     return (
-      <Section title="Between the picks">
+      <Section title={TEXT.paint.title}>
         <Choice
-          label="Way between the picks"
+          label={TEXT.paint.label}
           value={store.paintMode.value}
-          options={[
-            ['straight', 'Straight'],
-            ['geodesic', 'Shortest'],
-            ['magnetic', 'Magnetic'],
-          ]}
+          options={modes.map((m) => [m, PAINT_MODES[m].name] as const)}
           onPick={(value) => {
             store.paintMode.value = value;
           }}
         />
-        <p class="faint">
-          {store.paintMode.value === 'straight' && 'As near to a straight line as the surface allows.'}
-          {store.paintMode.value === 'geodesic' && 'The shortest way over the surface.'}
-          {store.paintMode.value === 'magnetic' && 'Drawn to ridges and valleys.'}
-        </p>
+        <p class="faint">{PAINT_MODES[store.paintMode.value].note}</p>
       </Section>
     );
   }
   if (tool === 'drag') {
     return (
-      <Section title="What follows">
+      <Section title={TEXT.drag.title}>
         <Slider
-          label="Share of the curve"
+          label={TEXT.drag.label}
           value={store.dragWidth.value}
           min={0.1}
           max={1}
@@ -83,146 +69,67 @@ function ToolOptions() {
       </Section>
     );
   }
+  if (tool === 'hold') return <HoldOptions />;
+  if (tool === 'handles') {
+    return (
+      <Section title={TEXT.handles.title}>
+        <Slider
+          label={TEXT.handles.count}
+          value={store.handleCount.value}
+          min={4}
+          max={40}
+          step={1}
+          show={String}
+          onInput={(v) => {
+            store.handleCount.value = v;
+          }}
+          onChange={() => void (app.tools.handles as Handles).ask()}
+        />
+      </Section>
+    );
+  }
   return null;
 }
 
-function Selection({ app }: { app: App }) {
-  const picked = store.selected.value;
-  const state = store.state.value;
-  if (!picked) return null;
-  const units = state.project?.units ?? '';
-  if (picked.kind === 'corner') {
-    const curves = state.curves.flatMap((c) => c.ends.filter((e) => e === picked.index)).length;
-    return (
-      <Section title={`Corner ${picked.index}`}>
-        <dl>
-          <Fact name="Curves" value={String(curves)} />
-        </dl>
-        {(curves === 0 || curves === 2) && (
-          <button type="button" onClick={() => app.remove()}>
-            {curves === 2 ? 'Join its curves' : 'Delete'}
-          </button>
-        )}
-      </Section>
-    );
-  }
-  if (picked.kind === 'feature') {
-    return (
-      <Section title={`Feature curve ${picked.index}`}>
-        <p class="faint">The grid of its patch follows it.</p>
-        <div class="row">
-          <button type="button" onClick={() => void app.edit({ edit: 'relax', curve: { feature: picked.index } })}>
-            Relax
-          </button>
-          <button type="button" onClick={() => app.remove()}>
-            Delete
-          </button>
-        </div>
-      </Section>
-    );
-  }
-  if (picked.kind === 'patch') return <PatchSelection app={app} index={picked.index} units={units} />;
-  return <CurveSelection app={app} index={picked.index} units={units} />;
-}
+/** Stiffness of the brush: steps of about three. */
+const STIFF = [0.1, 0.3, 1, 3, 10, 30, 100];
 
-function CurveSelection({ app, index, units }: { app: App; index: number; units: string }) {
-  const state = store.state.value;
-  const curve = state.curves[index];
-  if (!curve) return null;
-  const seam = state.seams.find((s) => s.curve === index);
+function HoldOptions() {
+  const holds = store.holds.value;
+  const words = TEXT.hold;
   return (
-    <Section title={`Curve ${index}`}>
-      <dl>
-        <Fact name="Length" value={length(curve.length, units)} />
-        {curve.control != null && <Fact name="Control points" value={String(curve.control)} />}
-        {seam && <Fact name="Largest angle of the seam" value={`${seam.angle_deg.toFixed(2)}°`} />}
-      </dl>
-      {curve.kind !== 'boundary' && (
-        <Choice
-          label="Seam along the curve"
-          value={curve.kind}
-          options={[
-            ['smooth', 'Smooth seam'],
-            ['feature', 'Sharp seam'],
-          ]}
-          onPick={(kind) =>
-            void app.edit({ edit: 'continuity', curves: [index], seam: kind === 'feature' ? 'sharp' : 'smooth' })
-          }
-        />
-      )}
-      <div class="row">
-        {curve.kind === 'smooth' && (
-          <button type="button" onClick={() => void app.edit({ edit: 'relax', curve: index })}>
-            Relax
-          </button>
-        )}
-        {curve.kind === 'smooth' && (
-          <button type="button" onClick={() => void app.edit({ edit: 'spline', curve: index, control: 8 })}>
-            Smooth as a spline
-          </button>
-        )}
-        <button type="button" onClick={() => void app.edit({ edit: 'split_curve', curve: index, at: 0.5 })}>
-          Divide
-        </button>
-        <button type="button" onClick={() => app.remove()}>
-          Delete
-        </button>
-      </div>
-    </Section>
-  );
-}
-
-function PatchSelection({ app, index, units }: { app: App; index: number; units: string }) {
-  const state = store.state.value;
-  const patch = state.patches[index];
-  if (!patch) return null;
-  const alone = store.isolated.value === index;
-  const control = patch.fitted?.control;
-  const set = (along: 0 | 1, value: number) => {
-    // Curves on opposite sides share their number: only those of this patch are named, the others keep theirs.
-    const list = state.curves.map((c) => c.control ?? 8);
-    for (const k of [along, along + 2]) list[patch.curves[k]!] = value;
-    void app.setting({ per_curve: list }, state.live);
-  };
-  return (
-    <Section title={`Patch ${index}`}>
-      {patch.fitted && (
-        <dl>
-          <Fact name="Distance, RMS" value={length(patch.fitted.rms, units)} />
-          <Fact name="Distance, largest" value={length(patch.fitted.max, units)} />
-        </dl>
-      )}
-      {control && (
-        <div class="row numbers">
-          {([0, 1] as const).map((along) => (
-            <label key={along}>
-              Control points, {along === 0 ? 'u' : 'v'}
-              <input
-                type="number"
-                min={4}
-                max={128}
-                value={control[along]}
-                onChange={(e) => set(along, Math.min(128, Math.max(4, Math.round(Number(e.currentTarget.value) || 4))))}
-              />
-            </label>
-          ))}
-        </div>
-      )}
-      <button
-        type="button"
-        aria-pressed={alone}
-        onClick={() => {
-          store.isolated.value = alone ? null : index;
+    <Section title={words.title}>
+      <Slider
+        label={words.brush}
+        value={STIFF.indexOf(store.stiffness.value)}
+        min={0}
+        max={STIFF.length - 1}
+        step={1}
+        show={(k) => (STIFF[k] === 1 ? words.none : words.times(digits(STIFF[k]!)))}
+        onInput={(k) => {
+          store.stiffness.value = STIFF[k]!;
         }}
-      >
-        {alone ? 'Show all patches' : 'Show it alone'}
-      </button>
+      />
+      {holds && (
+        <>
+          <p class="faint">{words.found(holds.pins.length, holds.stretches.length)}</p>
+          <button
+            type="button"
+            onClick={() => {
+              store.holds.value = null;
+            }}
+          >
+            {words.clear}
+          </button>
+        </>
+      )}
     </Section>
   );
 }
 
 function Faults({ app }: { app: App }) {
   const { faults, curves } = store.state.value;
+  const words = TEXT.faults;
   if (faults.length === 0 || curves.length === 0) return null;
   const mend = (fault: Fault) => {
     const at = fault.why.place;
@@ -230,9 +137,9 @@ function Faults({ app }: { app: App }) {
     if (fault.offer === 'split_region' && at) void app.edit({ edit: 'split_region', at });
     if (fault.offer === 'delete_corner' && at) void app.edit({ edit: 'delete_corner', corner: { near: at } });
   };
-  const word = { boundaries: 'Draw it', split_region: 'Split it', delete_corner: 'Delete it' };
+  const word = { boundaries: words.draw, split_region: words.split, delete_corner: words.remove };
   return (
-    <Section title={`To put right (${faults.length})`}>
+    <Section title={words.title(faults.length)}>
       <ul class="faults">
         {faults.slice(0, 8).map((fault) => (
           <li key={fault.why.message}>
@@ -241,7 +148,7 @@ function Faults({ app }: { app: App }) {
             <div class="row">
               {fault.why.place && (
                 <button type="button" class="small" onClick={() => app.fly(fault.why.place!)}>
-                  Show
+                  {words.show}
                 </button>
               )}
               {fault.offer && (
@@ -253,7 +160,7 @@ function Faults({ app }: { app: App }) {
           </li>
         ))}
       </ul>
-      {faults.length > 8 && <p class="faint">and {plural(faults.length - 8, 'more place')}</p>}
+      {faults.length > 8 && <p class="faint">{words.more(faults.length - 8)}</p>}
     </Section>
   );
 }
@@ -270,12 +177,13 @@ export function capital(text: string): string {
 
 function Network({ app }: { app: App }) {
   const state = store.state.value;
+  const words = TEXT.network;
   const has = state.curves.length > 0;
   const finished = state.patches.length > 0 && state.faults.length === 0;
   return (
-    <Section title="Network">
+    <Section title={words.title}>
       <Slider
-        label="Patches, about"
+        label={words.patches}
         value={patches.value}
         min={6}
         max={200}
@@ -288,17 +196,17 @@ function Network({ app }: { app: App }) {
       <div class="row">
         {!finished && (
           <button type="button" onClick={() => void app.complete(patches.value, sharp.value)}>
-            {has ? 'Complete the rest' : 'Lay out patches'}
+            {has ? words.complete : words.layOut}
           </button>
         )}
         {has && (
           <button type="button" onClick={() => void app.edit({ edit: 'relax' })}>
-            Relax all
+            {words.relax}
           </button>
         )}
       </div>
       <Slider
-        label="Sharp edges above"
+        label={words.sharp}
         value={sharp.value}
         min={10}
         max={120}
@@ -313,29 +221,29 @@ function Network({ app }: { app: App }) {
           type="button"
           onClick={() => void app.edit({ edit: 'feature_lines', angle_deg: sharp.value, shortest: 0.05 })}
         >
-          Draw sharp edges
+          {words.drawSharp}
         </button>
         <button type="button" onClick={() => void app.edit({ edit: 'boundaries' })}>
-          Draw boundaries
+          {words.boundaries}
         </button>
       </div>
       <div class="row">
         <button type="button" onClick={() => void app.edit({ edit: 'symmetry' })}>
-          Find symmetry
+          {words.symmetry}
         </button>
         {state.symmetry && has && (
           <>
             <button type="button" onClick={() => void app.edit({ edit: 'mirror' })}>
-              Mirror
+              {words.mirror}
             </button>
             <button type="button" onClick={() => void app.edit({ edit: 'mirror', swap: true })}>
-              Mirror back
+              {words.mirrorBack}
             </button>
           </>
         )}
         {has && (
           <button type="button" onClick={() => void app.edit({ edit: 'clear' })}>
-            Delete all curves
+            {words.clear}
           </button>
         )}
       </div>

@@ -1,8 +1,11 @@
 // The panel of the view, and that of the history.
 import type { App } from '../app';
+import { length } from '../model/format';
 import * as store from '../model/store';
-import { EDITS, SHADINGS, SHAPES } from '../model/texts';
+import { EDITS, SHADINGS, SHAPES, TEXT, VIEWS } from '../model/texts';
 import { Check, Choice, Section, Slider } from './parts';
+
+const words = TEXT.look;
 
 export function ViewPanel({ app }: { app: App }) {
   const { layers } = store.state.value;
@@ -13,37 +16,65 @@ export function ViewPanel({ app }: { app: App }) {
     store.show.value = { ...show, [name]: on };
   };
   const section = store.section.value;
+  const units = store.state.value.project?.units ?? '';
+  const hidden = store.hidden.value.size;
   return (
     <>
-      <Section title="Shape">
+      <Section title={words.shape}>
         <Choice
-          label="Shape"
+          label={words.shape}
           value={store.shape.value}
           options={shapes.map((s) => [s, SHAPES[s]] as const)}
           onPick={store.showShape}
         />
       </Section>
       {store.shape.value !== 'points' && (
-        <Section title="Shading">
+        <Section title={words.shading}>
           <Choice
-            label="Shading"
+            label={words.shading}
             value={store.shading.value}
             options={shadings.map((s) => [s, SHADINGS[s]] as const)}
             onPick={(s) => {
               store.shading.value = s;
             }}
           />
+          {(store.shading.value === 'deviation' || store.shading.value === 'curvature') && (
+            <Slider
+              label={words.scale}
+              value={Math.log10(store.scaleShare.value)}
+              min={-1}
+              max={1}
+              step={0.1}
+              show={() =>
+                length(store.scaleFound.value, store.shading.value === 'deviation' ? units : units && `1/${units}`)
+              }
+              onInput={(v) => {
+                store.scaleShare.value = 10 ** v;
+              }}
+            />
+          )}
         </Section>
       )}
-      <Section title="Lines">
-        <Check label="Curves" value={show.curves} onPick={toggle('curves')} />
-        <Check label="Corners" value={show.corners} onPick={toggle('corners')} />
-        {layers.isolines && <Check label="Iso-curves" value={show.isolines} onPick={toggle('isolines')} />}
-        {layers.nets && <Check label="Control nets" value={show.nets} onPick={toggle('nets')} />}
+      <Section title={words.lines}>
+        <Check label={words.curves} value={show.curves} onPick={toggle('curves')} />
+        <Check label={words.corners} value={show.corners} onPick={toggle('corners')} />
+        {store.state.value.seams.length > 0 && (
+          <Check label={words.angles} value={show.angles} onPick={toggle('angles')} />
+        )}
+        {layers.isolines && <Check label={words.isolines} value={show.isolines} onPick={toggle('isolines')} />}
+        {layers.nets && <Check label={words.nets} value={show.nets} onPick={toggle('nets')} />}
       </Section>
-      <Section title="Section">
+      {(hidden > 0 || store.isolated.value !== null) && (
+        <Section title={SHADINGS.patches}>
+          {hidden > 0 && <p class="faint">{words.hidden(hidden)}</p>}
+          <button type="button" onClick={() => app.showAll()}>
+            {words.showAll}
+          </button>
+        </Section>
+      )}
+      <Section title={words.section}>
         <Check
-          label="Cut the view open"
+          label={words.cut}
           value={section.on}
           onPick={(on) => {
             store.section.value = { ...section, on };
@@ -52,7 +83,7 @@ export function ViewPanel({ app }: { app: App }) {
         {section.on && (
           <>
             <Choice
-              label="Axis of the section"
+              label={words.axis}
               value={`${section.axis}`}
               options={[
                 ['0', 'X'],
@@ -64,7 +95,7 @@ export function ViewPanel({ app }: { app: App }) {
               }}
             />
             <Slider
-              label="Place"
+              label={words.place}
               value={section.at}
               min={0}
               max={1}
@@ -75,7 +106,7 @@ export function ViewPanel({ app }: { app: App }) {
               }}
             />
             <Check
-              label="The other side"
+              label={words.flip}
               value={section.flip}
               onPick={(flip) => {
                 store.section.value = { ...section, flip };
@@ -84,9 +115,9 @@ export function ViewPanel({ app }: { app: App }) {
           </>
         )}
       </Section>
-      <Section title="Camera">
+      <Section title={words.camera}>
         <div class="row views">
-          {(['front', 'right', 'top', 'back', 'left', 'bottom'] as const).map((name) => (
+          {(Object.keys(VIEWS) as (keyof typeof VIEWS)[]).map((name) => (
             <button
               type="button"
               key={name}
@@ -96,26 +127,26 @@ export function ViewPanel({ app }: { app: App }) {
                 app.view.moved();
               }}
             >
-              {name[0]!.toUpperCase() + name.slice(1)}
+              {VIEWS[name]}
             </button>
           ))}
         </div>
         <Check
-          label="Parallel projection"
+          label={words.parallel}
           value={store.parallel.value}
           onPick={(on) => {
             store.parallel.value = on;
           }}
         />
         <Check
-          label="Turn freely, without an up"
+          label={words.free}
           value={store.orbit.value === 'free'}
           onPick={(on) => {
             store.orbit.value = on ? 'free' : 'turntable';
           }}
         />
         <Check
-          label="Y is up"
+          label={words.yUp}
           value={store.up.value === 'y'}
           onPick={(on) => {
             store.up.value = on ? 'y' : 'z';
@@ -129,46 +160,67 @@ export function ViewPanel({ app }: { app: App }) {
 }
 
 export function HistoryPanel({ app }: { app: App }) {
-  const { done, undone } = store.state.value;
+  const { done, undone, branches } = store.state.value;
+  const told = TEXT.history;
   const name = (edit: string) => EDITS[edit] ?? edit;
   const back = (count: number) => void app.edit({ edit: 'undo', count });
   const forth = (count: number) => void app.edit({ edit: 'redo', count });
   return (
-    <Section title="History">
-      {done.length + undone.length === 0 && <p class="faint">Every edit is kept here, across restarts.</p>}
-      <ol class="history">
+    <>
+      <Section title={told.title}>
+        {done.length + undone.length === 0 && <p class="faint">{told.empty}</p>}
+        <ol class="history">
+          {done.length > 0 && (
+            <li>
+              <button type="button" onClick={() => back(done.length)}>
+                {told.began}
+              </button>
+            </li>
+          )}
+          {done.map((step, k) => (
+            <li key={k} class={k === done.length - 1 ? 'now' : ''}>
+              <button
+                type="button"
+                aria-current={k === done.length - 1 ? 'step' : undefined}
+                onClick={() => k < done.length - 1 && back(done.length - 1 - k)}
+              >
+                {name(step.edit)}
+                <span class="number faint">{told.curves(step.counts[1])}</span>
+              </button>
+            </li>
+          ))}
+          {[...undone].reverse().map((step, k) => (
+            <li key={`u${k}`} class="undone">
+              <button type="button" onClick={() => forth(k + 1)}>
+                {name(step.edit)}
+              </button>
+            </li>
+          ))}
+        </ol>
         {done.length > 0 && (
-          <li>
-            <button type="button" onClick={() => back(done.length)}>
-              As it began
-            </button>
-          </li>
+          <button type="button" onClick={() => void app.script()}>
+            {told.script}
+          </button>
         )}
-        {done.map((step, k) => (
-          <li key={k} class={k === done.length - 1 ? 'now' : ''}>
-            <button
-              type="button"
-              aria-current={k === done.length - 1 ? 'step' : undefined}
-              onClick={() => k < done.length - 1 && back(done.length - 1 - k)}
-            >
-              {name(step.edit)}
-              <span class="number faint">{step.counts[1]} curves</span>
-            </button>
-          </li>
-        ))}
-        {[...undone].reverse().map((step, k) => (
-          <li key={`u${k}`} class="undone">
-            <button type="button" onClick={() => forth(k + 1)}>
-              {name(step.edit)}
-            </button>
-          </li>
-        ))}
-      </ol>
-      {done.length > 0 && (
-        <button type="button" onClick={() => void app.script()}>
-          Save as a script
-        </button>
+      </Section>
+      {branches.length > 0 && (
+        <Section title={told.branches}>
+          <p class="faint">{told.branchNote}</p>
+          <ul class="list">
+            {branches
+              .map((branch, k) => ({ branch, k }))
+              .reverse()
+              .map(({ branch, k }) => (
+                <li key={k}>
+                  <span>{told.branch(branch.own.slice(0, 2).map(name).join(', '), branch.own.length - 2)}</span>
+                  <button type="button" class="small" onClick={() => void app.branch(k)}>
+                    {told.go}
+                  </button>
+                </li>
+              ))}
+          </ul>
+        </Section>
       )}
-    </Section>
+    </>
   );
 }

@@ -1,9 +1,9 @@
 // What lies over everything: messages, keys, all commands, a lost connection.
 import { signal } from '@preact/signals';
-import { useEffect, useRef } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 import type { App } from '../app';
 import * as store from '../model/store';
-import { FORMATS, KEYS, SHADINGS, SHAPES, TOOLS } from '../model/texts';
+import { FORMATS, KEYS, SAMPLES, SHADINGS, SHAPES, TEXT, TOOLS } from '../model/texts';
 import { capital, short } from './edit';
 
 /** What was told goes by itself after this, milliseconds; what was refused stays. */
@@ -25,11 +25,11 @@ export function Toasts({ app }: { app: App }) {
           <div class="row">
             {t.why.place && (
               <button type="button" class="small" onClick={() => app.fly(t.why.place!)}>
-                Show
+                {TEXT.toast.show}
               </button>
             )}
             <button type="button" class="small" onClick={() => store.dismiss(t.id)}>
-              Close
+              {TEXT.toast.close}
             </button>
           </div>
         </div>
@@ -46,7 +46,8 @@ function Dialog({ label, children }: { label: string; children: preact.Component
   const dialog = useRef<HTMLDialogElement>(null);
   // One that has gone tells that it was closed when another one may be open already.
   const gone = useRef(false);
-  useEffect(() => {
+  // Before the next key: who types at once types into it.
+  useLayoutEffect(() => {
     const shown = dialog.current;
     shown?.showModal();
     return () => {
@@ -69,8 +70,8 @@ function Dialog({ label, children }: { label: string; children: preact.Component
 
 export function Keys() {
   return (
-    <Dialog label="Keys">
-      <h2>Keys</h2>
+    <Dialog label={TEXT.top.keys}>
+      <h2>{TEXT.top.keys}</h2>
       <dl class="keys">
         {KEYS.map((k) => (
           <div key={k.keys}>
@@ -82,7 +83,7 @@ export function Keys() {
         ))}
       </dl>
       <button type="button" class="primary" onClick={close}>
-        Close
+        {TEXT.close}
       </button>
     </Dialog>
   );
@@ -94,6 +95,8 @@ export interface Command {
   run: () => void;
 }
 
+const words = TEXT.commands;
+
 /** All commands that do something now. */
 export function commands(app: App): Command[] {
   const state = store.state.value;
@@ -102,51 +105,58 @@ export function commands(app: App): Command[] {
     list.push({ name, run: () => void run(), ...(key ? { key } : {}) });
   };
   if (!state.project) {
-    add('Open the demonstration part', () => app.sample('part'));
-    add('Open a noisy scan', () => app.sample('scan'));
-    add('Open the bracket', () => app.sample('bracket'));
-    for (const file of state.files) add(`Open ${file}`, () => app.openFile(file));
+    for (const { sample } of SAMPLES) add(words[sample], () => app.sample(sample));
+    for (const file of state.files) add(words.open(file), () => app.openFile(file));
     return list;
   }
   for (const tool of TOOLS) {
-    if (!state.layers.mesh || (tool.id === 'feature' && state.patches.length === 0)) continue;
-    add(tool.name, () => app.choose(tool.id), tool.key);
+    if (store.canUse(tool.id, state)) add(tool.name, () => app.choose(tool.id), tool.key);
   }
-  if (state.done.length > 0) add('Undo', app.undo, 'Ctrl Z');
-  if (state.undone.length > 0) add('Redo', app.redo, 'Ctrl Shift Z');
-  if (state.layers.points && state.curves.length === 0) add('Make a mesh of the scan', () => app.mesh());
+  if (state.done.length > 0) add(TEXT.top.undo, app.undo, 'Ctrl Z');
+  if (state.undone.length > 0) add(TEXT.top.redo, app.redo, 'Ctrl Shift Z');
+  if (state.layers.points && !state.layers.mesh) add(words.look, () => app.clean());
+  if (state.layers.points && state.curves.length === 0) add(words.mesh, () => app.mesh());
   if (state.layers.mesh) {
-    add('Lay out patches', () => app.complete(24, 40));
-    add('Draw sharp edges', () => app.edit({ edit: 'feature_lines', angle_deg: 40, shortest: 0.05 }));
-    add('Draw boundaries', () => app.edit({ edit: 'boundaries' }));
-    add('Find symmetry', () => app.edit({ edit: 'symmetry' }));
-    if (state.curves.length > 0) add('Relax all curves', () => app.edit({ edit: 'relax' }));
+    add(words.layOut, () => app.complete(24, 40));
+    add(words.sharp, () => app.edit({ edit: 'feature_lines', angle_deg: 40, shortest: 0.05 }));
+    add(words.boundaries, () => app.edit({ edit: 'boundaries' }));
+    add(words.symmetry, () => app.edit({ edit: 'symmetry' }));
+    if (state.curves.length > 0) add(words.relax, () => app.edit({ edit: 'relax' }));
   }
   const is = (name: string) => state.stages.find((s) => s.name === name)?.is;
-  if (is('patches') === 'fresh') add('Fit surfaces', app.fit);
+  if (is('patches') === 'fresh') {
+    add(words.fit, app.fit);
+    add(words.coarse, app.fitCoarse);
+  }
   if (is('surfaces') === 'fresh') {
-    for (const f of FORMATS) add(`Export ${f.name}`, () => app.export(f.format));
+    for (const f of FORMATS) add(words.export(f.name), () => app.export(f.format));
   }
   for (const s of Object.keys(SHAPES) as store.Shape[]) {
-    if (state.layers[s]) add(`Show ${SHAPES[s].toLowerCase()}`, () => store.showShape(s));
+    if (state.layers[s]) add(words.show(SHAPES[s]), () => store.showShape(s));
   }
   for (const s of Object.keys(SHADINGS) as store.Shading[]) {
     if (!store.canShade(s, store.shape.value)) continue;
-    add(`Shade: ${SHADINGS[s].toLowerCase()}`, () => {
+    add(words.shade(SHADINGS[s]), () => {
       store.shading.value = s;
     });
   }
-  add('Fit the view', () => app.home(), 'Home');
-  add('Save a picture', () => app.picture());
-  if (state.done.length > 0) add('Save the edits as a script', () => app.script());
+  if (state.seams.length > 0) {
+    add(words.angles, () => {
+      store.show.value = { ...store.show.value, angles: !store.show.value.angles };
+    });
+  }
+  if (store.hidden.value.size > 0 || store.isolated.value !== null) add(words.showAll, () => app.showAll());
+  add(words.fitView, () => app.home(), 'Home');
+  add(words.picture, () => app.picture());
+  if (state.done.length > 0) add(words.script, () => app.script());
   add(
-    'Keys',
+    words.keys,
     () => {
       store.overlay.value = 'keys';
     },
     '?',
   );
-  add('Put the project away', () => app.close());
+  add(words.away, () => app.close());
   return list;
 }
 
@@ -155,30 +165,30 @@ const chosen = signal(0);
 
 export function Palette({ app }: { app: App }) {
   const input = useRef<HTMLInputElement>(null);
-  useEffect(() => {
+  useLayoutEffect(() => {
     query.value = '';
     chosen.value = 0;
     input.current?.focus();
   }, []);
-  const words = query.value.toLowerCase().split(/\s+/);
-  const found = commands(app).filter((c) => words.every((w) => c.name.toLowerCase().includes(w)));
+  const parts = query.value.toLowerCase().split(/\s+/);
+  const found = commands(app).filter((c) => parts.every((w) => c.name.toLowerCase().includes(w)));
   const at = Math.min(chosen.value, found.length - 1);
   const run = (command: Command | undefined) => {
     close();
     command?.run();
   };
   return (
-    <Dialog label="All commands">
+    <Dialog label={TEXT.palette.label}>
       <input
         ref={input}
         class="search"
         type="text"
         role="combobox"
-        aria-label="Command"
+        aria-label={TEXT.palette.command}
         aria-expanded="true"
         aria-controls="commands"
         aria-activedescendant={found.length > 0 ? `command-${at}` : undefined}
-        placeholder="What is to be done?"
+        placeholder={TEXT.palette.ask}
         value={query.value}
         onInput={(e) => {
           query.value = e.currentTarget.value;
@@ -192,7 +202,7 @@ export function Palette({ app }: { app: App }) {
           e.preventDefault();
         }}
       />
-      <div class="commands" id="commands" role="listbox" aria-label="Commands">
+      <div class="commands" id="commands" role="listbox" aria-label={TEXT.palette.label}>
         {found.map((c, k) => (
           // biome-ignore lint/a11y/useFocusableInteractive: the field keeps the focus and names the chosen one
           // biome-ignore lint/a11y/useKeyWithClickEvents: keys go to the field
@@ -218,10 +228,9 @@ export function Connection() {
   if (connection === 'open') return null;
   return (
     <div class="connection" role="alert">
-      {connection === 'connecting' && 'Connecting ...'}
-      {connection === 'lost' && 'The connection is lost. It comes back by itself once planish runs again.'}
-      {connection === 'refused' &&
-        'planish does not let this page in: open the address that it printed, with all of its letters.'}
+      {connection === 'connecting' && TEXT.connection.connecting}
+      {connection === 'lost' && TEXT.connection.lost}
+      {connection === 'refused' && TEXT.connection.refused}
     </div>
   );
 }

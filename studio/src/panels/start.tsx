@@ -2,13 +2,9 @@
 import { useRef } from 'preact/hooks';
 import type { App } from '../app';
 import * as store from '../model/store';
-import type { Sample } from '../protocol/types';
+import { SAMPLES, TEXT } from '../model/texts';
 
-const SAMPLES: { sample: Sample; name: string; note: string }[] = [
-  { sample: 'part', name: 'Demonstration part', note: 'a mesh with machined edges and relief' },
-  { sample: 'scan', name: 'Noisy scan', note: '60 000 points of that part, with outliers' },
-  { sample: 'bracket', name: 'Bracket', note: 'a mesh of flat faces, bores and fillets' },
-];
+const words = TEXT.start;
 const FILES = '.planish,.ply,.obj,.stl,.glb,.gltf,.e57,.las,.laz,.pcd,.xyz,.txt,.csv,.asc,.pts,.npy,.npz';
 
 export function Start({ app }: { app: App }) {
@@ -18,17 +14,17 @@ export function Start({ app }: { app: App }) {
   return (
     <main class="start">
       <div class="card">
-        <h1>Draw patches on a scan, and watch the surface follow</h1>
+        <h1>{words.title}</h1>
         <button type="button" class="drop" onClick={() => input.current?.click()} disabled={busy}>
-          <strong>{busy ? store.jobs.value[0]!.title : 'Drop a scan, a mesh or a project here'}</strong>
-          <span>{busy ? 'A moment ...' : 'or choose a file: E57, LAS, PLY, PCD, XYZ, OBJ, STL, GLB, .planish'}</span>
+          <strong>{busy ? store.jobs.value[0]!.title : words.drop}</strong>
+          <span>{busy ? words.moment : words.choose}</span>
         </button>
         <input
           ref={input}
           type="file"
           hidden
           accept={FILES}
-          aria-label="Choose a file"
+          aria-label={words.chooseFile}
           onChange={(e) => {
             const file = e.currentTarget.files?.[0];
             if (file) void app.drop(file);
@@ -37,20 +33,20 @@ export function Start({ app }: { app: App }) {
         />
         {files.length > 0 && (
           <>
-            <h2>Projects in this folder</h2>
+            <h2>{words.projects}</h2>
             <ul class="cards">
               {files.map((file) => (
                 <li key={file}>
                   <button type="button" disabled={busy} onClick={() => void app.openFile(file)}>
                     <strong>{file.replace(/\.planish$/i, '')}</strong>
-                    <span>go on</span>
+                    <span>{words.goOn}</span>
                   </button>
                 </li>
               ))}
             </ul>
           </>
         )}
-        <h2>To try</h2>
+        <h2>{words.samples}</h2>
         <ul class="cards">
           {SAMPLES.map((s) => (
             <li key={s.sample}>

@@ -3,9 +3,10 @@ import { signal } from '@preact/signals';
 import type { App } from '../app';
 import { digits, length } from '../model/format';
 import * as store from '../model/store';
-import { FORMATS } from '../model/texts';
+import { FORMATS, TEXT } from '../model/texts';
 import { Check, Choice, Fact, Section, Slider } from './parts';
 
+const words = TEXT.surface;
 /** Tolerances of the slider, of the diagonal. */
 const TOLERANCES = [1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5];
 const draft = signal<number | null>(null);
@@ -33,14 +34,14 @@ function Fineness({ app }: { app: App }) {
   );
   const finished = patches.length > 0 && faults.length === 0;
   return (
-    <Section title="How fine">
+    <Section title={words.title}>
       <Choice
-        label="How fine surfaces are"
+        label={words.label}
         value={how}
         options={[
-          ['tolerance', 'By tolerance'],
-          ['control', 'By number'],
-          ...(how === 'per_curve' ? ([['per_curve', 'Per patch']] as const) : []),
+          ['tolerance', words.byTolerance],
+          ['control', words.byNumber],
+          ...(how === 'per_curve' ? ([['per_curve', words.perPatch]] as const) : []),
         ]}
         onPick={(value) => {
           draft.value = null;
@@ -50,7 +51,7 @@ function Fineness({ app }: { app: App }) {
       />
       {how === 'tolerance' && (
         <Slider
-          label="Tolerance, RMS of a patch"
+          label={words.tolerance}
           value={draft.value ?? nearest}
           min={0}
           max={TOLERANCES.length - 1}
@@ -67,7 +68,7 @@ function Fineness({ app }: { app: App }) {
       )}
       {how === 'control' && (
         <Slider
-          label="Control points along a side"
+          label={words.control}
           value={draft.value ?? control}
           min={4}
           max={64}
@@ -82,12 +83,17 @@ function Fineness({ app }: { app: App }) {
           }}
         />
       )}
-      {how === 'per_curve' && <p class="faint">Numbers were set at single patches.</p>}
-      <Check label="Fit anew after every edit" value={live} onPick={(on) => void app.setting(resolution, on)} />
+      {how === 'per_curve' && <p class="faint">{words.single}</p>}
+      <Check label={words.live} value={live} onPick={(on) => void app.setting(resolution, on)} />
       {finished && (
-        <button type="button" class="primary" onClick={() => void app.fit()}>
-          Fit surfaces
-        </button>
+        <div class="row">
+          <button type="button" class="primary" onClick={() => void app.fit()}>
+            {words.fit}
+          </button>
+          <button type="button" onClick={() => void app.fitCoarse()}>
+            {words.coarse}
+          </button>
+        </div>
       )}
     </Section>
   );
@@ -98,16 +104,16 @@ function Measured({ app }: { app: App }) {
   const units = project?.units ?? '';
   if (figures['surface.rms'] === undefined) return null;
   const rows: [string, string][] = [
-    ['Distance to the mesh, RMS', length(figures['surface.rms']!, units)],
-    ['Distance to the mesh, largest', length(figures['surface.max'] ?? 0, units)],
-    ['Control points', String(figures['surface.control_points'] ?? '')],
-    ['Folded cells', String(figures['grid.folds'] ?? 0)],
-    ['Gap of seams, largest', length(figures['seam.gap_max'] ?? 0, units)],
-    ['Angle of smooth seams, largest', `${digits(figures['seam.angle_max_deg'] ?? 0)}°`],
+    [words.rms, length(figures['surface.rms']!, units)],
+    [words.max, length(figures['surface.max'] ?? 0, units)],
+    [words.points, String(figures['surface.control_points'] ?? '')],
+    [words.folds, String(figures['grid.folds'] ?? 0)],
+    [words.gap, length(figures['seam.gap_max'] ?? 0, units)],
+    [words.angle, `${digits(figures['seam.angle_max_deg'] ?? 0)}°`],
   ];
   const worst = seams.filter((s) => !s.sharp).slice(0, 5);
   return (
-    <Section title="Measured">
+    <Section title={words.measured}>
       <dl>
         {rows.map(([name, value]) => (
           <Fact key={name} name={name} value={value} />
@@ -116,7 +122,7 @@ function Measured({ app }: { app: App }) {
       {layers.surfaces && <Histogram />}
       {worst.length > 0 && (
         <>
-          <h3>Worst smooth seams</h3>
+          <h3>{words.worst}</h3>
           <ul class="list">
             {worst.map((s) => (
               <li key={s.curve}>
@@ -128,7 +134,7 @@ function Measured({ app }: { app: App }) {
                     flyToCurve(app, s.curve);
                   }}
                 >
-                  Curve {s.curve}
+                  {words.curve(s.curve)}
                 </button>
                 <span class="number">{s.angle_deg.toFixed(2)}°</span>
               </li>
@@ -174,12 +180,7 @@ function Histogram() {
   const units = store.state.value.project?.units ?? '';
   return (
     <figure class="histogram">
-      <svg
-        viewBox={`0 0 ${BARS} 20`}
-        preserveAspectRatio="none"
-        role="img"
-        aria-label="How often each deviation is found"
-      >
+      <svg viewBox={`0 0 ${BARS} 20`} preserveAspectRatio="none" role="img" aria-label={words.histogram}>
         {counts.map((n, k) => (
           <rect key={k} x={k + 0.1} width={0.8} y={20 - (20 * n) / high} height={(20 * n) / high} />
         ))}
@@ -197,7 +198,7 @@ function Files({ app }: { app: App }) {
   const state = store.state.value;
   const fresh = state.stages.find((s) => s.name === 'surfaces')?.is === 'fresh';
   return (
-    <Section title="Files">
+    <Section title={words.files}>
       {fresh ? (
         <div class="formats">
           {FORMATS.map((f) => (
@@ -208,7 +209,7 @@ function Files({ app }: { app: App }) {
           ))}
         </div>
       ) : (
-        <p class="faint">Files are made of surfaces that are up to date.</p>
+        <p class="faint">{words.stale}</p>
       )}
     </Section>
   );

@@ -1,4 +1,5 @@
 // The socket: requests with answers, state as it comes, geometry by name. After a cut it connects again and goes on.
+import { TEXT } from '../model/texts';
 import { type Geometry, Joiner } from './frames';
 import type { Edit, Layer, Message, Request, State, Why } from './types';
 
@@ -66,7 +67,7 @@ export class Client {
       this.socket = null;
       this.joiner = new Joiner();
       for (const { failed } of this.waiting.values()) {
-        failed(new Refused({ message: 'The connection was cut.', hint: 'It comes back by itself.' }));
+        failed(new Refused({ message: TEXT.connection.cut, hint: TEXT.connection.back }));
       }
       this.waiting.clear();
       // A server that never let this page in will not do so the next time.

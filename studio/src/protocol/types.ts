@@ -12,6 +12,28 @@ export type Array = {
   width: number;
 };
 
+/** Edits that were left for others. */
+export type Branch = {
+  /** Edits from the beginning on. */
+  edits: number;
+  /** Those of them that the drawing of now does not have, by their names in a script. */
+  own: string[];
+};
+
+/** What is known of the points of a scan. */
+export type Cleaned = {
+  /** Standard deviation of the points, world units. */
+  noise: number;
+  /** Points that are outliers. */
+  outliers: number;
+  /** Pieces of surface that do not hang together. */
+  parts: number;
+  /** Distance of neighbouring points, world units. */
+  spacing: number;
+  /** The edge of a cell that suits them, world units. */
+  voxel: number;
+};
+
 /** A curve of the network. */
 export type Curve = {
   /** Control points along it, if it has surfaces. */
@@ -240,6 +262,8 @@ export type Fault = {
 
 /** The surface of a patch. */
 export type Fitted = {
+  /** Cells of its grid along u and v. */
+  cells: [number, number];
   /** Control points along u and v. */
   control: [number, number];
   /** Largest distance, world units. */
@@ -281,6 +305,14 @@ export type Header = {
   total: number;
 };
 
+/** A hole of a mesh. */
+export type Hole = {
+  /** Its length around, world units. */
+  around: number;
+  /** A place on it, world units. */
+  place: [number, number, number];
+};
+
 /** A running job. */
 export type Job = {
   /** True if it can be ended early. */
@@ -302,7 +334,7 @@ export type Kind = ("smooth" | "feature" | "boundary");
 export type Kind2 = ("f32" | "u32");
 
 /** Geometry that a view shows. */
-export type Layer = ("points" | "mesh" | "coarse" | "curves" | "features" | "surfaces" | "displaced" | "isolines" | "nets");
+export type Layer = ("points" | "mesh" | "coarse" | "curves" | "features" | "surfaces" | "displaced" | "isolines" | "nets" | "peer");
 
 /** What a magnetic stroke is drawn to. */
 export type Magnetism = ({
@@ -321,6 +353,10 @@ export type Message = ({
   /** Version of the program. */
   version: string;
 } | {
+  /** Edits that were left for others, until the project is put away. */
+  branches: Branch[];
+  /** What is known of the points of the scan. */
+  cleaned?: (Cleaned | null);
   /** Corners of the network. */
   corners: [number, number, number][];
   /** Curves of the network. */
@@ -335,14 +371,22 @@ export type Message = ({
   figures: { [key: string]: number };
   /** Projects in the folder, for the start page. */
   files: string[];
+  /** Holes of the mesh, the longest first, while they can be closed. */
+  holes: Hole[];
   /** Running jobs. */
   jobs: Job[];
   /** Geometry that there is, each with its name of now. */
   layers: { [key: string]: string };
+  /** Points of the scan that were left out by hand. */
+  left_out: number;
   /** True if surfaces follow every edit. */
   live: boolean;
+  /** The longest waves that the relief is shown with, world units. */
+  longest?: number | null;
   /** Patches of the network. */
   patches: Patch[];
+  /** The other project that is looked at. */
+  peer?: (Peer | null);
   /** The project; absent on the start page. */
   project?: (Project | null);
   /** How fine surfaces are. */
@@ -383,6 +427,36 @@ export type Message = ({
   id: number;
   type: "tried";
 } | {
+  /** Control points along u and v. */
+  control: [number, number];
+  /** Number of the request. */
+  id: number;
+  /** Largest distance, world units. */
+  max: number;
+  /** Root of the mean square distance to its grid, world units. */
+  rms: number;
+  type: "tried_patch";
+} | {
+  /** Number of the request. */
+  id: number;
+  /** World positions. */
+  points: [number, number, number][];
+  type: "handles";
+} | {
+  /** Texels along u. */
+  cols: number;
+  /** Heights along the normal, world units, the row of v = 0 first. */
+  heights: number[];
+  /** Number of the request. */
+  id: number;
+  /** Largest displacement. */
+  most: number;
+  /** Root of the mean square displacement. */
+  rms: number;
+  /** Texels along v. */
+  rows: number;
+  type: "map";
+} | {
   /** All running jobs. */
   jobs: Job[];
   type: "progress";
@@ -422,6 +496,22 @@ export type Patch = {
   curves: [number, number, number, number];
   /** Its surface, if it has one. */
   fitted?: (Fitted | null);
+  /** Sections that its feature curves make along u and along v. */
+  parts: [number, number];
+  /** Cells of its grid that were asked for, section by section: along u, and along v. Empty where they are left to the program. */
+  sections: [number[], number[]];
+};
+
+/** Another project that is looked at. */
+export type Peer = {
+  /** Middle of its box; its geometry is sent relative to it. */
+  center: [number, number, number];
+  /** Curves of its network. */
+  curves: number;
+  /** Diagonal of its box. */
+  diagonal: number;
+  /** Its file name. */
+  file: string;
 };
 
 /** A plane through `point` with unit normal `normal`. */
@@ -436,6 +526,8 @@ export type Plane = {
 export type Project = {
   /** Middle of the box; geometry is sent relative to it. */
   center: [number, number, number];
+  /** True if the vertices of the mesh have colours. */
+  coloured: boolean;
   /** Diagonal of the box. */
   diagonal: number;
   /** Its file. */
@@ -468,7 +560,7 @@ export type Pull = {
   weight?: number;
 };
 
-/** What the page asks for. Every request is answered once, by `done`, `refused`, `tried`, `script` or `exported`. */
+/** What the page asks for. Every request is answered once, by `done`, `refused`, or what it asks for. */
 export type Request = ({
   /** The edit, as a script has it. */
   edit: Edit;
@@ -482,9 +574,79 @@ export type Request = ({
   id: number;
   type: "try";
 } | {
+  /** True to pause at coarse grids, so that one sees early how they run. */
+  coarse?: boolean;
   /** Number of the request. */
   id: number;
   type: "fit";
+} | {
+  /** Along u and v; absent for the fewest that keep the tolerance. */
+  control?: [number, number] | null;
+  /** Number of the request. */
+  id: number;
+  /** The patch. */
+  patch: number;
+  /** Largest RMS distance, world units. */
+  tolerance?: number | null;
+  type: "try_patch";
+} | {
+  /** How many. */
+  control: number;
+  /** The curve. */
+  curve: CurveName;
+  /** Number of the request. */
+  id: number;
+  type: "handles";
+} | {
+  /** Number of the request. */
+  id: number;
+  /** The patch. */
+  patch: number;
+  type: "map";
+} | {
+  /** Number of the request. */
+  id: number;
+  /** The longest waves that are shown, world units; all if absent. */
+  longest?: number | null;
+  type: "relief";
+} | {
+  /** Number of the request. */
+  id: number;
+  type: "clean";
+} | {
+  /** Number of the request. */
+  id: number;
+  /** Corners of the line, from -1 to 1. */
+  line: [number, number][];
+  /** True to leave out what lies without. */
+  outside?: boolean;
+  type: "lasso";
+  /** From the places that geometry is sent in to clip space, column by column. */
+  view: number[];
+} | {
+  /** True for all. */
+  all?: boolean;
+  /** Number of the request. */
+  id: number;
+  type: "take_in";
+} | {
+  /** Its number. */
+  hole: number;
+  /** Number of the request. */
+  id: number;
+  type: "close_hole";
+} | {
+  /** Its file name; absent to put it away. */
+  file?: string | null;
+  /** Number of the request. */
+  id: number;
+  type: "peer";
+} | {
+  /** Which. */
+  branch: number;
+  /** Number of the request. */
+  id: number;
+  type: "branch";
 } | {
   /** Number of the request. */
   id: number;
@@ -501,6 +663,8 @@ export type Request = ({
   /** Cells along the longest side; those that suit the scan if absent. */
   resolution?: number | null;
   type: "mesh";
+  /** The edge of a cell, world units; in place of their number. */
+  voxel?: number | null;
 } | {
   /** Number of the request. */
   id: number;
@@ -617,6 +781,10 @@ export type Standing = ("empty" | "partial" | "fresh" | "stale" | "running" | "f
 
 /** Everything but geometry. */
 export type State = {
+  /** Edits that were left for others, until the project is put away. */
+  branches: Branch[];
+  /** What is known of the points of the scan. */
+  cleaned?: (Cleaned | null);
   /** Corners of the network. */
   corners: [number, number, number][];
   /** Curves of the network. */
@@ -631,14 +799,22 @@ export type State = {
   figures: { [key: string]: number };
   /** Projects in the folder, for the start page. */
   files: string[];
+  /** Holes of the mesh, the longest first, while they can be closed. */
+  holes: Hole[];
   /** Running jobs. */
   jobs: Job[];
   /** Geometry that there is, each with its name of now. */
   layers: { [key: string]: string };
+  /** Points of the scan that were left out by hand. */
+  left_out: number;
   /** True if surfaces follow every edit. */
   live: boolean;
+  /** The longest waves that the relief is shown with, world units. */
+  longest?: number | null;
   /** Patches of the network. */
   patches: Patch[];
+  /** The other project that is looked at. */
+  peer?: (Peer | null);
   /** The project; absent on the start page. */
   project?: (Project | null);
   /** How fine surfaces are. */

@@ -2,6 +2,7 @@
 import type { Vector3 } from 'three';
 import { length } from '../model/format';
 import { hovered, isolated, selected, shape, state, tab, toolHint } from '../model/store';
+import { TEXT } from '../model/texts';
 import type { Edit } from '../protocol/types';
 import type { Bench, Spot, Tool } from './tool';
 
@@ -127,7 +128,7 @@ export class Measure implements Tool {
     );
     if (!this.from) return;
     view.setLine('helper', new Float32Array(ends.flatMap((p) => p.toArray())));
-    toolHint.value = `Distance ${length(this.from.distanceTo(to), state.value.project?.units ?? '')}`;
+    toolHint.value = TEXT.tool.distance(length(this.from.distanceTo(to), state.value.project?.units ?? ''));
   }
 
   move(spot: Spot): void {
@@ -148,7 +149,7 @@ export class Measure implements Tool {
     this.leave();
     this.from = target.clone();
     this.show(target);
-    toolHint.value = 'Click the other place.';
+    toolHint.value = TEXT.tool.clickOther;
   }
 
   key(key: string): boolean {

@@ -1,6 +1,6 @@
 // Dragging a curve or a corner, with the snake live under the cursor.
 import { Plane, Vector3 } from 'three';
-import { dragWidth, hovered } from '../model/store';
+import { dragWidth, holds, hovered } from '../model/store';
 import type { CurveName, Edit } from '../protocol/types';
 import type { Found } from '../view/seek';
 import type { Bench, Spot, Tool } from './tool';
@@ -45,7 +45,18 @@ export class Pull implements Tool {
     const by = to.clone().sub(held.place).toArray();
     const curve: CurveName = kind === 'feature' ? { feature: index } : index;
     const at = Math.min(1 - END, Math.max(END, held.at));
-    return { edit: 'drag_curve', curve, at, by, width: dragWidth.value };
+    const kept = holds.value;
+    const own = kept && kept.picked.kind === kind && kept.picked.index === index ? kept : null;
+    const { pins = [], stretches: stiffness = [] } = own ?? {};
+    return {
+      edit: 'drag_curve',
+      curve,
+      at,
+      by,
+      width: dragWidth.value,
+      ...(pins.length > 0 ? { pins } : {}),
+      ...(stiffness.length > 0 ? { stiffness } : {}),
+    };
   }
 
   up(): void {

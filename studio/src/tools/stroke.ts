@@ -1,6 +1,7 @@
 // Painting: clicks along a curve, shown as it will run.
 import type { Vector3 } from 'three';
 import { paintMode, toolHint } from '../model/store';
+import { TEXT } from '../model/texts';
 import type { Edit } from '../protocol/types';
 import type { Bench, Spot, Tool } from './tool';
 
@@ -53,7 +54,7 @@ export class Stroke implements Tool {
     this.marks(null);
     const meets = this.kind === 'paint' && (spot.corner !== null || spot.curve !== null);
     if (meets && this.picks.length > 1) void this.finish(false);
-    else toolHint.value = this.picks.length > 1 ? 'Enter ends the curve here.' : 'Click the next place.';
+    else toolHint.value = this.picks.length > 1 ? TEXT.tool.enterEnds : TEXT.tool.clickNext;
   }
 
   doubleClick(): void {

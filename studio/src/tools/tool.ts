@@ -1,7 +1,7 @@
 // What a tool is: picks in, edits out. The view shows what it would do before it is done.
 import type { Vector3 } from 'three';
 import type { Client } from '../protocol/client';
-import type { Edit } from '../protocol/types';
+import type { CurveName, Edit } from '../protocol/types';
 import type { Found } from '../view/seek';
 import type { View } from '../view/view';
 
@@ -23,6 +23,10 @@ export interface Bench {
   world(place: Vector3): [number, number, number];
   /** Makes an edit; false if it was refused, which the user is told. */
   edit(edit: Edit): Promise<boolean>;
+  /** Control vertices of a curve, relative to the middle; none if it has none, which the user is told. */
+  handles(curve: CurveName, control: number): Promise<Vector3[]>;
+  /** Leaves points out that are seen within a line. */
+  lasso(view: number[], line: [number, number][]): Promise<unknown>;
   /** Shows what an edit would do; only the last one counts. */
   preview(edit: Edit | null): void;
 }

@@ -48,6 +48,36 @@ export function share(all: Courses, curve: number, segment: number, part: number
   return whole > 0 ? before / whole : 0;
 }
 
+/** Both ends of all pieces of a curve between two shares of its length. */
+export function stretch({ position, offset }: Courses, curve: number, from: number, to: number): Float32Array {
+  const [low, high] = [Math.min(from, to), Math.max(from, to)];
+  const points: number[][] = [];
+  for (let p = offset[curve]!; p < offset[curve + 1]!; p++) points.push([...position.subarray(3 * p, 3 * p + 3)]);
+  const lengths = points.slice(1).map((p, k) => Math.hypot(...p.map((x, c) => x - points[k]![c]!)));
+  const whole = lengths.reduce((a, b) => a + b, 0) || 1;
+  const out: number[] = [];
+  let before = 0;
+  lengths.forEach((length, k) => {
+    const [a, b] = [before / whole, (before + length) / whole];
+    before += length;
+    const [s, t] = [Math.max(a, low), Math.min(b, high)];
+    if (t <= s) return;
+    for (const share of [s, t]) {
+      const part = (share - a) / Math.max(1e-12, b - a);
+      for (let c = 0; c < 3; c++) out.push(points[k]![c]! + part * (points[k + 1]![c]! - points[k]![c]!));
+    }
+  });
+  return new Float32Array(out);
+}
+
+/** The place of a curve at a share of its length. */
+export function placeAt(all: Courses, curve: number, at: number): number[] {
+  const pieces = stretch(all, curve, 0, at);
+  if (pieces.length >= 3) return [...pieces.subarray(pieces.length - 3)];
+  const first = all.offset[curve] ?? 0;
+  return [...all.position.subarray(3 * first, 3 * first + 3)];
+}
+
 /** Lines wider than this mark others, pixels. */
 const OVER = 4;
 
@@ -56,8 +86,14 @@ export class Thick {
   readonly object: LineSegments2;
   readonly material: LineMaterial;
 
-  constructor(color: string, width: number, inFront = false) {
-    this.material = new LineMaterial({ color, linewidth: width, depthTest: !inFront, transparent: inFront });
+  constructor(color: string, width: number, inFront = false, vertexColors = false) {
+    this.material = new LineMaterial({
+      color,
+      linewidth: width,
+      depthTest: !inFront,
+      transparent: inFront,
+      vertexColors,
+    });
     // What is pointed at lies over the line that it is.
     this.material.polygonOffset = width > OVER;
     this.material.polygonOffsetFactor = -2;
@@ -68,11 +104,14 @@ export class Thick {
     if (inFront) this.object.renderOrder = 10;
   }
 
-  set(positions: Float32Array): void {
+  /** Shows pieces; `colors` has three numbers for each end of one. */
+  set(positions: Float32Array, colors?: Float32Array): void {
     this.object.geometry.dispose();
     this.object.geometry = new LineSegmentsGeometry();
     this.object.visible = positions.length > 0;
-    if (positions.length > 0) this.object.geometry.setPositions(positions);
+    if (positions.length === 0) return;
+    this.object.geometry.setPositions(positions);
+    if (colors) this.object.geometry.setColors(colors);
   }
 }
 
@@ -87,7 +126,7 @@ export class Thin {
     this.object.visible = false;
   }
 
-  set(positions: Float32Array): void {
+  set(positions: Float32Array, _colors?: Float32Array): void {
     this.object.geometry.dispose();
     this.object.geometry = new BufferGeometry();
     this.object.geometry.setAttribute('position', new BufferAttribute(positions, 3));

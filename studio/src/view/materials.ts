@@ -6,6 +6,8 @@ export const MODES = { clay: 0, patches: 1, deviation: 2, curvature: 2, zebra: 3
 const VERTEX = /* glsl */ `
 attribute float value;
 attribute float patchOf;
+attribute float hide;
+varying float vHide;
 varying vec3 vNormal;
 varying vec3 vEye;
 varying vec3 vPlace;
@@ -18,6 +20,7 @@ void main() {
   vPlace = position;
   vValue = value;
   vPatch = patchOf;
+  vHide = hide;
   gl_Position = projectionMatrix * eye;
 }`;
 
@@ -36,6 +39,7 @@ varying vec3 vEye;
 varying vec3 vPlace;
 varying float vValue;
 varying float vPatch;
+varying float vHide;
 
 // From blue over white to red: even steps of lightness on both sides.
 vec3 scale(float x) {
@@ -52,7 +56,7 @@ vec3 palette(float n) {
 }
 
 void main() {
-  if (dot(cut.xyz, vPlace) > cut.w) discard;
+  if (dot(cut.xyz, vPlace) > cut.w || vHide > 0.5) discard;
   bool isPatch = alone >= 0.0;
   if (isPatch && abs(vPatch - alone) > 0.5) discard;
   vec3 toEye = parallel ? vec3(0.0, 0.0, 1.0) : normalize(-vEye);
@@ -110,10 +114,13 @@ export function surfaceMaterial(): ShaderMaterial {
 
 const DOT_VERTEX = /* glsl */ `
 uniform float size;
+uniform vec4 cut;
 attribute vec3 color;
 varying vec3 vColor;
+varying float vCut;
 void main() {
   vColor = color;
+  vCut = dot(cut.xyz, position) - cut.w;
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
   gl_Position.z -= 0.002 * gl_Position.w;
   gl_PointSize = size;
@@ -122,7 +129,9 @@ void main() {
 const DOT_FRAGMENT = /* glsl */ `
 uniform vec3 rim;
 varying vec3 vColor;
+varying float vCut;
 void main() {
+  if (vCut > 0.0) discard;
   float r = length(gl_PointCoord - 0.5);
   if (r > 0.5) discard;
   gl_FragColor = vec4(r > 0.32 ? rim : vColor, 1.0);
@@ -133,7 +142,7 @@ export function dotMaterial(size: number, rim: string): ShaderMaterial {
   return new ShaderMaterial({
     vertexShader: DOT_VERTEX,
     fragmentShader: DOT_FRAGMENT,
-    uniforms: { size: { value: size }, rim: { value: new Color(rim) } },
+    uniforms: { size: { value: size }, rim: { value: new Color(rim) }, cut: { value: WHOLE.clone() } },
   });
 }
 
@@ -141,42 +150,28 @@ const CLOUD_VERTEX = /* glsl */ `
 uniform float size;
 uniform vec4 cut;
 attribute vec3 color;
-varying float vLight;
 varying float vCut;
 varying vec3 vTint;
-uniform float low;
-uniform float high;
-uniform bool upZ;
 void main() {
-  vec4 eye = modelViewMatrix * vec4(position, 1.0);
-  float h = ((upZ ? position.z : position.y) - low) / max(1e-9, high - low);
-  vTint = mix(vec3(0.16, 0.36, 0.55), vec3(0.80, 0.72, 0.48), clamp(h, 0.0, 1.0));
+  vTint = color;
   vCut = dot(cut.xyz, position) - cut.w;
-  vLight = 1.0;
-  gl_Position = projectionMatrix * eye;
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
   gl_PointSize = size;
 }`;
 
 const CLOUD_FRAGMENT = /* glsl */ `
-varying float vLight;
 varying float vCut;
 varying vec3 vTint;
 void main() {
   if (vCut > 0.0) discard;
-  gl_FragColor = vec4(vTint * vLight, 1.0);
+  gl_FragColor = vec4(vTint, 1.0);
 }`;
 
-/** Points of a scan, coloured by height. */
+/** Points of a scan, each of its colour. */
 export function cloudMaterial(): ShaderMaterial {
   return new ShaderMaterial({
     vertexShader: CLOUD_VERTEX,
     fragmentShader: CLOUD_FRAGMENT,
-    uniforms: {
-      size: { value: 2 },
-      cut: { value: WHOLE.clone() },
-      low: { value: -1 },
-      high: { value: 1 },
-      upZ: { value: true },
-    },
+    uniforms: { size: { value: 2 }, cut: { value: WHOLE.clone() } },
   });
 }

@@ -8,6 +8,7 @@ import {
   Mesh,
   OrthographicCamera,
   PerspectiveCamera,
+  Plane,
   Points,
   Ray,
   Scene,
@@ -19,7 +20,7 @@ import {
 } from 'three';
 import { MeshBVH } from 'three-mesh-bvh';
 import type { Geometry } from '../protocol/frames';
-import { type Courses, courses, pieces, Thick, Thin } from './lines';
+import { type Courses, courses, pieces, placeAt, stretch, Thick, Thin } from './lines';
 import { cloudMaterial, dotMaterial, MODES, surfaceMaterial } from './materials';
 import { HALF_FOV, Rig } from './rig';
 
@@ -58,6 +59,8 @@ export class View {
     sharp: new Thick('#c2410c', 2.6),
     boundary: new Thick('#4d5560', 2.2),
     features: new Thick('#7e22ce', 2),
+    angles: new Thick('#ffffff', 4, false, true),
+    held: new Thick('#be185d', 5.5),
     hover: new Thick('#0ea5a0', 4.5),
     chosen: new Thick('#f59e0b', 4.5),
     erase: new Thick('#dc2626', 4.5),
@@ -65,6 +68,7 @@ export class View {
     helper: new Thick('#0f172a', 1.5, true),
   };
   private readonly corners = new Points(new BufferGeometry(), dotMaterial(9, '#12343b'));
+  private readonly pins = new Points(new BufferGeometry(), dotMaterial(13, '#ffffff'));
   private readonly marks = new Points(new BufferGeometry(), dotMaterial(12, '#ffffff'));
   curves: Courses = courses(undefined);
   features: Courses = courses(undefined);
@@ -84,15 +88,19 @@ export class View {
     this.renderer = new WebGLRenderer({ canvas, antialias: !slow, preserveDrawingBuffer: true });
     // Colours are written as they are named.
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    this.renderer.localClippingEnabled = true;
     this.renderer.setPixelRatio(slow ? 1 : Math.min(2, window.devicePixelRatio));
     this.coarseSurface = this.surface;
     for (const line of Object.values(this.lines)) this.scene.add(line.object);
-    for (const dots of [this.corners, this.marks]) {
+    for (const dots of [this.corners, this.pins, this.marks]) {
       dots.frustumCulled = false;
       dots.visible = false;
       this.scene.add(dots);
     }
     this.marks.renderOrder = 11;
+    // What holds a curve lies over the mark that it is chosen.
+    this.lines.held.material.polygonOffsetFactor = -4;
+    this.lines.held.material.polygonOffsetUnits = -24;
     (this.marks.material as ShaderMaterial).depthTest = false;
     this.rig.look('corner');
   }
@@ -207,9 +215,25 @@ export class View {
       const vertices = buffers.getAttribute('position').count;
       buffers.setAttribute('value', new BufferAttribute(values ?? new Float32Array(vertices), 1));
       this.shown = new Mesh(buffers, this.surface);
+      this.hide(this.hidden);
       this.scene.add(this.shown);
     }
     this.swap();
+    this.draw();
+  }
+
+  private hidden: ReadonlySet<number> = new Set();
+
+  /** Patches that are not shown. */
+  hide(patches: ReadonlySet<number>): void {
+    this.hidden = patches;
+    const buffers = this.shown?.geometry;
+    if (!buffers) return;
+    const patchOf = buffers.getAttribute('patchOf');
+    const hide = new Float32Array(patchOf.count);
+    if (patches.size > 0)
+      for (let k = 0; k < hide.length; k++) hide[k] = patches.has(Math.round(patchOf.getX(k))) ? 1 : 0;
+    buffers.setAttribute('hide', new BufferAttribute(hide, 1));
     this.draw();
   }
 
@@ -237,14 +261,16 @@ export class View {
     }
     if (geometry) {
       const buffers = buffersOf(geometry);
-      buffers.setAttribute('value', new BufferAttribute(new Float32Array(buffers.getAttribute('position').count), 1));
+      for (const name of ['value', 'hide']) {
+        buffers.setAttribute(name, new BufferAttribute(new Float32Array(buffers.getAttribute('position').count), 1));
+      }
       this.coarse = new Mesh(buffers, this.coarseSurface);
       this.coarse.visible = false;
       this.scene.add(this.coarse);
     }
   }
 
-  showPoints(geometry: Geometry | undefined): void {
+  showPoints(geometry: Geometry | undefined, colors: Float32Array): void {
     if (this.points) {
       this.scene.remove(this.points);
       this.points.geometry.dispose();
@@ -253,14 +279,12 @@ export class View {
     if (geometry) {
       const buffers = new BufferGeometry();
       buffers.setAttribute('position', new BufferAttribute(geometry.floats.get('position')!, 3));
+      buffers.setAttribute('color', new BufferAttribute(colors, 3));
+      // Few points are shown larger, so that they make a surface.
+      const count = buffers.getAttribute('position').count;
+      this.cloud.uniforms.size!.value = count < 20_000 ? 3.5 : count < 100_000 ? 2.5 : 2;
       this.points = new Points(buffers, this.cloud);
       this.points.frustumCulled = false;
-      buffers.computeBoundingBox();
-      const z = this.rig.up.z === 1;
-      const box = buffers.boundingBox!;
-      this.cloud.uniforms.low!.value = z ? box.min.z : box.min.y;
-      this.cloud.uniforms.high!.value = z ? box.max.z : box.max.y;
-      this.cloud.uniforms.upZ!.value = z;
       this.scene.add(this.points);
     }
     this.draw();
@@ -283,11 +307,24 @@ export class View {
     const cut = new Vector4(normal.x, normal.y, normal.z, at);
     this.surface.uniforms.cut!.value = cut;
     this.cloud.uniforms.cut!.value = cut;
+    (this.corners.material as ShaderMaterial).uniforms.cut!.value = cut;
+    const plane = new Plane(normal.clone().negate(), at);
+    for (const [name, line] of Object.entries(this.lines)) {
+      const material = line instanceof Thick ? line.material : line.object.material;
+      const isTool = name === 'preview' || name === 'helper';
+      Object.assign(material, { clippingPlanes: normal.lengthSq() > 0 && !isTool ? [plane] : [] });
+    }
     this.draw();
   }
 
   setCorners(positions: Float32Array, colors: Float32Array): void {
     setDots(this.corners, positions, colors);
+    this.draw();
+  }
+
+  /** Places that stay marked: pins and holes. */
+  setPins(positions: Float32Array, colors: Float32Array): void {
+    setDots(this.pins, positions, colors);
     this.draw();
   }
 
@@ -297,8 +334,8 @@ export class View {
     this.draw();
   }
 
-  setLine(name: keyof View['lines'], positions: Float32Array): void {
-    this.lines[name].set(positions);
+  setLine(name: keyof View['lines'], positions: Float32Array, colors?: Float32Array): void {
+    this.lines[name].set(positions, colors);
     const line = this.lines[name];
     if (line instanceof Thick) line.material.resolution.set(this.canvas.clientWidth, this.canvas.clientHeight);
     this.draw();
@@ -306,6 +343,15 @@ export class View {
 
   piecesOf(kind: 'curve' | 'feature', which: Iterable<number>): Float32Array {
     return pieces(kind === 'curve' ? this.curves : this.features, which);
+  }
+
+  /** Pieces of a curve between two shares of its length. */
+  stretch(picked: { kind: string; index: number }, from: number, to: number): Float32Array {
+    return stretch(picked.kind === 'feature' ? this.features : this.curves, picked.index, from, to);
+  }
+
+  placeAt(picked: { kind: string; index: number }, at: number): number[] {
+    return placeAt(picked.kind === 'feature' ? this.features : this.curves, picked.index, at);
   }
 
   // ---- what is under the cursor
@@ -341,17 +387,29 @@ export class View {
   /** The patch under a pixel, where surfaces are shown. */
   pickPatch(x: number, y: number): number | null {
     if (!this.shown || this.shownIsMesh) return null;
-    if (this.shownTree?.geometry !== this.shown.geometry) {
-      this.shownTree = { geometry: this.shown.geometry, bvh: new MeshBVH(this.shown.geometry, { indirect: true }) };
-    }
+    const bvh = this.treeOfShown(this.shown);
     const alone = this.surface.uniforms.alone!.value as number;
     const patch = this.shown.geometry.getAttribute('patchOf');
-    const hits = this.shownTree.bvh.raycast(this.ray(x, y), 2).sort((a, b) => a.distance - b.distance);
+    const hits = bvh.raycast(this.ray(x, y), 2).sort((a, b) => a.distance - b.distance);
     for (const hit of hits) {
       const found = Math.round(patch.getX(hit.face?.a ?? 0));
-      if (alone < 0 || found === alone) return found;
+      if ((alone < 0 || found === alone) && !this.hidden.has(found)) return found;
     }
     return null;
+  }
+
+  private treeOfShown(shown: Mesh): MeshBVH {
+    if (this.shownTree?.geometry !== shown.geometry) {
+      this.shownTree = { geometry: shown.geometry, bvh: new MeshBVH(shown.geometry, { indirect: true }) };
+    }
+    return this.shownTree.bvh;
+  }
+
+  /** The place of what is shown under a pixel, whatever it is. */
+  pickShown(x: number, y: number): Vector3 | null {
+    if (!this.shown) return null;
+    const hits = this.treeOfShown(this.shown).raycast(this.ray(x, y), 2);
+    return hits.sort((a, b) => a.distance - b.distance)[0]?.point ?? null;
   }
 
   /** Pixel of a place, and its depth. */

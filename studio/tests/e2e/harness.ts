@@ -8,7 +8,7 @@ import { afterAll, beforeAll, expect } from 'vitest';
 import type { State } from '../../src/protocol/types';
 
 const ROOT = resolve(import.meta.dirname, '../../..');
-const PROGRAM = join(ROOT, 'target/release/planish');
+export const PROGRAM = join(ROOT, 'target/release/planish');
 const BROWSERS = ['/usr/bin/chromium', '/usr/bin/chromium-browser', '/usr/bin/google-chrome'];
 /** Pictures for people to look at. */
 export const SHOTS = join(ROOT, 'out/studio');
@@ -24,7 +24,7 @@ const TYPES: Record<string, string> = { html: 'text/html', js: 'text/javascript'
 let browser: Browser;
 
 /** Opens the browser for the tests of a file. */
-export function withBrowser(): void {
+export function withBrowser(more: string[] = []): void {
   beforeAll(async () => {
     mkdirSync(SHOTS, { recursive: true });
     browser = await chromium.launch({
@@ -38,6 +38,7 @@ export function withBrowser(): void {
         '--enable-unsafe-swiftshader',
         '--force-device-scale-factor=1',
         '--hide-scrollbars',
+        ...more,
       ],
     });
   });
@@ -69,6 +70,10 @@ export class Program {
       process.on('exit', (code) => failed(new Error(`planish studio ended with ${code}: ${err}`)));
     });
     return this.url;
+  }
+
+  get pid(): number {
+    return this.process?.pid ?? 0;
   }
 
   /** Ends it, with a signal; returns the exit status. */

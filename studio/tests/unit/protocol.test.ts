@@ -35,11 +35,14 @@ describe('golden messages', () => {
     expect([...kinds].sort()).toEqual([
       'done',
       'exported',
+      'handles',
+      'map',
       'progress',
       'refused',
       'script',
       'state',
       'tried',
+      'tried_patch',
       'welcome',
     ]);
   });

@@ -1,16 +1,19 @@
 //! Answers to requests, and what becomes of jobs that end.
 
+use super::beside::{Peer, other};
 use super::content::{self, Content};
 use super::jobs::Outcome;
 use super::project::{NO_PROJECT, Project};
+use super::scan::Lasso;
 use super::{Table, export};
 use crate::protocol::state::StageName;
 use crate::protocol::{Message, Request, Why};
 use crate::web::hub::Client;
-use planish::observe::Observer;
-use planish::pipeline::{self, ScanParams};
+use planish::field::Spacing;
+use planish::pipeline;
 use planish::surface::Resolution;
 use std::path::Path;
+use std::sync::Arc;
 
 impl<'env> Table<'_, '_, 'env> {
     /// Answers a request; tells if something else comes onto the desk.
@@ -19,12 +22,30 @@ impl<'env> Table<'_, '_, 'env> {
         match request {
             Request::Edit { edit, .. } => self.edit(client, id, edit),
             Request::Try { edit, .. } => self.try_out(client, id, edit),
-            Request::Fit { .. } => match self.fit() {
-                Ok(job) => self.wait_for(client, id, job),
-                Err(why) => self.refuse(client, id, why),
-            },
+            Request::Fit { coarse, .. } => {
+                self.desk.coarse = coarse;
+                match self.fit() {
+                    Ok(job) => self.wait_for(client, id, job),
+                    Err(why) => self.refuse(client, id, why),
+                }
+            }
+            Request::TryPatch { patch, control, tolerance, .. } => {
+                self.try_patch(client, id, patch, control, tolerance);
+            }
+            Request::Handles { curve, control, .. } => self.handles(client, id, &curve, control),
+            Request::Map { patch, .. } => self.map(client, id, patch),
+            Request::Relief { longest, .. } => self.relief(client, id, longest),
+            Request::Clean { .. } => self.clean(client, id),
+            Request::Lasso { view, line, outside, .. } => self.lasso(client, id, &Lasso { view, line, outside }),
+            Request::TakeIn { all, .. } => self.take_in(client, id, all),
+            Request::CloseHole { hole, .. } => self.close_hole(client, id, hole),
+            Request::Peer { file, .. } => self.peer(client, id, file),
+            Request::Branch { branch, .. } => self.branch(client, id, branch),
             Request::Setting { resolution, live, .. } => self.set(client, id, resolution, live),
-            Request::Mesh { close, resolution, .. } => self.mesh(client, id, close, resolution),
+            Request::Mesh { close, resolution, voxel, .. } => match cells(resolution, voxel) {
+                Ok(cells) => self.mesh(client, id, close, cells),
+                Err(why) => self.refuse(client, id, Why::of(why)),
+            },
             Request::Cancel { job, .. } => match self.desk.jobs.stop(job) {
                 true => self.done(client, id, String::new()),
                 false => self.refuse(client, id, Why::of("this job has ended already")),
@@ -89,25 +110,21 @@ impl<'env> Table<'_, '_, 'env> {
         self.tell_state();
     }
 
-    fn mesh(&mut self, client: &Client, id: u32, close: Option<bool>, resolution: Option<usize>) {
-        let Some(scan) = self.project.as_ref().and_then(|p| p.scan.clone()) else {
-            return self.refuse(client, id, Why::of("there is no scan here - hint: drop one on the page"));
+    /// Looks at another project, or at none.
+    pub(super) fn peer(&mut self, client: &Client, id: u32, file: Option<String>) {
+        let Some(project) = &mut *self.project else { return self.refuse(client, id, Why::of(NO_PROJECT)) };
+        let Some(file) = file else {
+            project.peer = None;
+            self.done(client, id, String::new());
+            return self.tell_state();
         };
-        if !self.project.as_ref().is_some_and(|p| p.model.network.curves.is_empty()) {
-            let why = "curves are drawn on the mesh that is there - hint: put the project away and open the scan again";
-            return self.refuse(client, id, Why::of(why));
+        let folder = project.file.parent().unwrap_or(Path::new("")).to_owned();
+        if !content::is_project(Path::new(&file)) || folder.join(&file) == project.file {
+            return self.refuse(client, id, Why::of(format!("{file} is no other project of this folder")));
         }
-        let cells = resolution.map(planish::field::Spacing::Resolution);
-        let params = ScanParams { close, cells, ..ScanParams::default() };
-        let job = self.desk.jobs.start(self.scope, ("mesh", "Making a mesh of the scan"), move |watch| {
-            let observer: &dyn Observer = watch;
-            let made = pipeline::mesh_scan(&scan, &params, observer).map_err(|e| e.to_string()).and_then(|made| {
-                let suited = pipeline::params_for(&made);
-                let (mesh, _) =
-                    planish::mend::repair(&made.meshed.extracted.mesh, observer).map_err(|e| e.to_string())?;
-                Ok(Box::new((mesh, suited)))
-            });
-            Outcome::Meshed(made)
+        let job = self.desk.jobs.start_free("peer", &format!("Reading {file}"), move |_| {
+            let read = other(&folder, &file).map_err(|e| format!("{file}: {e}"));
+            Outcome::Looked(read.map(|(mesh, drawing)| Peer { file, mesh: Arc::new(mesh), drawing: Arc::new(drawing) }))
         });
         self.wait_for(client, id, job);
     }
@@ -139,8 +156,28 @@ impl<'env> Table<'_, '_, 'env> {
             Outcome::Opened(Ok(project)) => (Answer::Done(project.notice.clone()), Some(Content::Project(project))),
             Outcome::Meshed(Ok(made)) => {
                 let (mesh, params) = *made;
-                let next = self.project.take().map(|project| Content::Project(Box::new(project.meshed(mesh, params))));
-                (done(), next)
+                (done(), self.meshed(mesh, params))
+            }
+            Outcome::Cleaned(Ok(known)) => {
+                self.desk.layers.new_points();
+                if let Some(project) = &mut *self.project {
+                    project.known = Some(known);
+                }
+                (done(), None)
+            }
+            Outcome::Parted(Ok((revision, shown))) => {
+                self.parted(revision, shown);
+                (done(), None)
+            }
+            Outcome::Looked(Ok(peer)) => {
+                self.desk.layers.new_peer();
+                if let Some(project) = &mut *self.project {
+                    project.peer = Some(peer);
+                }
+                (done(), None)
+            }
+            Outcome::Cleaned(Err(why)) | Outcome::Parted(Err(why)) | Outcome::Looked(Err(why)) => {
+                (Answer::Refused(Why::of(why)), None)
             }
             Outcome::Meshed(Err(why)) => {
                 self.desk.failed = Some((StageName::Mesh, why.clone()));
@@ -171,6 +208,15 @@ pub(super) enum Answer {
     Refused(Why),
     /// Told already, or later.
     Given,
+}
+
+/// Cells of a mesh to be made: by their number along the longest side, or by their edge.
+fn cells(resolution: Option<usize>, voxel: Option<f64>) -> Result<Option<Spacing>, &'static str> {
+    match (resolution, voxel) {
+        (_, Some(edge)) if !(edge > 0.0 && edge.is_finite()) => Err("the edge of a cell is a length above 0"),
+        (_, Some(edge)) => Ok(Some(Spacing::Voxel(edge))),
+        (resolution, None) => Ok(resolution.map(Spacing::Resolution)),
+    }
 }
 
 /// Fewest and most control points along a curve.

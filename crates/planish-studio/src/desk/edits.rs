@@ -3,12 +3,14 @@
 
 use super::Table;
 use super::answer::{Answer, with};
+use super::beside::other;
 use super::jobs::Outcome;
 use super::project::{Fit, NO_PROJECT, deviations};
 use crate::protocol::state::StageName;
 use crate::protocol::{Message, Why};
 use crate::web::hub::Client;
 use planish::edit::{ApplyError, Edit, Made, apply, preview};
+use planish::grid::GridParams;
 use planish::mesh::FacePoint;
 use planish::model::{Drawing, Model};
 use planish::network::Network;
@@ -16,6 +18,7 @@ use planish::observe::{Observer, Silent};
 use planish::pipeline::{self, Earlier, PipelineObserver};
 use planish::surface::Resolution;
 use std::collections::HashSet;
+use std::path::Path;
 use std::sync::Arc;
 
 impl<'env> Table<'_, '_, 'env> {
@@ -36,7 +39,7 @@ impl<'env> Table<'_, '_, 'env> {
     }
 
     /// The drawing has changed: the file, the surfaces and all pages follow.
-    fn after_edit(&mut self) {
+    pub(super) fn after_edit(&mut self) {
         self.desk.failed = None;
         if let Some(project) = self.project {
             let curves = project.model.network.curves.len();
@@ -56,12 +59,13 @@ impl<'env> Table<'_, '_, 'env> {
     fn start_edit(&mut self, edit: Edit) -> u32 {
         let (drawing, revision) =
             self.project.as_ref().map_or_else(Default::default, |p| (p.model.drawing(), p.revision));
+        let folder = self.project.as_ref().and_then(|p| p.file.parent()).unwrap_or(Path::new("")).to_owned();
         let title = title(&edit);
         let Some(ground) = self.ground else { return 0 };
         self.desk.jobs.start(self.scope, ("edit", title), move |watch| {
             let mut drawing: Drawing = drawing;
             let observer: &dyn Observer = watch;
-            let made = apply(&mut drawing, &edit, ground, &|_| Err("is not here".into()), observer);
+            let made = apply(&mut drawing, &edit, ground, &|name: &str| other(&folder, name), observer);
             Outcome::Edited(revision, edit, Box::new(made.map(|made| (drawing, made))))
         })
     }
@@ -134,22 +138,32 @@ impl<'env> Table<'_, '_, 'env> {
             shift: *shift,
             ..Model::default()
         };
-        let params = with(&project.params, &self.desk.resolution);
+        let coarse = self.desk.coarse;
+        let mut params = with(&project.params, &self.desk.resolution);
+        if coarse {
+            params.grid = coarser(&params.grid);
+        }
         model.params = serde_json::to_string(&params).unwrap_or_default();
-        let earlier = project.fit.as_ref().and_then(|f| f.earlier.clone());
+        // Grids of other parameters cannot be followed.
+        let earlier = project.fit.as_ref().filter(|f| f.coarse == coarse).and_then(|f| f.earlier.clone());
         self.desk.jobs.stop_kind("fit");
-        Ok(self.desk.jobs.start(self.scope, ("fit", "Fitting surfaces"), move |watch| {
-            let observer: &dyn PipelineObserver = watch;
-            model.mesh = mesh.as_ref().clone();
-            let made = pipeline::rework(&mut model, earlier.as_ref(), &params, observer);
-            model.mesh = Default::default();
-            Outcome::Fitted(made.map_err(|e| e.to_string()).map(|made| {
-                let earlier = Earlier::of(&model);
-                let pipeline::Assessed { quality, seams, warnings, .. } = made;
-                let deviations = deviations(&model);
-                Box::new(Fit { revision, model: Arc::new(model), earlier, quality, seams, warnings, deviations })
-            }))
-        }))
+        Ok(self.desk.jobs.start(
+            self.scope,
+            ("fit", if coarse { "Coarse grids" } else { "Fitting surfaces" }),
+            move |watch| {
+                let observer: &dyn PipelineObserver = watch;
+                model.mesh = mesh.as_ref().clone();
+                let made = pipeline::rework(&mut model, earlier.as_ref(), &params, observer);
+                model.mesh = Default::default();
+                Outcome::Fitted(made.map_err(|e| e.to_string()).map(|made| {
+                    let earlier = Earlier::of(&model);
+                    let pipeline::Assessed { quality, seams, warnings, .. } = made;
+                    let deviations = deviations(&model);
+                    let (model, short) = (Arc::new(model), None);
+                    Box::new(Fit { revision, model, earlier, quality, seams, warnings, deviations, coarse, short })
+                }))
+            },
+        ))
     }
 
     /// Takes over fitted surfaces.
@@ -169,6 +183,14 @@ impl<'env> Table<'_, '_, 'env> {
             }
         }
     }
+}
+
+/// Grids at which a fit pauses: a quarter of the points along each side, and none made finer where they miss the mesh.
+fn coarser(grid: &GridParams) -> GridParams {
+    const ALONG: usize = 4;
+    let density = grid.density / (ALONG * ALONG) as f64;
+    let min_side = ((grid.min_side - 1) / ALONG + 1).max(4);
+    GridParams { density, min_side, miss: 1.0, ..grid.clone() }
 }
 
 /// All places of the curves of a network. A curve that is divided leaves pieces that are new curves, and nothing new to see.

@@ -1,6 +1,7 @@
 //! Jobs: what takes long, each on a thread of its own with a copy of what it works on. They tell how far they are, and stop
 //! when they are told.
 
+use super::beside::{Known, Peer, Shown};
 use super::project::Fit;
 use super::{Letter, Project};
 use crate::StudioError;
@@ -24,8 +25,14 @@ const TELL_EVERY: Duration = Duration::from_millis(100);
 pub enum Outcome {
     /// A file was read, or a part made.
     Opened(Result<Box<Project>, String>),
-    /// A scan was meshed: with the parameters that suit it.
-    Meshed(Result<Box<(TriMesh, PipelineParams)>, String>),
+    /// A scan was meshed, with the parameters that suit it; or the mesh mended.
+    Meshed(Result<Box<(TriMesh, Option<PipelineParams>)>, String>),
+    /// Points of a scan were looked at.
+    Cleaned(Result<Arc<Known>, String>),
+    /// Reliefs of a revision were parted.
+    Parted(Result<(u64, Shown), String>),
+    /// Another project was read.
+    Looked(Result<Peer, String>),
     /// An edit was made on the drawing of a revision.
     Edited(u64, Edit, Box<Result<(Drawing, Made), ApplyError>>),
     /// Surfaces were fitted.

@@ -19,6 +19,9 @@ pub struct Layers {
     /// Counts what came onto the desk, and what was fitted.
     content: u64,
     fit: u64,
+    points: u64,
+    relief: u64,
+    peer: u64,
     kept: BTreeMap<Layer, (String, Vec<Bytes>)>,
     waiting: BTreeMap<Layer, (String, Vec<Client>)>,
 }
@@ -36,12 +39,27 @@ impl Layers {
         self.fit += 1;
     }
 
+    /// Points were left out, taken in or looked at.
+    pub fn new_points(&mut self) {
+        self.points += 1;
+    }
+
+    /// Other waves of the reliefs are shown.
+    pub fn new_relief(&mut self) {
+        self.relief += 1;
+    }
+
+    /// Another project is looked at.
+    pub fn new_peer(&mut self) {
+        self.peer += 1;
+    }
+
     /// Names of all geometry that there is.
     pub fn names(&self, project: &Project) -> BTreeMap<Layer, String> {
         let (content, fit, revision) = (self.content, self.fit, project.revision);
         let mut names = BTreeMap::new();
         if project.scan.is_some() {
-            names.insert(Layer::Points, format!("points-{content}"));
+            names.insert(Layer::Points, format!("points-{content}-{}", self.points));
         }
         if !project.mesh.triangles.is_empty() {
             names.insert(Layer::Mesh, format!("mesh-{content}"));
@@ -54,14 +72,13 @@ impl Layers {
             names.insert(Layer::Features, format!("features-{content}-{revision}"));
         }
         if project.fit.is_some() {
-            for (layer, name) in [
-                (Layer::Surfaces, "surfaces"),
-                (Layer::Displaced, "displaced"),
-                (Layer::Isolines, "isolines"),
-                (Layer::Nets, "nets"),
-            ] {
+            for (layer, name) in [(Layer::Surfaces, "surfaces"), (Layer::Isolines, "isolines"), (Layer::Nets, "nets")] {
                 names.insert(layer, format!("{name}-{content}-{fit}"));
             }
+            names.insert(Layer::Displaced, format!("displaced-{content}-{fit}-{}", self.relief));
+        }
+        if project.peer.is_some() {
+            names.insert(Layer::Peer, format!("peer-{content}-{}", self.peer));
         }
         names
     }
@@ -112,9 +129,13 @@ fn builder(project: &Project, layer: Layer) -> Box<dyn FnOnce() -> Arrays + Send
     let center = center(project);
     let (mesh, scan) = (project.mesh.clone(), project.scan.clone());
     let drawing = matches!(layer, Layer::Curves | Layer::Features).then(|| project.model.drawing());
+    let short = project.fit.as_ref().and_then(|f| f.short.clone());
+    let (known, peer) = (project.known.clone(), project.peer.clone().filter(|_| layer == Layer::Peer));
     let fit = project.fit.as_ref().map(|f| f.model.clone());
     Box::new(move || match (layer, drawing, fit) {
-        (Layer::Points, ..) => scan.map(|scan| tessellate::points(&scan, center)).unwrap_or_default(),
+        (Layer::Points, ..) => {
+            scan.map(|scan| tessellate::points(&scan, known.as_ref().map(|k| &k.cloud), center)).unwrap_or_default()
+        }
         (Layer::Mesh, ..) => tessellate::mesh(&mesh, center, true),
         (Layer::Coarse, ..) => tessellate::coarse(&mesh, center),
         (Layer::Curves, Some(drawing), _) => {
@@ -124,15 +145,23 @@ fn builder(project: &Project, layer: Layer) -> Box<dyn FnOnce() -> Arrays + Send
             tessellate::courses(&mesh, center, drawing.sketch.features.iter().map(|f| &f.points[..]))
         }
         (Layer::Surfaces, _, Some(model)) => tessellate::surfaces(&model, center),
-        (Layer::Displaced, _, Some(model)) => tessellate::displaced(&model, center),
+        (Layer::Displaced, _, Some(model)) => {
+            tessellate::displaced(&model, short.as_ref().map(|s| &s.maps[..]), center)
+        }
         (Layer::Isolines, _, Some(model)) => tessellate::isolines(&model, center),
         (Layer::Nets, _, Some(model)) => tessellate::nets(&model, center),
+        (Layer::Peer, ..) => {
+            peer.map(|p| tessellate::mesh(&p.mesh, p.mesh.bounds().center(), false)).unwrap_or_default()
+        }
         _ => Arrays::default(),
     })
 }
 
-/// Middle of the box of a project.
+/// What geometry of a project is sent relative to: the middle of its box.
 pub fn center(project: &Project) -> DVec3 {
+    if let Some(middle) = project.middle {
+        return middle;
+    }
     match &project.scan {
         Some(scan) if project.mesh.triangles.is_empty() => scan.bounds().center(),
         _ => project.mesh.bounds().center(),

@@ -1,10 +1,13 @@
 //! The desk: one thread that owns the project. Requests of all pages come to it one after the other; what takes long runs as
 //! a job beside it, on a copy, and its result is taken over if it still fits.
 //!
-//! 1. what lies on it - `content`, `project`      2. answers - `answer`, `edits`, `export`      3. jobs - `jobs`
+//! 1. what lies on it - `content`, `project`, `beside`      2. answers - `answer`, `edits`, `scan`, `patch`, `branches`, `export`
+//! 3. jobs - `jobs`
 //! 4. nothing is lost - `journal`, `save`      5. what pages see - `state`, `layers`, `tessellate`
 
 mod answer;
+mod beside;
+mod branches;
 mod content;
 mod edits;
 mod export;
@@ -12,8 +15,10 @@ mod exports;
 mod jobs;
 mod journal;
 mod layers;
+mod patch;
 mod project;
 mod save;
+mod scan;
 mod state;
 mod tessellate;
 
@@ -76,6 +81,8 @@ pub struct Desk {
     /// Choices that all pages share.
     resolution: Resolution,
     live: bool,
+    /// True while fits pause at coarse grids.
+    coarse: bool,
     /// What the last failed job was refused for, by the stage.
     failed: Option<(crate::protocol::state::StageName, String)>,
 }
@@ -92,7 +99,8 @@ impl Desk {
         let jobs = Jobs::new(post.clone())?;
         let (resolution, live) = (usual_resolution(), true);
         let layers = Layers::default();
-        Ok(Desk { hub, inbox, post, folder, units, exports, jobs, layers, resolution, live, failed: None })
+        let coarse = false;
+        Ok(Desk { hub, inbox, post, folder, units, exports, jobs, layers, resolution, live, coarse, failed: None })
     }
 
     /// Works until the program ends.
@@ -105,6 +113,7 @@ impl Desk {
         loop {
             self.layers.new_content();
             self.failed = None;
+            self.coarse = false;
             content = match content {
                 Content::End => return,
                 Content::Nothing => self.sit(&mut None, None),

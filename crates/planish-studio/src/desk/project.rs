@@ -1,7 +1,10 @@
 //! A project on the desk: a scan or a mesh with its drawing, what was fitted to it, and its file.
 
+use super::beside::{Branch, Known, Peer, Shown, other};
 use super::journal::Journal;
 use super::save::Saver;
+use crate::protocol::state::Hole;
+use planish::DVec3;
 use planish::cloud::Cloud;
 use planish::edit::{Edit, Ground, Made, Redo, Undo, apply};
 use planish::mesh::TriMesh;
@@ -24,6 +27,18 @@ pub struct Project {
     pub model: Model,
     /// The scan that it was made of, if that is known.
     pub scan: Option<Arc<Cloud>>,
+    /// What is known of its points, if somebody has asked.
+    pub known: Option<Arc<Known>>,
+    /// The scan before each time that points were left out.
+    pub left_out: Vec<Arc<Cloud>>,
+    /// What geometry is sent relative to, where it is not the middle of the box.
+    pub middle: Option<DVec3>,
+    /// Holes of the mesh, while they can be closed.
+    pub holes: Vec<Hole>,
+    /// Edits that were left for others.
+    pub branches: Vec<Branch>,
+    /// Another project that is looked at.
+    pub peer: Option<Peer>,
     /// Its file.
     pub file: PathBuf,
     /// What to know of how it was opened.
@@ -56,6 +71,10 @@ pub struct Fit {
     pub warnings: Vec<Warning>,
     /// Distances of each surface to its grid.
     pub deviations: Vec<Deviation>,
+    /// True if its grids are coarse: a pause on the way.
+    pub coarse: bool,
+    /// The reliefs that are shown, if not those of the model.
+    pub short: Option<Shown>,
 }
 
 /// Distances of each surface of a model to its grid.
@@ -92,6 +111,12 @@ impl Project {
         Project {
             mesh,
             scan: None,
+            known: None,
+            left_out: Vec::new(),
+            middle: None,
+            holes: Vec::new(),
+            branches: Vec::new(),
+            peer: None,
             notice,
             revision: 1,
             faults: Vec::new(),
@@ -114,7 +139,7 @@ impl Project {
 
     /// The project of a scan with the mesh that was made of it.
     pub fn meshed(self, mesh: TriMesh, params: PipelineParams) -> Project {
-        Project { mesh: Arc::new(mesh), params, ..self }.unsaved()
+        Project { mesh: Arc::new(mesh), params, middle: None, ..self }.unsaved()
     }
 
     /// One that no file holds yet.
@@ -131,7 +156,8 @@ impl Project {
             let (quality, seams) = (Quality::new(), Vec::new());
             let (warnings, deviations) = (Vec::new(), deviations(&model));
             let (revision, model) = (self.revision, Arc::new(model));
-            self.fit = Some(Fit { revision, model, earlier, quality, seams, warnings, deviations });
+            let (coarse, short) = (false, None);
+            self.fit = Some(Fit { revision, model, earlier, quality, seams, warnings, deviations, coarse, short });
         }
         self
     }
@@ -151,6 +177,7 @@ impl Project {
             self.notice = format!("{count} edit{s} of the last session came back from its journal.");
         }
         self.look(ground);
+        self.look_for_holes(&ground.canvas.adjacency);
         self.save();
     }
 
@@ -202,6 +229,7 @@ impl Project {
     }
 
     fn record(&mut self, edit: &Edit, drawing: Drawing, made: &Made, ground: &Ground) {
+        self.fork();
         self.model.record(HistoryEntry { command: edit.name(), parameters: edit.parameters() }, drawing);
         self.revision += 1;
         match &made.faults {
@@ -222,7 +250,7 @@ impl Project {
 
     /// Takes over what a job has fitted. Surfaces of an older drawing are shown, but not kept.
     pub fn fitted(&mut self, fit: Fit) {
-        if fit.revision == self.revision {
+        if fit.revision == self.revision && !fit.coarse {
             let Model { grids, surfaces, reliefs, params, .. } = fit.model.as_ref();
             (self.model.grids, self.model.surfaces, self.model.reliefs) =
                 (grids.clone(), surfaces.clone(), reliefs.clone());
@@ -275,14 +303,4 @@ impl Project {
 /// Tells one state of the drawing and its history from another.
 fn journal_state(model: &Model) -> u64 {
     super::journal::state_of(&model.drawing(), model.undo.len(), model.redo.len())
-}
-
-/// Another model of the folder, by its bare name.
-fn other(folder: &Path, name: &str) -> Result<(TriMesh, Drawing), String> {
-    if Path::new(name).file_name() != Some(name.as_ref()) {
-        return Err("is not a file of the project's folder".into());
-    }
-    let model = planish_io::read_model(folder.join(name)).map_err(|e| e.to_string())?;
-    let drawing = model.drawing();
-    Ok((model.mesh, drawing))
 }

@@ -6,10 +6,12 @@ use super::{Table, content};
 use crate::protocol::state::{Curve, Fault, Fitted, Kind, Offer, Patch, Seam, Stage, StageName, Standing, State, Step};
 use crate::protocol::{Why, state};
 use planish::DVec3;
+use planish::grid::Family;
 use planish::mesh::TriMesh;
-use planish::model::Drawing;
+use planish::model::{Drawing, Sketch};
 use planish::network::{self, CurveKind};
 use planish::pipeline::worst_seams;
+use std::path::Path;
 
 /// Seams that are told at most.
 const SEAMS: usize = 200;
@@ -30,11 +32,11 @@ impl Table<'_, '_, '_> {
         State {
             revision: project.revision,
             project: Some(facts(project)),
-            files: Vec::new(),
+            files: others(project),
             stages: self.stages(project),
             corners: network.corners.iter().map(corner).collect(),
             curves: network.curves.iter().map(|c| curve(mesh, c)).collect::<Vec<_>>(),
-            patches: patches(&network, of_now),
+            patches: patches(&network, &sketch, of_now),
             features: sketch.features.iter().map(|f| f.patch).collect(),
             faults: project.faults.iter().map(fault).collect(),
             symmetry: sketch.symmetry.map(|p| [p.point.to_array(), p.normal.to_array()]),
@@ -55,6 +57,12 @@ impl Table<'_, '_, '_> {
             seams: of_now.map_or_else(Vec::new, seams),
             warnings: of_now.map_or_else(Vec::new, |f| f.warnings.iter().map(|w| w.message.clone()).collect()),
             jobs,
+            cleaned: project.known.as_ref().map(|k| k.told()),
+            left_out: left_out(project),
+            holes: project.holes.clone(),
+            branches: project.told_branches(),
+            longest: of_now.and_then(|f| f.short.as_ref()).map(|s| s.longest),
+            peer: project.peer.as_ref().map(|p| p.told()),
         }
         .with_control(of_now)
     }
@@ -83,6 +91,9 @@ impl Table<'_, '_, '_> {
             _ => Standing::Partial,
         };
         let (fitted, surfaces) = match &project.fit {
+            Some(fit) if fit.revision == project.revision && fit.coarse => {
+                (Standing::Partial, fit.model.surfaces.len())
+            }
             Some(fit) if fit.revision == project.revision => (Standing::Fresh, fit.model.surfaces.len()),
             Some(fit) => (Standing::Stale, fit.model.surfaces.len()),
             None => (Standing::Empty, 0),
@@ -134,8 +145,22 @@ fn facts(project: &Project) -> state::Project {
         points: project.scan.as_ref().map_or(0, |s| s.points.len() as u64),
         center: center(project).to_array(),
         diagonal: bounds.diagonal(),
+        coloured: project.mesh.attributes.iter().any(|a| a.name == "color"),
         notice: project.notice.clone(),
     }
+}
+
+/// Other projects in the folder of a project.
+fn others(project: &Project) -> Vec<String> {
+    let folder = project.file.parent().unwrap_or(Path::new(""));
+    let own = project.file.file_name().unwrap_or_default();
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    content::projects(folder).into_iter().filter(|f| f.as_str() != own).collect()
+}
+
+fn left_out(project: &Project) -> u64 {
+    let now = project.scan.as_ref().map_or(0, |s| s.points.len());
+    project.left_out.first().map_or(0, |all| (all.points.len() - now) as u64)
 }
 
 fn parted_note(patches: usize, faults: usize) -> String {
@@ -154,13 +179,23 @@ fn curve(mesh: &TriMesh, curve: &network::Curve) -> Curve {
     Curve { ends: curve.corners, kind, length, control: None }
 }
 
-fn patches(network: &network::Network, fit: Option<&Fit>) -> Vec<Patch> {
+fn patches(network: &network::Network, sketch: &Sketch, fit: Option<&Fit>) -> Vec<Patch> {
     let fitted = |p: usize| {
         let (surface, found) = fit.and_then(|f| Some((f.model.surfaces.get(p)?, f.deviations.get(p)?)))?;
-        Some(Fitted { control: [surface.cols as u32, surface.rows as u32], rms: found.rms, max: found.max })
+        let grid = fit?.model.grids.get(p)?;
+        let cells = [grid.cols as u32 - 1, grid.rows as u32 - 1];
+        Some(Fitted { control: [surface.cols as u32, surface.rows as u32], cells, rms: found.rms, max: found.max })
     };
-    let patch =
-        |(p, patch): (usize, &network::Patch)| Patch { curves: patch.sides.map(|s| s.curve), fitted: fitted(p) };
+    let patch = |(p, patch): (usize, &network::Patch)| {
+        let asked = sketch.sections.iter().find(|s| s.0 as usize == p).map(|s| &s.1);
+        let sections =
+            asked.map_or_else(Default::default, |s| [&s.u, &s.v].map(|l| l.iter().map(|&n| n as u32).collect()));
+        // Curves that run along v part the patch along u.
+        let of =
+            |family: Family| sketch.features.iter().filter(|f| f.patch as usize == p && f.family == family).count();
+        let parts = [Family::V, Family::U].map(|f| of(f) as u32 + 1);
+        Patch { curves: patch.sides.map(|s| s.curve), sections, parts, fitted: fitted(p) }
+    };
     network.patches.iter().enumerate().map(patch).collect()
 }
 

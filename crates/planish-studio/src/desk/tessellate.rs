@@ -8,6 +8,7 @@ use planish::grid::Grid;
 use planish::mesh::{Adjacency, DecimateParams, DecimateTarget, FacePoint, NONE, TriMesh, decimate, next, sharp_edges};
 use planish::model::Model;
 use planish::observe::Silent;
+use planish::relief::{self, Relief};
 use rayon::prelude::*;
 
 /// Edges sharper than this are shown with an edge, degrees.
@@ -23,11 +24,26 @@ const SIDE: [usize; 2] = [9, 65];
 const ISOLINES: usize = 7;
 
 /// Points of a scan, as many as can be shown.
-pub fn points(cloud: &Cloud, center: DVec3) -> Arrays {
+/// * `known` - the same points with what is known of them
+pub fn points(cloud: &Cloud, known: Option<&Cloud>, center: DVec3) -> Arrays {
     let step = cloud.points.len().div_ceil(POINTS).max(1);
     let mut arrays = Arrays::default();
     let shown = cloud.points.iter().step_by(step);
     arrays.floats("position", 3, shown.flat_map(|p| relative(*p, center)));
+    let found = [("normal", 3), ("noise", 1), ("confidence", 1), ("segment", 1), ("outlier", 1)];
+    let known = known.filter(|k| k.points.len() == cloud.points.len());
+    for (attribute, width) in
+        known.iter().flat_map(|k| found.iter().filter_map(|&(n, w)| Some((k.attribute(n, w)?, w))))
+    {
+        arrays.floats(
+            &attribute.name,
+            width as u32,
+            attribute.values.chunks_exact(width).step_by(step).flatten().copied(),
+        );
+    }
+    if let Some(color) = cloud.attribute("color", 3) {
+        arrays.floats("color", 3, color.values.chunks_exact(3).step_by(step).flatten().copied());
+    }
     arrays
 }
 
@@ -127,7 +143,7 @@ fn nodes(grid: &Grid, patches: usize) -> [Vec<usize>; 2] {
 }
 
 /// `most` of `count` numbers, the first and the last among them.
-fn even(count: usize, most: usize) -> Vec<usize> {
+pub(super) fn even(count: usize, most: usize) -> Vec<usize> {
     let shown = count.min(most).max(2);
     (0..shown).map(|k| (k * (count - 1) + (shown - 1) / 2) / (shown - 1)).collect()
 }
@@ -170,12 +186,17 @@ pub fn surfaces(model: &Model, center: DVec3) -> Arrays {
     arrays
 }
 
-/// The surfaces with their relief: the grids.
-pub fn displaced(model: &Model, center: DVec3) -> Arrays {
+/// The surfaces with their relief: the grids, or with other reliefs.
+pub fn displaced(model: &Model, reliefs: Option<&[Relief]>, center: DVec3) -> Arrays {
     let (mut positions, mut normals) = (Vec::new(), Vec::new());
-    for grid in &model.grids {
+    let made: Option<Vec<Vec<DVec3>>> = reliefs.and_then(|reliefs| {
+        let each = model.surfaces.par_iter().zip(reliefs);
+        each.map(|(surface, relief)| relief::displace(surface, relief)).collect::<Result<_, _>>().ok()
+    });
+    for (k, grid) in model.grids.iter().enumerate() {
         let [us, vs] = nodes(grid, model.grids.len());
-        let at = |i: usize, j: usize| grid.points[vs[j] * grid.cols + us[i]];
+        let points = made.as_ref().and_then(|m| m.get(k)).unwrap_or(&grid.points);
+        let at = |i: usize, j: usize| points[vs[j] * grid.cols + us[i]];
         for j in 0..vs.len() {
             for i in 0..us.len() {
                 let (a, b) = (i.saturating_sub(1), (i + 1).min(us.len() - 1));

@@ -5,7 +5,7 @@
 pub mod frame;
 pub mod state;
 
-use planish::edit::Edit;
+use planish::edit::{CurveName, Edit};
 use planish::surface::Resolution;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ pub use state::State;
 /// Version of the protocol: a page of another version loads itself anew.
 pub const VERSION: u32 = 1;
 
-/// What the page asks for. Every request is answered once, by `done`, `refused`, `tried`, `script` or `exported`.
+/// What the page asks for. Every request is answered once, by `done`, `refused`, or what it asks for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Request {
@@ -36,6 +36,93 @@ pub enum Request {
     Fit {
         /// Number of the request.
         id: u32,
+        /// True to pause at coarse grids, so that one sees early how they run.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        coarse: bool,
+    },
+    /// One patch tried alone with numbers of control points of its own, or with the fewest that keep a tolerance.
+    TryPatch {
+        /// Number of the request.
+        id: u32,
+        /// The patch.
+        patch: u32,
+        /// Along u and v; absent for the fewest that keep the tolerance.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        control: Option<[usize; 2]>,
+        /// Largest RMS distance, world units.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        tolerance: Option<f64>,
+    },
+    /// Control vertices of the space curve that a curve would be drawn through.
+    Handles {
+        /// Number of the request.
+        id: u32,
+        /// The curve.
+        curve: CurveName,
+        /// How many.
+        control: usize,
+    },
+    /// The displacement map of a patch.
+    Map {
+        /// Number of the request.
+        id: u32,
+        /// The patch.
+        patch: u32,
+    },
+    /// Reliefs shown as they are, or only their waves shorter than a length.
+    Relief {
+        /// Number of the request.
+        id: u32,
+        /// The longest waves that are shown, world units; all if absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        longest: Option<f64>,
+    },
+    /// Noise, normals and outliers of the scan.
+    Clean {
+        /// Number of the request.
+        id: u32,
+    },
+    /// Points of the scan left out: those within a line around them on the screen, or those without.
+    Lasso {
+        /// Number of the request.
+        id: u32,
+        /// From the places that geometry is sent in to clip space, column by column.
+        view: [f64; 16],
+        /// Corners of the line, from -1 to 1.
+        line: Vec<[f64; 2]>,
+        /// True to leave out what lies without.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        outside: bool,
+    },
+    /// The last points that were left out taken in again, or all.
+    TakeIn {
+        /// Number of the request.
+        id: u32,
+        /// True for all.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        all: bool,
+    },
+    /// One hole of the mesh closed; before curves are drawn.
+    CloseHole {
+        /// Number of the request.
+        id: u32,
+        /// Its number.
+        hole: u32,
+    },
+    /// Another project of the folder looked at, so that its network can be carried over.
+    Peer {
+        /// Number of the request.
+        id: u32,
+        /// Its file name; absent to put it away.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        file: Option<String>,
+    },
+    /// Edits that were left for others, taken up again.
+    Branch {
+        /// Number of the request.
+        id: u32,
+        /// Which.
+        branch: u32,
     },
     /// How fine surfaces are, and whether they follow every edit.
     Setting {
@@ -56,6 +143,9 @@ pub enum Request {
         /// Cells along the longest side; those that suit the scan if absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         resolution: Option<usize>,
+        /// The edge of a cell, world units; in place of their number.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        voxel: Option<f64>,
     },
     /// A job ended without its result.
     Cancel {
@@ -110,7 +200,17 @@ impl Request {
         match *self {
             Request::Edit { id, .. }
             | Request::Try { id, .. }
-            | Request::Fit { id }
+            | Request::Fit { id, .. }
+            | Request::TryPatch { id, .. }
+            | Request::Handles { id, .. }
+            | Request::Map { id, .. }
+            | Request::Relief { id, .. }
+            | Request::Clean { id }
+            | Request::Lasso { id, .. }
+            | Request::TakeIn { id, .. }
+            | Request::CloseHole { id, .. }
+            | Request::Peer { id, .. }
+            | Request::Branch { id, .. }
             | Request::Setting { id, .. }
             | Request::Mesh { id, .. }
             | Request::Cancel { id, .. }
@@ -146,6 +246,8 @@ pub enum Layer {
     Isolines,
     /// Control nets.
     Nets,
+    /// The mesh of the other project that is looked at.
+    Peer,
 }
 
 /// A file to be made.
@@ -219,6 +321,39 @@ pub enum Message {
         curves: Vec<Vec<f32>>,
         /// Corners that would be new or moved.
         corners: Vec<[f32; 3]>,
+    },
+    /// How near a patch alone comes.
+    TriedPatch {
+        /// Number of the request.
+        id: u32,
+        /// Control points along u and v.
+        control: [usize; 2],
+        /// Root of the mean square distance to its grid, world units.
+        rms: f64,
+        /// Largest distance, world units.
+        max: f64,
+    },
+    /// Control vertices of a curve.
+    Handles {
+        /// Number of the request.
+        id: u32,
+        /// World positions.
+        points: Vec<[f64; 3]>,
+    },
+    /// A displacement map.
+    Map {
+        /// Number of the request.
+        id: u32,
+        /// Texels along u.
+        cols: u32,
+        /// Texels along v.
+        rows: u32,
+        /// Heights along the normal, world units, the row of v = 0 first.
+        heights: Vec<f32>,
+        /// Root of the mean square displacement.
+        rms: f64,
+        /// Largest displacement.
+        most: f64,
     },
     /// How far jobs are.
     Progress {

@@ -48,6 +48,18 @@ pub struct State {
     pub warnings: Vec<String>,
     /// Running jobs.
     pub jobs: Vec<Job>,
+    /// What is known of the points of the scan.
+    pub cleaned: Option<Cleaned>,
+    /// Points of the scan that were left out by hand.
+    pub left_out: u64,
+    /// Holes of the mesh, the longest first, while they can be closed.
+    pub holes: Vec<Hole>,
+    /// Edits that were left for others, until the project is put away.
+    pub branches: Vec<Branch>,
+    /// The longest waves that the relief is shown with, world units.
+    pub longest: Option<f64>,
+    /// The other project that is looked at.
+    pub peer: Option<Peer>,
 }
 
 impl State {
@@ -73,8 +85,64 @@ impl State {
             seams: Vec::new(),
             warnings: Vec::new(),
             jobs: Vec::new(),
+            cleaned: None,
+            left_out: 0,
+            holes: Vec::new(),
+            branches: Vec::new(),
+            longest: None,
+            peer: None,
         }
     }
+}
+
+/// What is known of the points of a scan.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cleaned {
+    /// Standard deviation of the points, world units.
+    pub noise: f64,
+    /// Distance of neighbouring points, world units.
+    pub spacing: f64,
+    /// Points that are outliers.
+    pub outliers: u64,
+    /// Pieces of surface that do not hang together.
+    pub parts: u32,
+    /// The edge of a cell that suits them, world units.
+    pub voxel: f64,
+}
+
+/// A hole of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Hole {
+    /// Its length around, world units.
+    pub around: f64,
+    /// A place on it, world units.
+    pub place: [f64; 3],
+}
+
+/// Edits that were left for others.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Branch {
+    /// Edits from the beginning on.
+    pub edits: u32,
+    /// Those of them that the drawing of now does not have, by their names in a script.
+    pub own: Vec<String>,
+}
+
+/// Another project that is looked at.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Peer {
+    /// Its file name.
+    pub file: String,
+    /// Middle of its box; its geometry is sent relative to it.
+    pub center: [f64; 3],
+    /// Diagonal of its box.
+    pub diagonal: f64,
+    /// Curves of its network.
+    pub curves: u32,
 }
 
 /// A project.
@@ -99,6 +167,8 @@ pub struct Project {
     pub center: [f64; 3],
     /// Diagonal of the box.
     pub diagonal: f64,
+    /// True if the vertices of the mesh have colours.
+    pub coloured: bool,
     /// What to know of how it was opened.
     pub notice: String,
 }
@@ -181,6 +251,10 @@ pub enum Kind {
 pub struct Patch {
     /// Its curves.
     pub curves: [u32; 4],
+    /// Cells of its grid that were asked for, section by section: along u, and along v. Empty where they are left to the program.
+    pub sections: [Vec<u32>; 2],
+    /// Sections that its feature curves make along u and along v.
+    pub parts: [u32; 2],
     /// Its surface, if it has one.
     pub fitted: Option<Fitted>,
 }
@@ -191,6 +265,8 @@ pub struct Patch {
 pub struct Fitted {
     /// Control points along u and v.
     pub control: [u32; 2],
+    /// Cells of its grid along u and v.
+    pub cells: [u32; 2],
     /// Root of the mean square distance to the mesh, world units.
     pub rms: f64,
     /// Largest distance, world units.

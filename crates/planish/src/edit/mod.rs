@@ -26,7 +26,7 @@ mod work;
 pub use apply::{apply, preview};
 pub use change::{
     AddCorner, Clear, Continuity, DeleteCorner, DeleteCurves, DragCorner, DragCurve, Join, Mirror, Relax, Seam, Spline,
-    SplitCurve, SplitRegion, Symmetry, mirror_network,
+    SplitCurve, SplitRegion, Symmetry, handles, mirror_network,
 };
 pub use draw::{Boundaries, Carry, Complete, Cut, Extend, FeatureLines, Paint, Project, carry_network};
 pub use error::ApplyError;

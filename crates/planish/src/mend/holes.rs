@@ -47,26 +47,47 @@ pub fn close_holes(
             }
             // A lid runs against the edges of its hole.
             let rim: Vec<u32> = around.iter().rev().map(|&h| mesh.origin(h)).collect();
-            Ok(lid_over(mesh, &adjacency, around, &rim).map(|lid| (rim, lid)))
+            Ok(lid_over(mesh, &adjacency, around, &rim, true).map(|lid| (rim, lid)))
         })
         .collect();
     let mut count = 0;
     for (rim, lid) in made?.into_iter().flatten() {
-        let first = mesh.points.len() as u32;
-        let name = |v: u32| rim.get(v as usize).copied().unwrap_or_else(|| first + v - rim.len() as u32);
-        mesh.triangles.extend(lid.triangles.iter().map(|t| t.map(name)));
-        let own = &lid.points[rim.len()..];
-        mesh.points.extend(own);
-        tags.vertices.extend(own.iter().map(|_| FeatureKind::None));
-        for a in &mut mesh.attributes {
-            let at = |v: u32, k: usize| a.values[v as usize * a.width + k];
-            let mean = |k: usize| rim.iter().map(|&v| at(v, k)).sum::<f32>() / rim.len() as f32;
-            let value: Vec<f32> = (0..a.width).map(mean).collect();
-            own.iter().for_each(|_| a.values.extend(&value));
-        }
+        cover(mesh, tags, &rim, &lid);
         count += 1;
     }
     Ok(count)
+}
+
+/// Closes the hole of an oriented manifold whose boundary comes nearest to a place, as somebody has asked for it: whatever lies
+/// around. False, and the mesh as it was, if its boundary touches itself or has too many edges.
+pub fn close_hole(mesh: &mut TriMesh, tags: &mut FeatureTags, near: DVec3) -> bool {
+    let adjacency = Adjacency::new(mesh);
+    let away = |h: &u32| mesh.points[mesh.origin(*h) as usize].distance_squared(near);
+    let nearest = |around: &Vec<u32>| around.iter().map(away).fold(f64::INFINITY, f64::min);
+    let loops = boundary_loops(&adjacency);
+    let Some(around) = loops.iter().min_by(|a, b| nearest(a).total_cmp(&nearest(b))) else { return false };
+    if around.len() > MOST_EDGES {
+        return false;
+    }
+    let rim: Vec<u32> = around.iter().rev().map(|&h| mesh.origin(h)).collect();
+    let found = lid_over(mesh, &adjacency, around, &rim, false);
+    found.inspect(|lid| cover(mesh, tags, &rim, lid)).is_some()
+}
+
+/// Puts a lid on its rim.
+fn cover(mesh: &mut TriMesh, tags: &mut FeatureTags, rim: &[u32], lid: &Lid) {
+    let first = mesh.points.len() as u32;
+    let name = |v: u32| rim.get(v as usize).copied().unwrap_or_else(|| first + v - rim.len() as u32);
+    mesh.triangles.extend(lid.triangles.iter().map(|t| t.map(name)));
+    let own = &lid.points[rim.len()..];
+    mesh.points.extend(own);
+    tags.vertices.extend(own.iter().map(|_| FeatureKind::None));
+    for a in &mut mesh.attributes {
+        let at = |v: u32, k: usize| a.values[v as usize * a.width + k];
+        let mean = |k: usize| rim.iter().map(|&v| at(v, k)).sum::<f32>() / rim.len() as f32;
+        let value: Vec<f32> = (0..a.width).map(mean).collect();
+        own.iter().for_each(|_| a.values.extend(&value));
+    }
 }
 
 fn step(mesh: &TriMesh, h: u32) -> DVec3 {
@@ -74,7 +95,8 @@ fn step(mesh: &TriMesh, h: u32) -> DVec3 {
 }
 
 /// The lid over a boundary, if that is a hole of the surface around.
-fn lid_over(mesh: &TriMesh, adjacency: &Adjacency, around: &[u32], rim: &[u32]) -> Option<Lid> {
+/// * `told` - true to tell holes from ends by what lies around
+fn lid_over(mesh: &TriMesh, adjacency: &Adjacency, around: &[u32], rim: &[u32], told: bool) -> Option<Lid> {
     let n = rim.len();
     let points: Vec<DVec3> = rim.iter().map(|&v| mesh.points[v as usize]).collect();
     let beside: Vec<Vec<u32>> = rim
@@ -98,7 +120,7 @@ fn lid_over(mesh: &TriMesh, adjacency: &Adjacency, around: &[u32], rim: &[u32]) 
         return None;
     }
     let flat = least_area(&points, taken)?;
-    if n > CRACK {
+    if told && n > CRACK {
         let area: f64 = flat.iter().map(|t| cross(&points, t).length()).sum();
         let lid: DVec3 = flat.iter().map(|t| cross(&points, t)).sum();
         let sides: DVec3 = around.iter().map(|&h| mesh.area_vector(h as usize / 3)).sum();
@@ -133,6 +155,26 @@ mod tests {
         let points = &mesh.points;
         mesh.triangles.retain(|t| t.iter().all(|&v| points[v as usize].distance(DVec3::Z) > radius));
         crate::mend::repair(&mesh, &crate::Silent).unwrap().0
+    }
+
+    #[test]
+    fn a_pipe_gets_lids_on_those_of_its_two_ends_that_are_asked_for() {
+        let mut mesh = shapes::cylinder(1.0, 3.0, 24);
+        let normal = |t: usize, m: &TriMesh| m.area_vector(t).normalize().z.abs();
+        let sides: Vec<[u32; 3]> =
+            (0..mesh.triangles.len()).filter(|&t| normal(t, &mesh) < 0.5).map(|t| mesh.triangles[t]).collect();
+        mesh.triangles = sides;
+        let mut mesh = crate::mend::repair(&mesh, &crate::Silent).unwrap().0;
+        let mut tags = FeatureTags::from_edges(mesh.points.len(), []);
+        assert_eq!(close_holes(&mut mesh, &mut tags, 100.0, &crate::Silent).unwrap(), 0);
+        assert_eq!(boundary_loops(&Adjacency::new(&mesh)).len(), 2);
+        let top = mesh.bounds().max.z;
+        assert!(close_hole(&mut mesh, &mut tags, DVec3::new(0.0, 0.0, 10.0)));
+        let left = boundary_loops(&Adjacency::new(&mesh));
+        assert_eq!(left.len(), 1);
+        assert!(left[0].iter().all(|&h| mesh.points[mesh.origin(h) as usize].z < top - 1.0));
+        assert!(close_hole(&mut mesh, &mut tags, DVec3::ZERO) && diagnose(&mesh).watertight);
+        assert!(!close_hole(&mut mesh, &mut tags, DVec3::ZERO));
     }
 
     #[test]

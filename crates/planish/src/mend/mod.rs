@@ -11,7 +11,7 @@ pub(crate) mod rims;
 mod slivers;
 mod trim;
 
-pub use holes::close_holes;
+pub use holes::{close_hole, close_holes};
 pub use repair::{part_fans, repair, weld};
 pub use repairs::Repairs;
 pub(crate) use rims::finish;

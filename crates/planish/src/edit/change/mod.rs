@@ -25,7 +25,7 @@ pub use drag_curve::DragCurve;
 pub use join::Join;
 pub use mirror::{Mirror, mirror_network};
 pub use relax::Relax;
-pub use spline::Spline;
+pub use spline::{Spline, handles};
 pub use split_curve::SplitCurve;
 pub use split_region::SplitRegion;
 pub use symmetry::Symmetry;

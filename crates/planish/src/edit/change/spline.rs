@@ -1,9 +1,11 @@
 //! Edits a curve through the control vertices of a space curve ([K98] §3.3.2 and 3.3.3).
 
-use crate::curve::SplineEdit;
+use crate::curve::{Canvas, SplineEdit, SurfaceCurve};
 use crate::edit::check::{self, Range, within};
-use crate::edit::work::Work;
-use crate::edit::{ApplyError, Command, CurveName, SplineMove};
+use crate::edit::work::{Ground, Work};
+use crate::edit::{ApplyError, Command, CurveName, Others, SplineMove};
+use crate::model::Drawing;
+use crate::observe::Silent;
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,6 +14,35 @@ use serde::{Deserialize, Serialize};
 const FEWEST_CONTROL: usize = 4;
 /// More would follow every edge of any mesh, and the system for them is dense.
 const MOST_CONTROL: usize = 1000;
+
+/// A curve at even places, and the space curve through them.
+fn spline_of(canvas: &Canvas, course: &SurfaceCurve, control: usize) -> Result<(SurfaceCurve, SplineEdit), ApplyError> {
+    let (mesh, adjacency) = (canvas.mesh, &canvas.adjacency);
+    let even = course.spaced(mesh, adjacency, canvas.edge)?;
+    // A short curve still has as many places as its spline has vertices.
+    let even = even.resampled(mesh, adjacency, even.points.len().max(2 * control))?;
+    let spline = SplineEdit::fit(mesh, &even, control)?;
+    Ok((even, spline))
+}
+
+/// Control vertices of the space curve that a [`Spline`] edit of a curve would begin with, world units.
+/// * `control` - how many, `4..=1000`
+/// # Errors
+/// As the edit.
+pub fn handles(
+    drawing: &Drawing,
+    curve: &CurveName,
+    control: usize,
+    ground: &Ground,
+) -> Result<Vec<DVec3>, ApplyError> {
+    let edit = Spline { curve: curve.clone(), control, moves: Vec::new() };
+    edit.check()?;
+    let mut copy = drawing.clone();
+    let others: &Others = &|_| Err("no other model is looked at".into());
+    let mut work = Work { ground, drawing: &mut copy, others, observer: &Silent, relaxed: Vec::new(), images: None };
+    let curve = work.curve(curve)?;
+    work.edit_curve(curve, |e, curve, _| spline_of(&ground.canvas, &e.course(curve), control).map(|(_, s)| s.control))
+}
 
 /// Fits a space curve with some control vertices, moves it, and lets the curve follow. Without moves it smooths.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -50,11 +81,7 @@ impl Command for Spline {
         let canvas = &work.ground.canvas;
         let (mesh, adjacency) = (canvas.mesh, &canvas.adjacency);
         work.edit_curve(curve, |e, curve, _| -> Result<(), ApplyError> {
-            let course = e.course(curve);
-            let even = course.spaced(mesh, adjacency, canvas.edge)?;
-            // A short curve still has as many places as its spline has vertices.
-            let even = even.resampled(mesh, adjacency, even.points.len().max(2 * self.control))?;
-            let mut spline = SplineEdit::fit(mesh, &even, self.control)?;
+            let (even, mut spline) = spline_of(canvas, &e.course(curve), self.control)?;
             for m in &self.moves {
                 match *m {
                     SplineMove::Control { vertex, by } => {

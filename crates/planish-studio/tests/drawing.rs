@@ -1,0 +1,228 @@
+//! What a page can do besides edits: points looked at and left out, holes closed, sizes tried, handles, maps, ways of the history,
+//! networks of other projects.
+
+mod common;
+
+use common::*;
+use planish::DVec3;
+use planish::synthetic::shapes;
+use planish_io::WriteOptions;
+use serde_json::{Value, json};
+
+/// A ball of radius 1 as points, with 20 far ones beside it.
+fn points(folder: &std::path::Path) -> std::path::PathBuf {
+    let count = 6000;
+    let on = |k: usize| {
+        let (z, a) = (1.0 - 2.0 * (k as f64 + 0.5) / count as f64, 2.4 * k as f64);
+        let r = (1.0f64 - z * z).sqrt() * (1.0 + 0.002 * planish::geom::random::unit(3, k as u64));
+        format!("{} {} {}\n", r * a.cos(), r * a.sin(), z)
+    };
+    let far = |k: usize| format!("3 {} 0\n", 0.05 * k as f64);
+    let path = folder.join("ball.xyz");
+    std::fs::write(&path, (0..count).map(on).chain((0..20).map(far)).collect::<String>()).unwrap();
+    path
+}
+
+/// The view along z without perspective, which sees all that is nearer than `reach`.
+fn view(reach: f64) -> Value {
+    let mut m = [0.0; 16];
+    [0, 5, 10].iter().for_each(|&k| m[k] = 1.0 / reach);
+    m[15] = 1.0;
+    json!(m)
+}
+
+#[test]
+fn points_are_looked_at_left_out_and_taken_in_and_make_a_mesh_of_a_given_cell() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), Some(points(folder.path())));
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["layers"]["points"].is_string()).await;
+        let first = page.state["layers"]["points"].clone();
+        assert_eq!(page.ask(json!({ "type": "clean" })).await["type"], "done");
+        page.state_with(|s| s["cleaned"].is_object()).await;
+        assert_ne!(page.state["layers"]["points"], first, "the points have colours now");
+        assert!(page.state["cleaned"]["spacing"].as_f64().unwrap() < 0.1, "{}", page.state["cleaned"]);
+        // All within the ball's box are kept; the far ones go. Geometry is relative to the middle of the box.
+        let center: Vec<f64> =
+            page.state["project"]["center"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+        let at = |x: f64, y: f64| [(x - center[0]) / 10.0, (y - center[1]) / 10.0];
+        let line = json!([at(2.0, -0.5), at(4.0, -0.5), at(4.0, 2.0), at(2.0, 2.0)]);
+        let lasso = json!({ "type": "lasso", "view": view(10.0), "line": line });
+        assert_eq!(page.ask(lasso.clone()).await["type"], "done");
+        page.state_with(|s| s["left_out"] == 20).await;
+        assert_eq!(page.state["project"]["center"], json!(center), "what is shown stays where it is");
+        assert_eq!(page.state["cleaned"], Value::Null);
+        assert_eq!(page.ask(lasso.clone()).await["type"], "refused");
+        page.ask(json!({ "type": "take_in" })).await;
+        page.state_with(|s| s["left_out"] == 0).await;
+        assert_eq!(page.ask(lasso).await["type"], "done");
+        assert_eq!(page.ask(json!({ "type": "mesh", "voxel": -1.0 })).await["type"], "refused");
+        let mut triangles = Vec::new();
+        let mut name = Value::Null;
+        for voxel in [0.24, 0.12] {
+            assert_eq!(page.ask(json!({ "type": "mesh", "close": true, "voxel": voxel })).await["type"], "done");
+            page.state_with(|s| s["layers"]["mesh"].is_string() && s["layers"]["mesh"] != name).await;
+            name = page.state["layers"]["mesh"].clone();
+            triangles.push(page.state["project"]["triangles"].as_f64().unwrap());
+        }
+        let ratio = triangles[1] / triangles[0];
+        assert!((2.5..5.0).contains(&ratio), "half the cell, {ratio} times the triangles");
+        assert_eq!(page.state["holes"], json!([]));
+    });
+    server.end();
+}
+
+#[test]
+fn a_pipe_is_closed_at_one_end_and_stays_open_at_the_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut pipe = shapes::cylinder(1.0, 3.0, 32);
+    let side = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| pipe.points[v as usize]);
+        (b - a).cross(c - a).normalize().dot(DVec3::Z).abs() < 0.5
+    };
+    let sides = pipe.triangles.iter().copied().filter(side).collect();
+    pipe.triangles = sides;
+    let path = folder.path().join("pipe.ply");
+    planish_io::write_mesh(&path, &pipe, &WriteOptions::default()).unwrap();
+    let server = Server::start(folder.path(), Some(path));
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["holes"].as_array().is_some_and(|h| h.len() == 2)).await;
+        let around = page.state["holes"][0]["around"].as_f64().unwrap();
+        assert!((around - 6.28).abs() < 0.1, "{around}");
+        assert_eq!(page.ask(json!({ "type": "close_hole", "hole": 0 })).await["type"], "done");
+        page.state_with(|s| s["holes"].as_array().is_some_and(|h| h.len() == 1)).await;
+        assert_eq!(page.ask(json!({ "type": "close_hole", "hole": 7 })).await["type"], "refused");
+        page.edit(json!({ "edit": "boundaries" })).await;
+        page.state_with(|s| counts(s)[0] > 0).await;
+        let refused = page.ask(json!({ "type": "close_hole", "hole": 0 })).await;
+        assert!(refused["why"]["message"].as_str().unwrap().contains("curves are drawn"), "{refused}");
+    });
+    server.end();
+}
+
+#[test]
+fn a_patch_is_tried_alone_has_handles_a_map_and_waves_and_grids_pause_coarse() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), Some(sphere(folder.path(), 5)));
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["layers"]["mesh"].is_string()).await;
+        let setting = json!({ "type": "setting", "resolution": { "control": [6, 6] }, "live": false });
+        page.ask(setting).await;
+        assert_eq!(page.ask(json!({ "type": "map", "patch": 0 })).await["type"], "refused");
+        assert_eq!(page.edit(json!({ "edit": "complete", "patches": 6 })).await["type"], "done");
+        assert_eq!(page.ask(json!({ "type": "fit", "coarse": true })).await["type"], "done");
+        page.state_with(|s| s["stages"][4]["is"] == "partial").await;
+        let coarse = page.state["patches"][0]["fitted"]["cells"][0].as_u64().unwrap();
+        assert_eq!(page.ask(json!({ "type": "export", "format": "step" })).await["type"], "refused");
+        assert_eq!(page.ask(json!({ "type": "fit" })).await["type"], "done");
+        page.state_with(|s| s["stages"][4]["is"] == "fresh").await;
+        let fine = page.state["patches"][0]["fitted"]["cells"][0].as_u64().unwrap();
+        assert!(fine >= 3 * coarse, "{coarse} cells, then {fine}");
+        let rms = |answer: &Value| answer["rms"].as_f64().unwrap_or_else(|| panic!("{answer}"));
+        let tried = |control: [u32; 2]| json!({ "type": "try_patch", "patch": 0, "control": control });
+        let [few, many] = [page.ask(tried([4, 4])).await, page.ask(tried([12, 12])).await];
+        assert!(rms(&many) < 0.2 * rms(&few), "{few} {many}");
+        let wanted = 0.5 * (rms(&few) + rms(&many));
+        let found = page.ask(json!({ "type": "try_patch", "patch": 0, "tolerance": wanted })).await;
+        assert!(rms(&found) <= wanted && found["control"].as_array().unwrap().iter().all(|c| c.as_u64() < Some(12)));
+        assert_eq!(page.ask(tried([3, 4])).await["type"], "refused");
+        let handles = page.ask(json!({ "type": "handles", "curve": 0, "control": 7 })).await;
+        let places = handles["points"].as_array().unwrap_or_else(|| panic!("{handles}"));
+        assert_eq!(places.len(), 7);
+        let radius = |p: &Value| (0..3).map(|k| p[k].as_f64().unwrap().powi(2)).sum::<f64>().sqrt();
+        assert!(places.iter().all(|p| (radius(p) - 1.0).abs() < 0.3), "{handles}");
+        assert_eq!(page.ask(json!({ "type": "handles", "curve": 99, "control": 7 })).await["type"], "refused");
+        let map = page.ask(json!({ "type": "map", "patch": 0 })).await;
+        let texels = map["cols"].as_u64().unwrap() * map["rows"].as_u64().unwrap();
+        assert_eq!(map["heights"].as_array().unwrap().len() as u64, texels);
+        let name = page.state["layers"]["displaced"].clone();
+        assert_eq!(page.ask(json!({ "type": "relief", "longest": 0.05 })).await["type"], "done");
+        page.state_with(|s| s["longest"] == 0.05).await;
+        assert_ne!(page.state["layers"]["displaced"], name);
+        let short = page.ask(json!({ "type": "map", "patch": 0 })).await;
+        assert!(rms(&short) <= 1.01 * rms(&map), "{} of {}", short["rms"], map["rms"]);
+        assert_eq!(page.ask(json!({ "type": "relief", "longest": 0.0 })).await["type"], "refused");
+        page.ask(json!({ "type": "relief" })).await;
+        page.state_with(|s| s["longest"] == Value::Null).await;
+    });
+    server.end();
+}
+
+#[test]
+fn another_way_of_the_history_is_kept_and_gone_back_to_with_the_same_curves() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), Some(sphere(folder.path(), 4)));
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["layers"]["mesh"].is_string()).await;
+        page.ask(json!({ "type": "setting", "resolution": { "control": [6, 6] }, "live": false })).await;
+        let [x, y, z] = CIRCLES.map(|(normal, through)| cut(normal, through));
+        for edit in [&x, &y, &z] {
+            assert_eq!(page.edit(edit.clone()).await["type"], "done");
+        }
+        page.state_with(|s| counts(s)[2] == 3).await;
+        let first = page.state["curves"].clone();
+        page.edit(json!({ "edit": "undo", "count": 2 })).await;
+        page.state_with(|s| counts(s)[2] == 1).await;
+        assert_eq!(page.state["branches"], json!([]), "it can still be made again");
+        page.edit(z).await;
+        page.state_with(|s| counts(s)[2] == 2).await;
+        assert_eq!(page.state["branches"], json!([{ "edits": 3, "own": ["cut", "cut"] }]));
+        let second = page.state["curves"].clone();
+        assert_eq!(page.ask(json!({ "type": "branch", "branch": 0 })).await["type"], "done");
+        page.state_with(|s| counts(s)[2] == 3).await;
+        assert_eq!(page.state["curves"], first);
+        assert_eq!(page.state["branches"], json!([{ "edits": 2, "own": ["cut"] }]));
+        assert_eq!(page.ask(json!({ "type": "branch", "branch": 0 })).await["type"], "done");
+        page.state_with(|s| counts(s)[2] == 2).await;
+        assert_eq!(page.state["curves"], second);
+        assert_eq!(page.ask(json!({ "type": "branch", "branch": 5 })).await["type"], "refused");
+    });
+    server.end();
+}
+
+#[test]
+fn the_network_of_another_project_comes_over_by_three_landmarks() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), Some(sphere(folder.path(), 4)));
+    let mut curves = 0;
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["layers"]["mesh"].is_string()).await;
+        page.ask(json!({ "type": "setting", "resolution": { "control": [6, 6] }, "live": false })).await;
+        for (normal, through) in CIRCLES {
+            page.edit(cut(normal, through)).await;
+        }
+        page.state_with(|s| counts(s)[2] == 3 && s["project"]["saved"] == true).await;
+        curves = counts(&page.state)[0];
+        assert!(curves >= 12, "{curves} curves");
+    });
+    server.end();
+    let large = folder.path().join("large.ply");
+    planish_io::write_mesh(&large, &shapes::sphere(2.0, 4), &WriteOptions::default()).unwrap();
+    let server = Server::start(folder.path(), Some(large));
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["layers"]["mesh"].is_string()).await;
+        assert_eq!(page.state["files"], json!(["sphere.planish"]));
+        assert_eq!(page.ask(json!({ "type": "peer", "file": "../sphere.planish" })).await["type"], "refused");
+        assert_eq!(page.ask(json!({ "type": "peer", "file": "sphere.planish" })).await["type"], "done");
+        page.state_with(|s| s["peer"]["curves"] == curves).await;
+        assert!(page.state["layers"]["peer"].is_string());
+        let landmarks = json!([
+            [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]],
+            [[0.0, 1.0, 0.0], [0.0, 2.0, 0.0]],
+            [[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]],
+            [[-1.0, 0.0, 0.0], [-2.0, 0.0, 0.0]]
+        ]);
+        let carried = page.edit(json!({ "edit": "carry", "from": "sphere.planish", "landmarks": landmarks })).await;
+        assert_eq!(carried["type"], "done", "{carried}");
+        page.state_with(|s| counts(s)[0] >= 12).await;
+        page.ask(json!({ "type": "peer" })).await;
+        page.state_with(|s| s["peer"] == Value::Null).await;
+    });
+    server.end();
+}
