@@ -1,4 +1,4 @@
-"""Relief moved to another model: the bumps of a dense ball on patches that were laid out without them.
+"""Relief moved to another model: the bumps of a ball on other patches of its smooth form.
 
 python move_relief.py [OUTPUT.planish]
 """
@@ -10,15 +10,15 @@ import numpy as np
 import planish
 
 
-def main(output: str = "moved.planish", *, level: int = 5) -> planish.Model:
+def main(output: str = "moved.planish", *, level: int = 4) -> planish.Model:
     ball = planish.sphere(10.0, level)
     unit = ball.points / 10.0
-    height = 0.1 * np.sin(9.0 * unit[:, 0]) * np.sin(11.0 * unit[:, 1]) * np.sin(8.0 * unit[:, 2])
+    height = 0.05 * np.sin(25.0 * unit[:, 0]) * np.sin(22.0 * unit[:, 1])
     bumpy = planish.Mesh(ball.points + height[:, None] * unit, ball.triangles)
 
-    # On few control points the bumps are left to the displacement maps.
+    # On few control points the bumps are left to the displacement maps; the smooth form gets patches of its own.
     detailed = bumpy.fit(patches=6, control=[6, 6])
-    plain = ball.fit(patches=24, control=[6, 6])
+    plain = detailed.surface_mesh("base").fit(patches=24, tolerance=2e-4)
 
     moved = plain.transfer_relief(detailed)
     wanted = detailed.surface_mesh("displaced")

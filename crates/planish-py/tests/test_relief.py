@@ -8,30 +8,27 @@ import pytest
 import planish
 
 
-def bumpy(seed: int, patches: int) -> planish.Model:
-    """A ball with bumps, on few control points: the bumps are relief."""
-    ball = planish.sphere(10.0, 5)
-    unit = ball.points / 10.0
-    bumps = 0.1 * np.sin(9.0 * unit[:, 0] + seed) * np.sin(11.0 * unit[:, 1]) * np.sin(8.0 * unit[:, 2])
-    return planish.Mesh(ball.points + bumps[:, None] * unit, ball.triangles).fit(patches=patches, control=[6, 6])
-
-
 @pytest.fixture(scope="module")
 def detailed() -> planish.Model:
-    return bumpy(0, 6)
+    """A ball with bumps, on few control points: the bumps are relief."""
+    ball = planish.sphere(10.0, 4)
+    unit = ball.points / 10.0
+    bumps = 0.05 * np.sin(25.0 * unit[:, 0]) * np.sin(22.0 * unit[:, 1])
+    return planish.Mesh(ball.points + bumps[:, None] * unit, ball.triangles).fit(patches=6, control=[6, 6])
 
 
 @pytest.fixture(scope="module")
-def plain() -> planish.Model:
-    return planish.sphere(10.0, 5).fit(patches=24, control=[6, 6])
+def plain(detailed: planish.Model) -> planish.Model:
+    """Its smooth form on other patches."""
+    return detailed.surface_mesh("base").fit(patches=24, tolerance=2e-4)
 
 
 def test_detail_moves_to_a_model_with_another_network(detailed: planish.Model, plain: planish.Model) -> None:
     made = plain.transfer_relief(detailed)
     assert made.facts["missed"] == 0 and made.facts["texels"] == sum(r.vectors.shape[0] * r.vectors.shape[1] for r in made.reliefs)
     wanted = detailed.surface_mesh("displaced")
-    before, after = (m.surface_mesh("displaced").compare(wanted)["both"]["max"] for m in (plain, made))
-    assert before > 0.05 and after < 0.35 * before
+    before, after = (m.surface_mesh("displaced").compare(wanted)["both"]["rms"] for m in (plain, made))
+    assert before > 0.03 and after < 0.3 * before
     assert made.history[-1]["command"] == "relief transfer" and made.edit_relief("undo").reliefs[0].vectors.tolist() == plain.reliefs[0].vectors.tolist()
     nothing = plain.transfer_relief(detailed, reach=1e-9)
     assert nothing.facts["missed"] == nothing.facts["texels"]
