@@ -3,6 +3,7 @@
 #   make demo    build the program and run everything on a synthetic part: products in out/demo
 #   make test    all tests: the library, the program, files read back by other programs' libraries
 #   make studio  the page of the studio, which the program has inside
+#   make site    the documentation as a site: out/site
 #   make wheel   the Python package with the program inside: out/wheels
 #   make fuzz    damaged files for ten minutes a format, 300 killed sessions, hostile shapes through every command
 #   make lint    formatting and clippy, warnings are errors
@@ -20,7 +21,7 @@ PYTHON  := .venv/bin/python
 DATA    := $(or $(PLANISH_DATA),../shared/data)
 
 .NOTPARALLEL:
-.PHONY: build demo studio wheel fuzz deny test test-rust test-readers test-studio test-python lint bench bench-studio figures docs clean
+.PHONY: build demo studio site wheel fuzz deny test test-rust test-readers test-studio test-python lint bench bench-studio figures docs clean
 .DELETE_ON_ERROR:
 
 build: .stamp/packages .stamp/page
@@ -30,7 +31,7 @@ demo: build
 	$(PLANISH) demo -o out/demo
 	@echo "open out/demo/report.html"
 
-test: test-rust test-readers test-studio
+test: test-rust test-readers test-studio test-python site
 
 studio: .stamp/page
 
@@ -62,6 +63,12 @@ wheel: .stamp/packages .stamp/python .stamp/page
 test-python: wheel
 	$(PYTHON) -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall out/wheels/*.whl
 	$(PYTHON) -m pytest crates/planish-py/tests
+
+# The reference of the package comes from the wheel that is installed: after `test-python`, or `make wheel` and pip.
+site: .stamp/site
+	@$(PYTHON) -c 'import planish' 2>/dev/null || $(MAKE) --no-print-directory test-python
+	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict --quiet
+	@echo "open out/site/index.html"
 
 # PLANISH_FUZZ_SECONDS: for each of the seventeen formats. Another PLANISH_FUZZ_SEED makes other files.
 fuzz: export PLANISH_FUZZ_SECONDS ?= 600
@@ -127,6 +134,11 @@ clean:
 	@mkdir -p .stamp
 	.ci/packages readers
 	test -x $(PYTHON) || python3 -m venv .venv
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check -r $<
+	@touch $@
+
+# What builds the site.
+.stamp/site: docs/requirements.txt .stamp/python
 	$(PYTHON) -m pip install --quiet --disable-pip-version-check -r $<
 	@touch $@
 

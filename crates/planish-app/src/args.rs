@@ -1,27 +1,33 @@
 //! What the user can say: commands in the order of the pipeline, and their options.
 
+pub mod examples;
 pub mod groups;
 pub mod relief;
 pub mod stages;
 pub mod steps;
 
-pub use groups::{Common, HoleArgs, Policy, ScanArgs};
+pub use groups::{Common, FromArgs, HoleArgs, Policy, ScanArgs, ToArgs};
 pub use stages::AllStages;
 pub use steps::{Step, Steps};
 
 use crate::failure::Failure;
 use crate::options::StageOptions;
 use crate::tolerance::Tolerance;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
+use planish::DVec3;
 use planish::cloud::{CleanParams, ProjectParams};
 use planish::contour::ContourParams;
 use planish::field;
+use planish::geom::Aabb;
 use planish::layout::LayoutParams;
 use planish::mesh::{DecimateParams, SmoothParams};
 use planish::pipeline::ScanParams;
 use planish::synthetic::ScannerParams;
 use planish_io::Up;
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
 
 /// Turns raw scans and dense triangle meshes into smooth B-spline patches with displacement maps.
 #[derive(Parser, Debug)]
@@ -46,37 +52,150 @@ pub struct Cli {
 #[derive(Subcommand, Debug)]
 pub enum Command {
     /// Scan a synthetic part with sharp edges and fine detail, and run everything on the noisy scan
+    #[command(after_help = examples::DEMO)]
     Demo(Demo),
     /// Everything: scan or mesh in; surfaces, displacement maps and a report out
+    #[command(after_help = examples::RUN)]
     Run(Run),
     /// Scan -> denoised, oriented points with outliers and features flagged
+    #[command(after_help = examples::CLEAN)]
     Clean(Clean),
     /// Scan, mesh, solid script, milling job or volume -> a closed mesh with sharp edges
+    #[command(after_help = examples::MESH)]
     Mesh(Mesh),
     /// Take noise off a mesh; sharp edges stay
+    #[command(after_help = examples::SMOOTH)]
     Smooth(Smooth),
     /// Make a mesh of fewer triangles; sharp edges stay
+    #[command(after_help = examples::DECIMATE)]
     Decimate(Decimate),
     /// Mesh -> a network of four-sided patches to start from
+    #[command(after_help = examples::LAYOUT)]
     Layout(Layout),
     /// Mesh and network -> grids, surfaces, seams and relief in one model file
+    #[command(after_help = examples::FIT)]
     Fit(Fit),
     /// Model and script -> the model with curves, corners and feature curves edited
+    #[command(after_help = examples::EDIT)]
     Edit(Edit),
     /// Control points moved or loaded; the relief goes along
+    #[command(after_help = examples::DEFORM)]
     Deform(relief::Deform),
     /// Displacement maps: export, import, edit, part, level, transfer
     Relief(relief::Relief),
     /// Model -> STEP, IGES, USD, mesh, network or displacement maps; the format comes from the extension
+    #[command(after_help = examples::EXPORT)]
     Export(Export),
     /// Distances between any two scans, meshes or models: signed, in figures, columns and pictures
+    #[command(after_help = examples::COMPARE)]
     Compare(Compare),
     /// Move, turn, scale, mirror or crop a mesh or a scan, or fit it on another
+    #[command(after_help = examples::TRANSFORM)]
     Transform(Transform),
     /// What is in a file, and what is wrong with it
+    #[command(after_help = examples::INFO)]
     Info(Info),
     /// Draw patches on a scan or a mesh in the browser, and watch the surface follow
+    #[command(after_help = examples::STUDIO)]
     Studio(Studio),
+    /// Words that a shell completes after `planish`
+    #[command(after_help = examples::COMPLETIONS)]
+    Completions(Completions),
+    /// Pages of the manual
+    #[command(after_help = examples::MAN)]
+    Man(Man),
+}
+
+impl Cli {
+    /// Reads a command line, the program's name first.
+    /// # Errors
+    /// What clap says; help and version are errors, too.
+    pub fn read(args: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {
+        let mut program = Cli::command();
+        let matches = program.try_get_matches_from_mut(args)?;
+        let mut cli = Cli::from_arg_matches(&matches).map_err(|e| e.format(&mut program))?;
+        if let (Command::Run(run), Some((name, matches))) = (&mut cli.command, matches.subcommand()) {
+            run.given = given(program.find_subcommand(name), matches);
+        }
+        Ok(cli)
+    }
+}
+
+/// The options that were given, as they are written on the command line, in the order of the help.
+fn given(command: Option<&clap::Command>, matches: &ArgMatches) -> Vec<OsString> {
+    let mut all = Vec::new();
+    for arg in command.into_iter().flat_map(|c| c.get_arguments()) {
+        let (id, Some(long)) = (arg.get_id().as_str(), arg.get_long()) else { continue };
+        if matches.value_source(id) != Some(ValueSource::CommandLine) {
+            continue;
+        }
+        let flag = format!("--{long}");
+        if !arg.get_action().takes_values() {
+            all.push(flag.into());
+            continue;
+        }
+        for value in matches.get_raw(id).into_iter().flatten() {
+            let mut text = OsString::from(format!("{flag}="));
+            text.push(value);
+            all.push(text);
+        }
+    }
+    all
+}
+
+impl Command {
+    /// The options that all commands have which read or write something.
+    pub fn common(&self) -> Option<&Common> {
+        Some(match self {
+            Command::Demo(a) => &a.common,
+            Command::Run(a) => &a.common,
+            Command::Clean(a) => &a.common,
+            Command::Mesh(a) => &a.common,
+            Command::Smooth(a) => &a.common,
+            Command::Decimate(a) => &a.common,
+            Command::Layout(a) => &a.common,
+            Command::Fit(a) => &a.common,
+            Command::Edit(a) => &a.common,
+            Command::Deform(a) => &a.common,
+            Command::Relief(a) => a.command.common(),
+            Command::Export(a) => &a.common,
+            Command::Compare(a) => &a.common,
+            Command::Transform(a) => &a.common,
+            Command::Info(a) => &a.common,
+            Command::Studio(a) => &a.common,
+            Command::Completions(_) | Command::Man(_) => return None,
+        })
+    }
+}
+
+/// `planish completions`
+#[derive(Args, Debug)]
+pub struct Completions {
+    /// The shell
+    pub shell: Shell,
+}
+
+/// Shells that complete words.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Shell {
+    /// GNU Bash
+    Bash,
+    /// The Z shell
+    Zsh,
+    /// The friendly interactive shell
+    Fish,
+    /// PowerShell
+    Powershell,
+}
+
+/// `planish man`
+#[derive(Args, Debug)]
+pub struct Man {
+    /// The command, such as `run` or `relief export` [default: the program itself]
+    pub command: Vec<String>,
+    /// Folder for the pages of all commands; made if missing
+    #[arg(short, long, value_name = "DIR", conflicts_with = "command")]
+    pub output: Option<PathBuf>,
 }
 
 /// An axis that points up.
@@ -115,11 +234,25 @@ pub struct Demo {
 #[derive(Args, Debug)]
 pub struct Run {
     /// A mesh (PLY, OBJ, STL, GLB, glTF) or a scan (E57, LAS, LAZ, PLY without faces, PCD, XYZ, TXT, CSV, ASC, PTS, NPY,
-    /// NPZ, CONF)
-    pub input: PathBuf,
+    /// NPZ, CONF); `-` is standard input. Several files, or a pattern such as 'scans/*.e57', get a folder each below DIR, with
+    /// a table and a report of all
+    #[arg(required = true, value_name = "INPUT")]
+    pub inputs: Vec<PathBuf>,
     /// Folder for the products; made if missing
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
+    /// Of several inputs, so many at once; a single one gets a folder below DIR, too. What an earlier run has finished is left
+    /// out, as far as content, options and version are the same
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<NonZeroUsize>,
+    /// Name of the folder below DIR, for the only input: one of a batch that another program has parted.
+    #[arg(long, hide = true, value_name = "DIR", requires = "jobs")]
+    pub folder: Option<String>,
+    #[command(flatten)]
+    pub from: FromArgs,
+    /// The options as they were given, for the runs of a batch.
+    #[arg(skip)]
+    pub given: Vec<OsString>,
     #[command(flatten)]
     pub scan: ScanArgs,
     /// Network to use instead of an automatic one
@@ -138,14 +271,30 @@ pub struct Run {
     pub points: StageOptions<ProjectParams>,
 }
 
+impl Run {
+    /// True if a folder for each input is meant.
+    pub fn is_batch(&self) -> bool {
+        self.inputs.len() > 1 || self.jobs.is_some() || self.inputs.iter().any(|path| is_pattern(path))
+    }
+}
+
+/// True for what is no file by itself and has a letter of a pattern: `*`, `?` or `[`. Shells that expand patterns leave none.
+pub fn is_pattern(path: &Path) -> bool {
+    path.to_str().is_some_and(|text| text.contains(['*', '?', '['])) && !path.exists()
+}
+
 /// `planish clean`
 #[derive(Args, Debug)]
 pub struct Clean {
     /// The scan: E57, LAS, LAZ, PLY, PCD, XYZ, TXT, CSV, ASC, PTS, NPY, NPZ or CONF
     pub scan: PathBuf,
-    /// The points: .ply or .xyz (all columns), .las, .laz or .e57
+    /// The points: .ply or .xyz (all columns), .las, .laz or .e57; `-` is standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub from: FromArgs,
+    #[command(flatten)]
+    pub to: ToArgs,
     /// Also write each segment into a file of its own beside the output
     #[arg(long)]
     pub segment: bool,
@@ -166,11 +315,22 @@ pub struct Clean {
 #[derive(Args, Debug)]
 pub struct Mesh {
     /// A scan (see `clean`); a mesh (PLY, OBJ, STL, GLB, glTF), also one with holes and intersections; a script of
-    /// solids or a milling job (.toml); or a volume (.nrrd, .npy)
+    /// solids or a milling job (.toml); a volume (.nrrd, .npy); or with --formula a formula. `-` is standard input
     pub input: PathBuf,
-    /// The mesh: .ply (with feature tags), .obj, .stl or .glb
+    /// The mesh: .ply (with feature tags), .obj, .stl or .glb; or the field itself as a volume, .nrrd or .npy: distances below
+    /// zero inside. `-` is standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// The input is a formula of x, y and z, negative inside, such as 'x^2 + y^2 - 1'
+    #[arg(long, requires = "bounds")]
+    pub formula: bool,
+    /// Where the body of a formula ends: x0,y0,z0,x1,y1,z1, or two numbers for all axes
+    #[arg(long, value_name = "FROM,TO", requires = "formula", allow_negative_numbers = true, value_parser = bounds)]
+    pub bounds: Option<Aabb>,
+    #[command(flatten)]
+    pub from: FromArgs,
+    #[command(flatten)]
+    pub to: ToArgs,
     #[command(flatten)]
     pub common: Common,
     #[command(flatten)]
@@ -251,9 +411,13 @@ fn default_memory() -> u64 {
 pub struct Smooth {
     /// The mesh: PLY (feature tags are respected), OBJ, STL, GLB or glTF
     pub mesh: PathBuf,
-    /// The smoothed mesh: .ply, .obj, .stl or .glb
+    /// The smoothed mesh: .ply, .obj, .stl or .glb; `-` is standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub from: FromArgs,
+    #[command(flatten)]
+    pub to: ToArgs,
     #[command(flatten)]
     pub common: Common,
     #[command(flatten)]
@@ -265,9 +429,13 @@ pub struct Smooth {
 pub struct Decimate {
     /// The mesh: PLY (feature tags are respected), OBJ, STL, GLB or glTF
     pub mesh: PathBuf,
-    /// The decimated mesh: .ply, .obj, .stl or .glb
+    /// The decimated mesh: .ply, .obj, .stl or .glb; `-` is standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub from: FromArgs,
+    #[command(flatten)]
+    pub to: ToArgs,
     #[command(flatten)]
     pub common: Common,
     #[command(flatten)]
@@ -279,9 +447,11 @@ pub struct Decimate {
 pub struct Layout {
     /// The mesh: PLY, OBJ, STL, GLB or glTF
     pub mesh: PathBuf,
-    /// The network
+    /// The network; `-` is standard output
     #[arg(short, long, value_name = "NETWORK.json")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub from: FromArgs,
     #[command(flatten)]
     pub common: Common,
     #[command(flatten)]
@@ -298,9 +468,11 @@ pub struct Fit {
     /// Network on the mesh [default: an automatic one]
     #[arg(long, value_name = "NETWORK.json")]
     pub network: Option<PathBuf>,
-    /// The model
+    /// The model; `-` is standard output
     #[arg(short, long, value_name = "MODEL.planish")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub from: FromArgs,
     #[command(flatten)]
     pub common: Common,
     #[command(flatten)]
@@ -338,9 +510,13 @@ pub struct Export {
     #[arg(value_name = "MODEL.planish")]
     pub model: PathBuf,
     /// Where to: .step, .stp, .igs or .iges (surfaces), .usda (surfaces and a mesh), .ply, .obj, .stl or .glb (a mesh),
-    /// .json (the network), or a folder (displacement maps)
+    /// .json (the network), or a folder (displacement maps); `-` is standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub from: FromArgs,
+    #[command(flatten)]
+    pub to: ToArgs,
     /// Which surface a mesh format gets, and the mesh of USD
     #[arg(long, value_name = "WORD", default_value = "displaced")]
     pub surface: ExportWord,
@@ -380,8 +556,10 @@ pub enum ExportWord {
 pub struct Compare {
     /// A scan, a mesh or a model: what is judged
     pub a: PathBuf,
-    /// A scan, a mesh or a model: what it should be like
+    /// A scan, a mesh or a model: what it should be like. `-` is standard input, for one of both
     pub b: PathBuf,
+    #[command(flatten)]
+    pub from: FromArgs,
     /// A with its distance from B in a column for each vertex or point (below zero inside of B), and coloured by it
     #[arg(short, long, value_name = "FILE.ply")]
     pub output: Option<PathBuf>,
@@ -415,9 +593,13 @@ pub struct Compare {
 pub struct Transform {
     /// A mesh or a scan of any format that is read
     pub input: PathBuf,
-    /// The same moved: .ply, .obj, .stl or .glb for a mesh; .ply, .xyz, .las, .laz or .e57 for a scan
+    /// The same moved: .ply, .obj, .stl or .glb for a mesh; .ply, .xyz, .las, .laz or .e57 for a scan; `-` is standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub from: FromArgs,
+    #[command(flatten)]
+    pub to: ToArgs,
     #[command(flatten)]
     pub steps: Steps,
     #[command(flatten)]
@@ -429,10 +611,27 @@ pub struct Transform {
 /// `planish info`
 #[derive(Args, Debug)]
 pub struct Info {
-    /// Any file that planish reads or writes: scan, mesh, model, volume, script, network, report, STEP, EXR, folder of maps
-    pub file: PathBuf,
+    /// Any files that planish reads or writes: scan, mesh, model, volume, script, network, report, STEP, EXR, folder of maps.
+    /// `-` is standard input
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    #[command(flatten)]
+    pub from: FromArgs,
     #[command(flatten)]
     pub common: Common,
+}
+
+/// The box of a formula.
+fn bounds(text: &str) -> Result<Aabb, String> {
+    let wanted = "two or six numbers parted by commas are needed, the greater ones last";
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse::<f64>()).collect();
+    let found = match numbers.map_err(|_| wanted)?[..] {
+        [a, b] => Aabb { min: DVec3::splat(a), max: DVec3::splat(b) },
+        [a, b, c, d, e, f] => Aabb { min: DVec3::new(a, b, c), max: DVec3::new(d, e, f) },
+        _ => return Err(wanted.into()),
+    };
+    let fine = found.min.is_finite() && found.max.is_finite() && found.min.cmplt(found.max).all();
+    if fine { Ok(found) } else { Err(wanted.into()) }
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -49,6 +49,7 @@ pub fn check(command: &Command) -> Result<(), Failure> {
         Command::Compare(a) => columns(&a.scan),
         Command::Transform(a) => columns(&a.scan),
         Command::Deform(_) | Command::Info(_) | Command::Studio(_) => Ok(()),
+        Command::Completions(_) | Command::Man(_) => Ok(()),
     }
 }
 

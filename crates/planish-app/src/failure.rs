@@ -73,7 +73,8 @@ impl Failure {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "error: {}: {}", words::plain(&self.subject), words::message(&self.what))?;
+        let subject = words::told(&self.subject);
+        write!(f, "error: {}: {}", words::plain(&subject), words::message(&words::told(&self.what)))?;
         // Library errors may already end in their own way out.
         match &self.hint {
             Some(hint) if !self.what.contains(" - hint: ") => write!(f, " - hint: {}", words::plain(hint)),

@@ -94,7 +94,7 @@ pub fn is_model(path: &Path) -> bool {
 /// The facts of a mesh as an input.
 pub fn mesh_facts(path: &Path, mesh: &TriMesh, units: Units) -> Input {
     Input {
-        path: path.display().to_string(),
+        path: crate::words::told(&path.display().to_string()),
         kind: "mesh".into(),
         counts: [("triangles", mesh.triangles.len()), ("vertices", mesh.points.len())]
             .map(|(what, n)| (what.to_owned(), n as u64))

@@ -13,31 +13,34 @@ mod placed;
 mod products;
 mod progress;
 mod shapes;
+mod stdout;
+mod streams;
 mod summary;
 mod tolerance;
 mod usage;
 mod words;
 
-use clap::Parser;
 use failure::{Failure, Status};
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 
-pub use commands::with_hint;
+pub use commands::{folder_names, with_hint};
 
 /// Runs the program and returns its exit status. It takes the whole process: its thread pool, its handlers of signals, and
 /// after an interrupt it ends the process.
 /// * `args` - the command line, the program's name first
-pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
-    let cli = match args::Cli::try_parse_from(args) {
+/// * `program` - how this program is started anew, for the runs of a batch: the path of an executable, and what it needs
+///   before a command
+pub fn run(args: impl IntoIterator<Item = OsString>, program: &[OsString]) -> u8 {
+    let cli = match args::Cli::read(args) {
         Ok(cli) => cli,
         Err(error) => {
             usage::tell(&error);
             return if error.use_stderr() { Status::Usage as u8 } else { Status::Done as u8 };
         }
     };
-    guarded(|| commands::run(cli)) as u8
+    guarded(|| commands::run(cli, program)) as u8
 }
 
 /// Runs `work`; failures and panics become one line on stderr and an exit status.

@@ -465,7 +465,30 @@ mod tests {
                 }
                 assert!(ids.insert(arg.get_id().clone()), "planish {}: two ids {}", command.get_name(), arg.get_id());
             }
-            assert!(names.contains("--report"), "{names:?}");
+            let tells = !["completions", "man"].contains(&command.get_name());
+            assert_eq!(names.contains("--report"), tells, "{names:?}");
+        }
+    }
+
+    #[test]
+    fn every_command_has_examples_that_it_takes() {
+        for (words, command) in leaves() {
+            let told = command.get_after_help().map(|t| t.to_string()).unwrap_or_default();
+            let lines: Vec<&str> = told.lines().filter(|l| l.trim_start().starts_with("planish ")).collect();
+            assert!(!lines.is_empty(), "planish {} has no example", words.join(" "));
+            // What shells make of it: quotes, pipes, places of files.
+            for line in told.lines().skip(1).flat_map(|l| l.split(" | ")).filter(|l| l.trim().starts_with("planish ")) {
+                let plain = line.split(['<', '>']).next().unwrap_or_default();
+                let mut args = Vec::new();
+                for (k, piece) in plain.split('\'').enumerate() {
+                    match k % 2 {
+                        0 => args.extend(piece.split_whitespace().map(str::to_owned)),
+                        _ => args.push(piece.to_owned()),
+                    }
+                }
+                let parsed = Cli::try_parse_from(&args).unwrap_or_else(|e| panic!("{line}: {e}"));
+                check::check(&parsed.command).unwrap_or_else(|e| panic!("{line}: {e}"));
+            }
         }
     }
 
@@ -525,7 +548,8 @@ mod tests {
             "part" => &["a.planish", "-o", "b.planish", "--wavelength", "5mm"],
             "deform" => &["a.planish", "s.obj", "-o", "b.planish"],
             "edit" if words.len() > 1 => &["a.planish", "b.toml", "-o", "c.planish"],
-            "demo" => &[],
+            "demo" | "man" => &[],
+            "completions" => &["bash"],
             "info" => &["a.ply"],
             "compare" => &["a.ply", "b.ply"],
             "edit" => &["a.planish", "b.toml"],
@@ -557,7 +581,9 @@ mod tests {
                 let is_step = name.contains(',') || name == "z-to-y|y-to-z";
                 if field.is_none() && !is_number && !is_step {
                     assert!(
-                        ["DIR", "FILE", "NAMES", "TOKEN", ".json", ".planish"].iter().any(|n| name.contains(n)),
+                        ["DIR", "FILE", "FORMAT", "NAMES", "TOKEN", ".json", ".planish"]
+                            .iter()
+                            .any(|n| name.contains(n)),
                         "{name}"
                     );
                     continue;

@@ -5,7 +5,7 @@
 //! bear it belongs to somebody else.
 
 use crate::args::relief::ReliefCommand;
-use crate::args::{Command, Common, Policy, Step};
+use crate::args::{Command, Policy, Step};
 use crate::failure::Failure;
 use planish_io::ExportKind;
 use std::fs;
@@ -15,6 +15,8 @@ use std::path::{Path, PathBuf};
 /// Products of `planish run` in its folder.
 pub const PRODUCTS: [&str; 8] =
     ["mesh.ply", "model.planish", "surface.step", "preview.glb", "report.json", "report.html", "points.ply", "relief"];
+/// What a batch has in its folder beside the folders of its runs: what is finished, and all rows for programs and for people.
+pub const BATCH_PRODUCTS: [&str; 3] = ["manifest.json", "batch.json", "batch.html"];
 /// What `planish demo` adds to them.
 pub const DEMO_PRODUCTS: [&str; 2] = ["scan.e57", "truth.ply"];
 /// The product that is a folder.
@@ -27,7 +29,8 @@ const MARKED: u64 = 1 << 16;
 /// # Errors
 /// The first output that may not be written, with the way out.
 pub fn check(command: &Command) -> Result<(), Failure> {
-    let (common, inputs, mut outputs) = files(command);
+    let Some(common) = command.common() else { return Ok(()) };
+    let (inputs, mut outputs) = files(command);
     outputs.extend(common.report.clone());
     let inputs: Vec<&Path> = inputs.iter().map(|p| p.as_path()).collect();
     allow(&inputs, &outputs, common.policy())?;
@@ -46,54 +49,49 @@ fn is_folder_of_maps(output: &Path) -> bool {
     planish_io::export_kind(output).is_ok_and(|kind| kind == ExportKind::Relief)
 }
 
-/// The common options of a command, what it reads and what it writes.
-fn files(command: &Command) -> (&Common, Vec<PathBuf>, Vec<PathBuf>) {
+/// What a command reads and what it writes.
+fn files(command: &Command) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let products = |folder: &Path, more: &[&str]| PRODUCTS.iter().chain(more).map(|p| folder.join(p)).collect();
     match command {
-        Command::Demo(a) => (&a.common, Vec::new(), products(&a.output, &DEMO_PRODUCTS)),
-        Command::Run(a) => (
-            &a.common,
-            [Some(a.input.clone()), a.network.clone()].into_iter().flatten().collect(),
-            products(&a.output, &[]),
-        ),
+        Command::Demo(a) => (Vec::new(), products(&a.output, &DEMO_PRODUCTS)),
+        // Each run of a batch looks after its own products.
+        Command::Run(a) if a.is_batch() => (Vec::new(), BATCH_PRODUCTS.iter().map(|p| a.output.join(p)).collect()),
+        Command::Run(a) => (a.inputs.iter().cloned().chain(a.network.clone()).collect(), products(&a.output, &[])),
         Command::Clean(a) => {
-            (&a.common, vec![a.scan.clone()], [Some(a.output.clone()), a.lines.clone()].into_iter().flatten().collect())
+            (vec![a.scan.clone()], [Some(a.output.clone()), a.lines.clone()].into_iter().flatten().collect())
         }
-        Command::Mesh(a) => (&a.common, vec![a.input.clone()], vec![a.output.clone()]),
-        Command::Smooth(a) => (&a.common, vec![a.mesh.clone()], vec![a.output.clone()]),
-        Command::Decimate(a) => (&a.common, vec![a.mesh.clone()], vec![a.output.clone()]),
-        Command::Layout(a) => (&a.common, vec![a.mesh.clone()], vec![a.output.clone()]),
-        Command::Fit(a) => (
-            &a.common,
-            [Some(a.input.clone()), a.network.clone()].into_iter().flatten().collect(),
-            vec![a.output.clone()],
-        ),
+        Command::Mesh(a) => (vec![a.input.clone()], vec![a.output.clone()]),
+        Command::Smooth(a) => (vec![a.mesh.clone()], vec![a.output.clone()]),
+        Command::Decimate(a) => (vec![a.mesh.clone()], vec![a.output.clone()]),
+        Command::Layout(a) => (vec![a.mesh.clone()], vec![a.output.clone()]),
+        Command::Fit(a) => {
+            (std::iter::once(a.input.clone()).chain(a.network.clone()).collect(), vec![a.output.clone()])
+        }
         // Without -o the model is edited where it is, with its history: that is asked for by the command itself.
-        Command::Edit(a) => (&a.common, vec![a.input.clone(), a.script.clone()], a.output.iter().cloned().collect()),
-        Command::Deform(a) => (&a.common, vec![a.model.clone(), a.to.clone()], vec![a.output.clone()]),
+        Command::Edit(a) => (vec![a.input.clone(), a.script.clone()], a.output.iter().cloned().collect()),
+        Command::Deform(a) => (vec![a.model.clone(), a.to.clone()], vec![a.output.clone()]),
         Command::Relief(a) => {
             let (inputs, outputs) = relief_files(&a.command);
-            (a.command.common(), inputs, outputs)
+            (inputs, outputs)
         }
         Command::Export(a) => {
             let is_folder = is_folder_of_maps(&a.output);
-            (&a.common, vec![a.model.clone()], if is_folder { Vec::new() } else { vec![a.output.clone()] })
+            (vec![a.model.clone()], if is_folder { Vec::new() } else { vec![a.output.clone()] })
         }
-        Command::Compare(a) => (
-            &a.common,
-            vec![a.a.clone(), a.b.clone()],
-            [a.output.clone(), a.picture.clone()].into_iter().flatten().collect(),
-        ),
+        Command::Compare(a) => {
+            (vec![a.a.clone(), a.b.clone()], [a.output.clone(), a.picture.clone()].into_iter().flatten().collect())
+        }
         Command::Transform(a) => {
             let named = a.steps.0.iter().filter_map(|step| match step {
                 Step::Align(path) | Step::Pairs(path) => Some(path.clone()),
                 _ => None,
             });
-            (&a.common, std::iter::once(a.input.clone()).chain(named).collect(), vec![a.output.clone()])
+            (std::iter::once(a.input.clone()).chain(named).collect(), vec![a.output.clone()])
         }
-        Command::Info(a) => (&a.common, vec![a.file.clone()], Vec::new()),
+        Command::Info(a) => (a.files.clone(), Vec::new()),
         // A project is worked on where it is; that of a mesh or a scan gets a name that no file has.
-        Command::Studio(a) => (&a.common, a.file.iter().cloned().collect(), Vec::new()),
+        Command::Studio(a) => (a.file.iter().cloned().collect(), Vec::new()),
+        Command::Completions(_) | Command::Man(_) => (Vec::new(), Vec::new()),
     }
 }
 

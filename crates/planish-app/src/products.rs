@@ -80,6 +80,14 @@ impl Staged {
         Staged::open(target, target, Kind::Folder, made)
     }
 
+    /// A folder for files that live as long as this command; nothing of it goes anywhere.
+    /// # Errors
+    /// If there is no room for it.
+    pub fn scratch() -> Result<Staged, Failure> {
+        let folder = std::env::temp_dir();
+        Staged::open(&folder, &folder, Kind::Folder, Vec::new())
+    }
+
     fn open(beside: &Path, target: &Path, kind: Kind, made: Vec<PathBuf>) -> Result<Staged, Failure> {
         sweep(beside);
         let open = || -> io::Result<(TempDir, Option<File>)> {

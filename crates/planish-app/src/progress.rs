@@ -33,12 +33,25 @@ pub fn watch_interrupts() {
     let Ok(mut signals) = Signals::new(ends) else { return };
     std::thread::spawn(move || {
         if signals.forever().next().is_some() {
-            CANCELLED.store(true, Ordering::SeqCst);
-            std::thread::sleep(GRACE);
-            let _ = writeln!(std::io::stderr(), "{}", crate::failure::Failure::interrupted());
-            products::abandon_and_exit(Status::Interrupted as u8);
+            end();
         }
     });
+}
+
+/// Makes the end of standard input end the program, too: a batch that is killed takes its runs along.
+pub fn watch_input() {
+    std::thread::spawn(|| {
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        end();
+    });
+}
+
+/// Ends the program: by itself where it notices in time, else by force.
+fn end() {
+    CANCELLED.store(true, Ordering::SeqCst);
+    std::thread::sleep(GRACE);
+    let _ = writeln!(std::io::stderr(), "{}", crate::failure::Failure::interrupted());
+    products::abandon_and_exit(Status::Interrupted as u8);
 }
 
 /// True if SIGHUP was ignored when the program started. Systems that do not tell count as not.

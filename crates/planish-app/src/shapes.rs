@@ -53,7 +53,7 @@ pub fn facts(path: &Path, shape: &Shape, units: Units) -> Input {
     match shape {
         Shape::Surface(mesh) => files::mesh_facts(path, mesh, units),
         Shape::Points(cloud) => Input {
-            path: path.display().to_string(),
+            path: crate::words::told(&path.display().to_string()),
             kind: "scan".into(),
             counts: [("points".to_owned(), cloud.points.len() as u64)].into(),
             units: units.symbol().into(),

@@ -1,7 +1,6 @@
-//! The one table that a command writes to stdout.
+//! The one table that a command writes.
 
-use crate::words;
-use std::io::Write;
+use crate::{stdout, words};
 
 /// Lines of a name and a value, in the order of adding.
 #[derive(Default)]
@@ -16,14 +15,13 @@ impl Summary {
         self
     }
 
-    /// Writes the table to stdout. A closed pipe is not an error.
+    /// Writes the table to where tables go. A closed pipe is not an error.
     pub fn print(&self) {
         let width = self.rows.iter().map(|(n, _)| n.chars().count()).max().unwrap_or(0);
-        let mut out = std::io::stdout().lock();
         for (name, value) in &self.rows {
             // Thin spaces are for pages; a terminal shows them as nothing.
-            let value = words::plain(&value.replace('\u{202f}', " "));
-            if writeln!(out, "{name:width$}  {value}").is_err() {
+            let value = words::plain(&words::told(&value.replace('\u{202f}', " ")));
+            if !stdout::table_line(&format!("{name:width$}  {value}")) {
                 return;
             }
         }

@@ -1,11 +1,41 @@
 //! Text on its way to a terminal: one line, nothing that steers the terminal, numbers and quotations short.
 
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
 /// Letters of a quotation at most.
 const QUOTED: usize = 60;
 /// Significant digits of a number with a fraction at most.
 const DIGITS: usize = 6;
 /// Whole numbers of more digits than this are no counts of anything, and are told as numbers with a fraction are.
 const COUNT_DIGITS: usize = 15;
+
+/// What stands for a standard stream on the command line.
+pub const DASH: &str = "-";
+
+/// The folder whose files stand for standard streams, if there is one.
+static SCRATCH: OnceLock<PathBuf> = OnceLock::new();
+
+/// Makes [`told`] tell of files in this folder as `-`.
+pub fn hide(folder: PathBuf) {
+    let _ = SCRATCH.set(folder);
+}
+
+/// A text in which files that stand for streams are told as `-`.
+pub fn told(text: &str) -> String {
+    let Some(scratch) = SCRATCH.get() else { return text.to_owned() };
+    let mut rest = text;
+    let mut told = String::new();
+    let prefix = format!("{}{}", scratch.display(), std::path::MAIN_SEPARATOR);
+    while let Some(at) = rest.find(&prefix) {
+        told += &rest[..at];
+        told += DASH;
+        rest = &rest[at + prefix.len()..];
+        let name = ["stdin.", "stdout."].into_iter().find_map(|n| rest.strip_prefix(n)).unwrap_or(rest);
+        rest = name.trim_start_matches(|c: char| c.is_ascii_alphanumeric());
+    }
+    told + rest
+}
 
 /// A text without what steers a terminal: control characters (but for spaces, which become one) and those that turn the
 /// direction of writing.

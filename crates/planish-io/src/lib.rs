@@ -10,6 +10,7 @@ mod export;
 mod far;
 mod gltf;
 mod grid_file;
+mod grid_write;
 mod iges;
 mod mapped;
 pub mod maps;
@@ -36,6 +37,7 @@ pub use error::{ReadError, WriteError};
 pub use export::{ExportKind, export, export_kind, export_mesh};
 pub use far::{FileUnits, file_units, shift_of, single_step};
 pub use grid_file::{is_grid, read_grid};
+pub use grid_write::write_grid;
 pub use iges::{IgesInput, IgesSummary, write_iges};
 pub use mapped::MappedMesh;
 pub use mesh_file::{

@@ -6,12 +6,13 @@ use planish::cloud::CloudError;
 use planish::contour::{ContourError, MeshingError};
 use planish::curve::CurveError;
 use planish::edit::ApplyError;
-use planish::field::{FieldError, LatticeError};
+use planish::field::{FieldError, FormulaError, LatticeError};
 use planish::grid::{FeatureError, GridError};
 use planish::layout::LayoutError;
 use planish::mesh::{CompareError, DecimateError, MeshError, SmoothError};
 use planish::network::ImprintError;
 use planish::pipeline::{PipelineError, ScanError};
+use planish::register::AlignError;
 use planish::relief::ReliefError;
 use planish::render::RenderError;
 use planish::surface::FitError;
@@ -72,11 +73,11 @@ macro_rules! told {
 
 told! {
     ReadError => FileError, WriteError => FileError, ProjectError => FileError, ScriptError => FileError,
-    NetworkFileError => FileError, CloudError => CloudError, FieldError => FieldError, LatticeError => FieldError,
+    NetworkFileError => FileError, CloudError => CloudError, FieldError => FieldError, LatticeError => FieldError, FormulaError => FieldError,
     ContourError => ContourError, MeshError => MeshError, SmoothError => MeshError, DecimateError => MeshError,
     CurveError => CurveError, ImprintError => NetworkError, LayoutError => LayoutError, ApplyError => EditError,
     GridError => GridError, FeatureError => GridError, FitError => FitError, ReliefError => ReliefError,
-    CompareError => CompareError, RenderError => RenderError,
+    CompareError => CompareError, AlignError => CompareError, RenderError => RenderError,
 }
 
 impl Told for MeshingError {

@@ -1,5 +1,6 @@
 //! Fields: solids and milling jobs from scripts, blended samples, functions written in Python; and volumes.
 
+use crate::error::{told, told_of};
 use crate::objects::PyMesh;
 use crate::params::Given;
 use crate::words::{bytes, sampling};
@@ -15,6 +16,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -33,7 +35,9 @@ enum Source {
 /// Field(function, bounds, *, gradient=None, noise_deg=0.0, exact=False)
 ///
 /// * function: called with points (n, 3) float64, returns n values: pseudo-distances in world units, NaN where unknown.
-///   It must answer the same for the same point and is called from several threads, one at a time.
+///   It must answer the same for the same point and is called from several threads, one at a time. Or a formula of x, y and z
+///   as text, such as "x^2 + y^2 - 1" (docs/guide/solids.md has what it may say): its gradients are exact, and the body ends
+///   at the box.
 /// * bounds: (2, 3), least and greatest corner of a box that holds the whole surface
 /// * gradient: called with points (n, 3), returns (n, 3); None for differences of the function's values
 /// * noise_deg: typical angle by which gradients miss the true normal, degrees; normals that differ by less than three
@@ -97,6 +101,17 @@ impl PyField {
         noise_deg: f64,
         exact: bool,
     ) -> PyResult<PyField> {
+        if let Ok(text) = function.extract::<String>() {
+            let given = gradient.is_some() || noise_deg != 0.0 || exact;
+            if given {
+                let what = "gradient, noise_deg and exact are for functions: a formula has exact gradients";
+                return Err(PyTypeError::new_err(what));
+            }
+            let formula = field::Formula::parse(&text).map_err(|e| told(function.py(), &e))?;
+            let bounds = array::bounds(bounds, "bounds")?;
+            let part = Part::Solid(field::Solid::of_formula(formula, &bounds));
+            return Ok(PyField { source: Source::Part(part), kind: "a formula" });
+        }
         for (name, given) in [("function", Some(&function)), ("gradient", gradient.as_ref())] {
             if given.is_some_and(|f| !f.is_callable()) {
                 return Err(PyTypeError::new_err(format!("{name}: something that can be called is needed")));
@@ -175,6 +190,31 @@ impl PyField {
             }
         })?;
         Ok(PyMesh::meshed(made, json!({})))
+    }
+
+    /// The field's values on a lattice around its surface, as a volume: float32, NaN where it does not know. Raises FieldError.
+    ///
+    /// * voxel, resolution: distance of the values in world units, or cells along the longest side (129)
+    /// * memory: GB that the values may take (8)
+    #[pyo3(signature = (*, memory=None, progress=None, **parameters))]
+    fn sample(
+        &self,
+        py: Python,
+        memory: Option<f64>,
+        progress: Option<&Bound<PyAny>>,
+        parameters: Option<&Bound<PyDict>>,
+    ) -> PyResult<PyVolume> {
+        let mut given = Given::new("Field.sample", parameters)?;
+        let sampling = sampling(given.take::<ScanParams>()?.cells, memory)?;
+        given.done()?;
+        let sampled = |field: &dyn Field, o: &dyn planish::Observer| {
+            Ok(ScalarGrid::of_field(field, sampling.spacing, sampling.memory, o)?)
+        };
+        let grid = self.run(py, "sample", progress, |o| match &self.source {
+            Source::Function(function) => sampled(function, &Watched { function, observer: o.one() }),
+            _ => sampled(self.field(), o.one()),
+        })?;
+        Ok(PyVolume::new(grid))
     }
 
     fn __repr__(&self) -> String {
@@ -394,6 +434,12 @@ impl PyVolume {
         let made =
             watch::run(py, "mesh", progress, |o| contour::from_grid(&self.grid, &volume, memory, &params, o.one()))?;
         Ok(PyMesh::meshed(made, json!({})))
+    }
+
+    /// Writes the volume, whole or not at all: .nrrd with spacing and origin, or .npy, an array indexed [x, y, z] that carries
+    /// neither. Raises FileError.
+    fn write(&self, py: Python, path: PathBuf) -> PyResult<()> {
+        py.detach(|| planish_io::write_grid(&path, &self.grid)).map_err(|e| told_of(py, &path, &e))
     }
 
     fn __repr__(&self) -> String {

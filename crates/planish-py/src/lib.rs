@@ -23,6 +23,7 @@ mod objects;
 mod params;
 mod picture;
 mod program;
+mod relief;
 mod surface;
 mod view;
 mod watch;
@@ -53,7 +54,7 @@ mod _planish {
     #[pymodule_export]
     use crate::params::{keywords, schema};
     #[pymodule_export]
-    use crate::program::main;
+    use crate::program::{folder_names, main};
     #[pymodule_export]
     use crate::surface::{PyGrid, PyRelief, PySurface};
     #[pymodule_export]

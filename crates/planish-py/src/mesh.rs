@@ -1,5 +1,6 @@
 //! Triangle meshes.
 
+use crate::cloud::PyCloud;
 use crate::error::{class, told, told_of};
 use crate::objects::{Body, PyCurve, PyMesh, PyModel, PyNetwork};
 use crate::params::{Given, pipeline_params};
@@ -13,8 +14,10 @@ use planish::geom::FacePoint;
 use planish::mesh::{FeatureTags, TriMesh};
 use planish::network::Network;
 use planish::pipeline::{self, PipelineError, PipelineParams};
+use planish::register::{self, AlignParams, Shape};
 use planish::{mend, mesh};
 use planish_io::WriteOptions;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
@@ -269,6 +272,34 @@ impl PyMesh {
         given.done()?;
         let (a, b) = (&self.body.mesh, &other.body.mesh);
         json::to(py, &watch::run(py, "compare", progress, |o| mesh::compare(a, b, &params, o.one()))?)
+    }
+
+    /// The mesh brought onto another mesh or a cloud: the best rigid fit. `facts` tells `linear` (3 x 3, rows) and `shift`, which
+    /// bring a point there as `linear @ p + shift`, the `median` distance before and after in world units, and whether it `settled`.
+    ///
+    /// * near: start only from where the mesh is
+    ///
+    /// Raises CompareError, MeshError. Source: docs/methods/measuring.md.
+    #[pyo3(signature = (other, *, near=false, progress=None))]
+    fn align(&self, py: Python, other: &Bound<PyAny>, near: bool, progress: Option<&Bound<PyAny>>) -> PyResult<PyMesh> {
+        let fixed = if let Ok(mesh) = other.cast::<PyMesh>() {
+            Shape::Surface(mesh.get().body.mesh.clone())
+        } else if let Ok(cloud) = other.cast::<PyCloud>() {
+            Shape::Points(cloud.get().cloud.as_ref().clone())
+        } else {
+            return Err(PyTypeError::new_err("other: a Mesh or a Cloud is needed"));
+        };
+        let moving = Shape::Surface(self.body.mesh.clone());
+        let params = AlignParams { near, ..AlignParams::default() };
+        let found = watch::run(py, "align", progress, |o| register::align(&moving, &fixed, &params, o.one()))?;
+        let mut mesh = self.body.mesh.clone();
+        found.placement.mesh(&mut mesh);
+        let linear = found.placement.linear.transpose().to_cols_array_2d();
+        let facts = json!({
+            "linear": linear, "shift": found.placement.shift.to_array(), "median": found.median,
+            "rounds": found.rounds, "settled": found.settled,
+        });
+        Ok(PyMesh::new(mesh, self.body.tags.clone(), facts))
     }
 
     /// The places of the mesh nearest to points (k, 3): a dict of `position` (k, 3), `distance` (k,) in world units,

@@ -5,7 +5,7 @@ use crate::network::told_faults;
 use crate::objects::{Body, PyMesh, PyModel, PyNetwork, recorded};
 use crate::params::pipeline_params;
 use crate::surface::{PyGrid, PyRelief, PySurface};
-use crate::{array, json, picture, watch};
+use crate::{array, json, picture, relief, watch};
 use numpy::{PyArray1, PyArray3};
 use planish::edit::{self, ApplyError, Edit, Ground, Made, Redo, Undo};
 use planish::mesh::TriMesh;
@@ -58,6 +58,12 @@ impl PyModel {
             "relaxed": made.relaxed, "faults": faults,
         });
         Ok(next)
+    }
+
+    /// The same model with what its last edit did.
+    fn after(mut self, told: Value) -> PyModel {
+        self.found.edit = told;
+        self
     }
 
     /// The surface of the model that a word names.
@@ -116,17 +122,24 @@ impl PyModel {
     /// Writes the model in another program's format, by the extension. Raises FileError, and ReliefError if its parts do
     /// not belong together.
     ///
-    /// * .step, .stp: the surfaces; .ply, .obj, .stl, .glb: a mesh; .json: the network; no extension: a folder of
-    ///   displacement maps (EXR)
+    /// * .step, .stp, .igs, .iges: the surfaces; .usda: the surfaces and a mesh; .ply, .obj, .stl, .glb: a mesh; .json: the
+    ///   network; no extension: a folder of displacement maps (EXR)
+    /// * .3dm by rhino3dm, .usdc and .usdz by usd-core, where these are installed
     /// * surface: which one a mesh format gets: "displaced", "base" or "mesh"; up: the axis that points up, "y" or "z"
     #[pyo3(signature = (path, *, surface="displaced", up="y"))]
-    fn export(&self, py: Python, path: PathBuf, surface: &str, up: &str) -> PyResult<()> {
-        let model = &self.model;
+    fn export(slf: &Bound<Self>, path: PathBuf, surface: &str, up: &str) -> PyResult<()> {
+        let (this, py) = (slf.get(), slf.py());
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+        if ["3dm", "usdc", "usdz"].contains(&extension.as_str()) {
+            crate::words::up(up)?;
+            return py.import("planish._formats")?.call_method1("export", (slf, path, surface, up)).map(drop);
+        }
+        let model = &this.model;
         let wrong = |e: WriteError| told_of(py, &path, &e);
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let options = WriteOptions { units: model.units, up: crate::words::up(up)?, name };
         let mesh = match planish_io::export_kind(&path).map_err(wrong)? {
-            ExportKind::Mesh => Some(self.surface_of(py, surface)?),
+            ExportKind::Mesh => Some(this.surface_of(py, surface)?),
             _ => None,
         };
         let patches = match planish_io::export_kind(&path).map_err(wrong)? {
@@ -310,6 +323,117 @@ impl PyModel {
     fn assess(&self, py: Python, progress: Option<&Bound<PyAny>>) -> PyResult<PyModel> {
         let found = watch::run(py, "measure", progress, |o| pipeline::assess(&self.model, o.run()))?;
         Ok(PyModel::new(self.model.clone()).with(found))
+    }
+
+    /// The model with an edit of its relief: a stroke, a stamp, a filter ... as a layer. Raises ReliefError; TypeError and
+    /// ValueError for fields that the edit does not have.
+    ///
+    /// * name, fields: the edit and what it takes, as in a script of `planish relief edit` (docs/guide/relief.md), such as
+    ///   `model.edit_relief("scale", amount=2)`; also "undo" and "redo"
+    #[pyo3(signature = (name, /, *, progress=None, **fields))]
+    fn edit_relief(
+        &self,
+        py: Python,
+        name: &str,
+        progress: Option<&Bound<PyAny>>,
+        fields: Option<&Bound<PyDict>>,
+    ) -> PyResult<PyModel> {
+        let (model, told) = relief::edited(py, &self.model, relief::step(name, fields)?, progress)?;
+        Ok(PyModel::new(model).after(told))
+    }
+
+    /// The model with the detail of another of the same shape, as a layer: at each texel the displacement that the other has at
+    /// the closest place of its surfaces, meant in space. `facts` tells `texels`, and how many `missed`. Raises ReliefError.
+    ///
+    /// * reach: further away than this nothing is taken over, world units; 2 % of the diagonal unless given
+    ///
+    /// Source: Krishnamurthy 1998, figure 7.5; docs/methods/relief.md.
+    #[pyo3(signature = (other, *, reach=None, progress=None))]
+    fn transfer_relief(
+        &self,
+        py: Python,
+        other: &PyModel,
+        reach: Option<f64>,
+        progress: Option<&Bound<PyAny>>,
+    ) -> PyResult<PyModel> {
+        let (model, told) = relief::transferred(py, &self.model, &other.model, reach, progress)?;
+        Ok(PyModel::new(model).after(told))
+    }
+
+    /// The model with other displacement maps, one for each patch in the shapes that they have; what they change is a layer. At
+    /// seams both sides take their mean. Raises ReliefError, ValueError.
+    #[pyo3(signature = (reliefs, *, name="set"))]
+    fn with_reliefs(&self, py: Python, reliefs: Vec<PyRef<PyRelief>>, name: &str) -> PyResult<PyModel> {
+        Ok(PyModel::new(relief::replaced(py, &self.model, &reliefs, name)?))
+    }
+
+    /// The same shape with surfaces that hold all that is longer than `wavelength` (world units) and maps of the rest. Raises
+    /// the error of the first stage that fails.
+    ///
+    /// Source: Krishnamurthy 1998, section 7.5.
+    #[pyo3(signature = (wavelength, *, progress=None))]
+    fn part_relief(&self, py: Python, wavelength: f64, progress: Option<&Bound<PyAny>>) -> PyResult<PyModel> {
+        if !(wavelength > 0.0 && wavelength.is_finite()) {
+            return Err(PyValueError::new_err(format!("wavelength={wavelength}: a length above 0 is needed")));
+        }
+        let (params, mut model) = (self.stored()?, self.model.clone());
+        watch::run(py, "part", progress, |o| pipeline::part_at(&mut model, wavelength, &params, o.run()))?;
+        let parameters = json!({ "wavelength": wavelength }).to_string();
+        model.history.push(HistoryEntry { command: "relief part".into(), parameters });
+        Ok(PyModel::new(model))
+    }
+
+    /// The same shape, with its edits, on surfaces of other numbers of control points. Raises the error of the first stage that
+    /// fails.
+    ///
+    /// * keywords as of `Mesh.fit`
+    ///
+    /// Source: Krishnamurthy 1998, section 7.6.
+    #[pyo3(signature = (*, progress=None, **parameters))]
+    fn level_relief(
+        &self,
+        py: Python,
+        progress: Option<&Bound<PyAny>>,
+        parameters: Option<&Bound<PyDict>>,
+    ) -> PyResult<PyModel> {
+        let params = pipeline_params("Model.level_relief", self.stored()?, parameters)?;
+        let mut model = self.model.clone();
+        watch::run(py, "level", progress, |o| pipeline::relevel(&mut model, &params, o.run()))?;
+        recorded(&mut model, "relief level", &params)?;
+        Ok(PyModel::new(model))
+    }
+
+    /// The model on other surfaces of its network, one for each patch; the relief goes along. Where their borders are apart, both
+    /// take the mean. Raises ReliefError and the error of the first stage that fails.
+    #[pyo3(signature = (surfaces, *, progress=None))]
+    fn deform(
+        &self,
+        py: Python,
+        surfaces: Vec<PyRef<PySurface>>,
+        progress: Option<&Bound<PyAny>>,
+    ) -> PyResult<PyModel> {
+        let wanted = self.model.surfaces.len();
+        if surfaces.len() != wanted {
+            let what = format!("surfaces: {} are given, and the model has {wanted}", surfaces.len());
+            return Err(PyValueError::new_err(what));
+        }
+        let mut given: Vec<surface::Surface> = surfaces.iter().map(|s| s.surface.clone()).collect();
+        pipeline::join(&self.model.network, &mut given).map_err(|e| told(py, &e))?;
+        let mut model = watch::run(py, "deform", progress, |o| pipeline::deform(&self.model, given, o.one()))?;
+        model.history.push(HistoryEntry { command: "deform".into(), parameters: "{}".into() });
+        Ok(PyModel::new(model))
+    }
+
+    /// The places of the surfaces closest to points (n, 3): a dict of `patch` (n,), `uv` (n, 2), `point` (n, 3) and `distance`
+    /// (n,), world units. Raises FitError, ReliefError for a model without surfaces.
+    #[pyo3(signature = (points, *, progress=None))]
+    fn closest<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<PyAny>,
+        progress: Option<&Bound<PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        crate::surface::closest(py, &self.model.surfaces, points, progress)
     }
 
     /// A mesh of the model: "displaced" (all detail), "base" (the B-spline surfaces alone) or "mesh" (what it was fitted

@@ -72,6 +72,24 @@ pub struct PySurface {
     pub surface: Surface,
 }
 
+/// The places of surfaces closest to points.
+pub fn closest<'py>(
+    py: Python<'py>,
+    surfaces: &[Surface],
+    points: &Bound<PyAny>,
+    progress: Option<&Bound<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let read = array::points(points, "points")?;
+    let points = read.vectors();
+    let all = watch::run(py, "closest", progress, |o| relief::closest(surfaces, &points, o.one()))?;
+    let found = PyDict::new(py);
+    found.set_item("uv", array::rows(py, all.iter().map(|p| p.uv.to_array()).collect())?)?;
+    found.set_item("point", array::vectors(py, all.iter().map(|p| p.point).collect())?)?;
+    found.set_item("distance", PyArray1::from_iter(py, all.iter().map(|p| p.distance)))?;
+    found.set_item("patch", PyArray1::from_iter(py, all.iter().map(|p| p.patch)))?;
+    Ok(found)
+}
+
 /// One vector of a jet.
 type Part = fn(&Jet) -> DVec3;
 
@@ -182,6 +200,25 @@ impl PySurface {
         array::rows(py, self.each(py, uv, |s, u, v| s.jet(u, v).curvatures().unwrap_or([f64::NAN; 2]))?)
     }
 
+    /// The places of the surface closest to points (n, 3): a dict of `uv` (n, 2), each from 0 to 1, `point` (n, 3) and `distance`
+    /// (n,), world units. Raises FitError.
+    ///
+    /// Where two sheets of it lie about equally far from a point, it may be that of the other sheet.
+    ///
+    /// Source: Piegl and Tiller 1997, section 6.1.
+    #[pyo3(signature = (points, *, progress=None))]
+    fn closest<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<PyAny>,
+        progress: Option<&Bound<PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let found = closest(py, std::slice::from_ref(&self.surface), points, progress)?;
+        // There is but one.
+        found.del_item("patch")?;
+        Ok(found)
+    }
+
     /// Positions at all pairs of `us` (m,) and `vs` (n,), from 0 to 1: (n, m, 3), world units. Far faster than one by one.
     fn sample<'py>(
         &self,
@@ -264,6 +301,11 @@ impl PyRelief {
     /// A relief.
     pub fn new(relief: Relief) -> PyRelief {
         PyRelief { relief }
+    }
+
+    /// That of the library.
+    pub fn relief(&self) -> &Relief {
+        &self.relief
     }
 }
 

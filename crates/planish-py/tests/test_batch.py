@@ -65,11 +65,10 @@ def test_other_content_other_options_and_lost_products_are_run_again(batch: plan
     (folder / "box-2" / "surface.step").unlink()
     again = planish.run_many([parts[0], parts[2]], folder, jobs=2, **QUICK)
     assert [row.status for row in again] == ["done", "done"]
-    from planish._batch import _key
-
-    keys = {_key(parts[0], {}), _key(parts[0], {"patches": 6}), _key(parts[2], {}), _key(parts[0], {"patches": 7})}
-    assert len(keys) == 4
-    assert _key(parts[0], {"threads": 2, "patches": None}) == _key(parts[0], {})
+    again = planish.run_many([parts[0]], folder, patches=7, threads=1)
+    assert [row.status for row in again] == ["done"]
+    again = planish.run_many([parts[0]], folder, patches=7, threads=2, seed=None)
+    assert [row.status for row in again] == ["skipped"]
 
 
 def test_a_run_of_an_object_leaves_products_that_are_read_back(box: planish.Mesh, tmp_path: Path) -> None:
@@ -89,11 +88,40 @@ def test_failures_have_the_programs_words_and_status(tmp_path: Path, parts: list
         planish.run_many([], tmp_path, jobs=0)
 
 
-def test_two_files_of_one_stem_get_folders_of_their_own() -> None:
-    from planish._batch import _names
+def test_the_command_line_and_python_skip_what_the_other_has_finished(parts: list[Path], tmp_path: Path) -> None:
+    table = planish.run_many([str(parts[2].parent / "box-*.stl")], tmp_path / "out", patches=6)
+    assert [row.source.name for row in table] == ["box-1.stl", "box-2.stl"]
+    command = ["run", *map(str, (parts[0], parts[2])), "-o", "out", "--patches", "6", "--json", "--jobs", "2"]
+    told = subprocess.run([sys.executable, "-m", "planish", *command], cwd=tmp_path, capture_output=True, text=True)
+    assert told.returncode == 0, told.stderr
+    rows = [json.loads(line) for line in told.stdout.splitlines()]
+    assert [row["status"] for row in rows] == ["skipped", "skipped"]
+    assert (tmp_path / "out" / "batch.html").read_text().count("<tr>") == 3
 
-    paths = [Path("a/x.ply"), Path("b/x.ply"), Path("x.stl"), Path("y.stl")]
-    assert list(_names(paths)) == ["x-ply", "x-ply-2", "x-stl", "y"]
+
+def test_no_files_are_an_empty_table(tmp_path: Path) -> None:
+    assert planish.run_many([], tmp_path / "out") == []
+
+
+def test_a_batch_that_is_killed_takes_its_runs_along(tmp_path: Path) -> None:
+    planish.demo_part(triangles=40_000).write(tmp_path / "part.ply")
+    code = "import sys, planish; planish.run_many([sys.argv[1] + '/part.ply'], sys.argv[1] + '/out')"
+    process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stderr=subprocess.DEVNULL)
+
+    def runs() -> list[str]:
+        told = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True).stdout.splitlines()
+        return [line for line in told if str(tmp_path) in line and "planish run" in line]
+
+    end = time.monotonic() + 10.0
+    while len(runs()) < 2 and time.monotonic() < end:
+        time.sleep(0.1)
+    assert len(runs()) == 2
+    process.kill()
+    process.wait()
+    end = time.monotonic() + 5.0
+    while runs() and time.monotonic() < end:
+        time.sleep(0.1)
+    assert runs() == [] and not (tmp_path / "out" / "part" / "report.json").exists()
 
 
 def test_ctrl_c_stops_a_batch_and_its_processes(tmp_path: Path) -> None:

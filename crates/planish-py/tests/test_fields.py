@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -131,3 +132,63 @@ def test_volumes_of_other_dtypes_and_layouts_are_the_same_and_wrong_ones_refused
         planish.Volume(values, spacing=0.0)
     with pytest.raises(planish.ContourError, match="has no surface; choose|has no surface - hint: choose"):
         planish.Volume(values).mesh(iso=99.0, volume_close=False)
+
+
+def test_a_formula_gives_the_mesh_of_the_function_that_it_is() -> None:
+    mesh = planish.Field("x^2 + y^2 + z^2 - 1", BOX).mesh(resolution=33)
+    assert np.abs(np.linalg.norm(mesh.points, axis=1) - 1.0).max() < 1e-12
+    field = planish.Field("sin(x)*y - z^2/3", BOX)
+    points = np.random.default_rng(3).uniform(-1.0, 1.0, (500, 3))
+    x, y, z = points.T
+    value, box = np.sin(x) * y - z**2 / 3, np.abs(points).max(axis=1) - 1.2
+    # What is deep inside is as far from the box as it is.
+    assert np.allclose(field.values(points), np.maximum(value, box), atol=1e-15)
+    normals = np.column_stack([np.cos(x) * y, np.sin(x), -2 * z / 3])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    decides = value > box
+    assert decides.sum() > 300 and np.allclose(field.gradients(points)[decides], normals[decides], atol=1e-12)
+
+
+def test_a_formula_ends_at_its_box_with_sharp_edges() -> None:
+    mesh = planish.Field("x^2 + y^2 - 1", [[-2, -2, -1], [2, 2, 1]]).mesh(voxel=0.1)
+    facts = mesh.diagnose()
+    assert facts["watertight"] and facts["volume"] == pytest.approx(2 * np.pi, rel=2e-3)
+    assert mesh.feature_edges is not None
+    ends = mesh.points[mesh.feature_edges]
+    assert np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum() == pytest.approx(4 * np.pi, rel=1e-2)
+
+
+def test_faults_of_a_formula_are_told_with_their_column() -> None:
+    with pytest.raises(planish.FieldError, match=r'"=" has no place .* \(column 11 of the formula\)') as raised:
+        planish.Field("x^2 + y^2 = 1", BOX)
+    assert raised.value.hint is not None and "left - right" in raised.value.hint
+    with pytest.raises(TypeError, match="exact gradients"):
+        planish.Field("x", BOX, exact=True)
+
+
+@pytest.mark.parametrize("name", ["ball.nrrd", "ball.npy"])
+def test_a_field_is_written_as_a_volume_and_read_again(tmp_path: Path, name: str) -> None:
+    volume = planish.Field(ball, BOX).sample(voxel=0.1)
+    volume.write(tmp_path / name)
+    back = planish.read(tmp_path / name)
+    assert isinstance(back, planish.Volume) and np.array_equal(back.values, volume.values)
+    if name.endswith("nrrd"):
+        assert back.spacing == volume.spacing and back.origin == volume.origin
+        mesh = back.mesh()
+        assert np.abs(np.linalg.norm(mesh.points, axis=1) - 1.0).max() < 0.01
+    else:
+        array = np.load(tmp_path / name)
+        assert np.array_equal(array.transpose(2, 1, 0), volume.values)
+        # Where the nodes are, the values are those of the function.
+        node = np.array(volume.origin) + np.array(volume.spacing) * [3, 5, 7]
+        assert array[3, 5, 7] == pytest.approx(np.linalg.norm(node) - 1.0, abs=1e-6)
+
+
+def test_a_sampled_function_that_raises_stops_the_call_with_what_it_raised() -> None:
+    def wrong(points: Reals) -> Reals:
+        raise ZeroDivisionError("mine")
+
+    with pytest.raises(ZeroDivisionError, match="mine"):
+        planish.Field(wrong, BOX).sample(resolution=20)
+    with pytest.raises(planish.FieldError, match="allow more memory"):
+        planish.Field(ball, BOX).sample(resolution=500, memory=0.01)

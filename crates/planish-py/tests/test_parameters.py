@@ -92,7 +92,7 @@ def test_unknown_keywords_are_refused_with_those_that_there_are(box: planish.Mes
 @pytest.mark.parametrize(
     ("keywords", "error", "message"),
     [
-        ({"patches": 0}, ValueError, "patches=0: a whole number from 1 to 100000 is needed"),
+        ({"patches": -1}, ValueError, "patches=-1: a whole number from 0 to 100000 is needed"),
         ({"patches": 2.5}, TypeError, "patches=2.5: a whole number is needed"),
         ({"patches": True}, TypeError, "patches=true: a whole number is needed"),
         ({"patches": "6"}, TypeError, "patches='6': a whole number is needed"),

@@ -241,3 +241,25 @@ def test_pictures_have_their_size_and_show_something(ball: planish.Mesh, model: 
         picture = shown.picture(120, 90)
         assert picture.shape == (90, 120, 4) and 0.1 < np.mean(picture[..., 3] > 0) <= 1.0
         assert 'src="data:image/png;base64,' in shown._repr_html_()
+
+
+def test_a_moved_mesh_is_brought_back_onto_a_mesh_and_a_cloud() -> None:
+    part = planish.demo_part(triangles=4_000)
+    angle = 0.3
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    moved = planish.Mesh(part.points @ turn.T + [1.0, -2.0, 0.5], part.triangles)
+    for other in (part, planish.Cloud(part.points)):
+        back = moved.align(other)
+        assert np.abs(back.points - part.points).max() < 0.02 * part.diagonal and back.facts["settled"]
+        assert np.allclose(moved.points @ np.array(back.facts["linear"]).T + back.facts["shift"], back.points)
+    with pytest.raises(TypeError, match="a Mesh or a Cloud"):
+        moved.align(part.points)  # type: ignore[arg-type]
+
+
+def test_a_model_moved_by_its_control_points_keeps_its_relief(model: planish.Model) -> None:
+    away = np.array([0.0, 0.0, 5.0])
+    moved = model.deform([planish.Surface(s.control + away, knots_u=s.knots_u, knots_v=s.knots_v) for s in model.surfaces])
+    before, after = model.surface_mesh("displaced"), moved.surface_mesh("displaced")
+    assert np.allclose(after.points, before.points + away, atol=1e-12)
+    with pytest.raises(ValueError, match="1 are given"):
+        model.deform(model.surfaces[:1])

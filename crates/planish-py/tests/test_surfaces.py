@@ -81,3 +81,27 @@ def test_surfaces_go_to_scipy_geomdl_and_splipy_and_back() -> None:
         assert np.allclose(again.control, SURFACE.control) and np.allclose(again.knots_v, SURFACE.knots_v)
     with pytest.raises(ValueError, match="bicubic"):
         neighbours.surface_from_geomdl({**SURFACE.to_geomdl(), "degree_u": 2})
+
+
+def test_points_off_a_surface_come_back_to_their_parameters() -> None:
+    # A sheet that bends slowly: offsets along its normals have their foot where they started.
+    x, y = np.meshgrid(np.linspace(0, 4, 9), np.linspace(0, 3, 7))
+    sheet = planish.Surface(np.stack([x, y, 0.3 * np.sin(x) * np.cos(y)], axis=2))
+    uv = 0.02 + 0.96 * UV
+    away = np.linspace(-0.2, 0.2, len(uv))
+    found = sheet.closest(sheet.evaluate(uv) + away[:, None] * sheet.normals(uv))
+    assert np.allclose(found["uv"], uv, atol=1e-7)
+    assert np.allclose(found["distance"], np.abs(away), atol=1e-9)
+    assert np.allclose(found["point"], sheet.evaluate(found["uv"]), atol=1e-14)
+
+
+def test_a_model_tells_the_patch_and_the_place_closest_to_points(model: planish.Model) -> None:
+    points = np.random.default_rng(4).uniform(-3.0, 3.0, (200, 3))
+    found = model.closest(points)
+    at = [model.surfaces[k].evaluate(uv[None])[0] for k, uv in zip(found["patch"], found["uv"], strict=True)]
+    assert np.allclose(at, found["point"])
+    half = np.array([2.0, 1.5, 1.0])
+    out = np.abs(points) - half
+    # The signed distance of a box: its surfaces are the box within the tolerance.
+    wanted = np.where((out > 0).any(axis=1), np.linalg.norm(out.clip(0), axis=1), -out.max(axis=1))
+    assert np.allclose(found["distance"], wanted, atol=0.01)

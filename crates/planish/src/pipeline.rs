@@ -26,7 +26,8 @@ pub use quality::{
 };
 pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
 pub use scan::{
-    ScanError, ScanMeshed, ScanParams, mesh_samples, mesh_scan, params_for, sample_figures, scan_figures, voxel_for,
+    ScanError, ScanMeshed, ScanParams, field_of, mesh_samples, mesh_scan, params_for, sample_figures, scan_figures,
+    voxel_for,
 };
 pub use truth::{EdgesFound, Zone, edge_reach, edges_found, truth_figures, zone};
 

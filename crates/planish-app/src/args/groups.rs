@@ -13,6 +13,9 @@ pub struct Common {
     /// Write the report to FILE.json
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
+    /// Write the report to stdout as one line of JSON, in place of the table
+    #[arg(long)]
+    pub json: bool,
     /// Number of threads, at most four for each core; the result does not depend on it [default: one for each core]
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
@@ -34,6 +37,9 @@ pub struct Common {
     /// Write nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
+    /// End as on Ctrl-C when standard input ends: with what has started this program.
+    #[arg(long, hide = true)]
+    pub tied: bool,
     /// Tell each stage with its time
     #[arg(short, long, conflicts_with = "quiet")]
     pub verbose: bool,
@@ -79,6 +85,23 @@ impl From<UnitsWord> for Units {
             UnitsWord::In => Units::In,
         }
     }
+}
+
+/// What standard input is.
+#[derive(Args, Clone, Debug, Default)]
+pub struct FromArgs {
+    /// What standard input is, where the input is `-`: the extension that its file would have [default: told by its
+    /// first bytes]
+    #[arg(long, value_name = "FORMAT")]
+    pub from: Option<String>,
+}
+
+/// What standard output is to be.
+#[derive(Args, Clone, Debug, Default)]
+pub struct ToArgs {
+    /// What goes to standard output, where the output is `-`: the extension that its file would have
+    #[arg(long, value_name = "FORMAT")]
+    pub to: Option<String>,
 }
 
 /// How a scan is read.

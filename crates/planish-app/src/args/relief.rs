@@ -1,5 +1,6 @@
 //! `planish relief` and `planish deform`: what the user can say of displacement maps.
 
+use super::examples;
 use super::groups::Common;
 use super::stages::AllStages;
 use crate::options::{StageOptions, StageParams};
@@ -26,16 +27,22 @@ pub struct Relief {
 #[derive(Subcommand, Debug)]
 pub enum ReliefCommand {
     /// Model -> a folder of images: displacement, heights or normals, for any renderer
+    #[command(after_help = examples::RELIEF_EXPORT)]
     Export(ReliefExport),
     /// Images that were edited elsewhere -> the model, as a layer
+    #[command(after_help = examples::RELIEF_IMPORT)]
     Import(ReliefImport),
     /// Model and script -> the model with strokes, stamps, filters ... as layers
+    #[command(after_help = examples::RELIEF_EDIT)]
     Edit(ReliefEdit),
     /// Part surface and map at a wavelength: what is longer goes to the surface, what is shorter to the map
+    #[command(after_help = examples::RELIEF_PART)]
     Part(ReliefPart),
     /// The same shape on other numbers of control points, with all edits
+    #[command(after_help = examples::RELIEF_LEVEL)]
     Level(ReliefLevel),
     /// Detail of another model, or of other patches, onto this model
+    #[command(after_help = examples::RELIEF_TRANSFER)]
     Transfer(ReliefTransfer),
 }
 

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// The facts of a scan as an input.
 pub fn scan_facts(path: &Path, scan: &Cloud, units: planish::model::Units) -> Input {
     Input {
-        path: path.display().to_string(),
+        path: crate::words::told(&path.display().to_string()),
         kind: "scan".into(),
         counts: [("points".to_owned(), scan.points.len() as u64)].into(),
         units: units.symbol().into(),

@@ -1,19 +1,19 @@
 //! One file per command, and what they share.
 
+mod batch;
 mod clean;
 mod compare;
-mod decimate;
 mod demo;
 mod edit;
 mod export;
 mod fit;
 mod info;
 mod layout;
+mod manual;
 mod mesh;
 mod missed;
 mod relief;
 mod run;
-mod smooth;
 mod studio;
 mod transform;
 
@@ -24,8 +24,11 @@ use crate::files;
 use crate::outputs;
 use crate::products::{self, Staged};
 use crate::progress::{self, Bars};
+use crate::stdout::{self, Carries};
+use crate::streams;
 use crate::words;
 pub use crate::words::with_hint;
+pub use batch::folder_names;
 use planish::grid::Grid;
 use planish::model::{Model, Units};
 use planish::observe::Cancelled;
@@ -34,23 +37,40 @@ use planish::relief::{Relief, ReliefError};
 use planish::surface::Surface;
 use planish_io::report::{Report, number};
 use planish_io::{FileUnits, WriteError};
+use std::ffi::OsString;
 use std::io::Write;
 use std::path::Path;
 
 /// Runs the command.
+/// * `program` - how this program is started anew
 /// # Errors
 /// What the user is to be told.
-pub fn run(cli: Cli) -> Result<Status, Failure> {
+pub fn run(cli: Cli, program: &[OsString]) -> Result<Status, Failure> {
     progress::watch_interrupts();
-    check::check(&cli.command)?;
-    outputs::check(&cli.command)?;
-    match cli.command {
+    let mut command = cli.command;
+    if command.common().is_some_and(|common| common.json) {
+        stdout::carry(Carries::Json)?;
+    }
+    if command.common().is_some_and(|common| common.tied) {
+        progress::watch_input();
+    }
+    check::check(&command)?;
+    let streams = streams::open(&mut command)?;
+    outputs::check(&command)?;
+    let status = carry_out(command, program)?;
+    streams.close()?;
+    Ok(status)
+}
+
+fn carry_out(command: Command, program: &[OsString]) -> Result<Status, Failure> {
+    match command {
         Command::Demo(args) => demo::demo(&Session::new(&args.common)?, &args),
+        Command::Run(args) if args.is_batch() => batch::run(&Session::new(&args.common)?, &args, program),
         Command::Run(args) => run::run(&Session::new(&args.common)?, &args),
         Command::Clean(args) => clean::clean(&Session::new(&args.common)?, &args),
         Command::Mesh(args) => mesh::mesh(&Session::new(&args.common)?, &args),
-        Command::Smooth(args) => smooth::smooth(&Session::new(&args.common)?, &args),
-        Command::Decimate(args) => decimate::decimate(&Session::new(&args.common)?, &args),
+        Command::Smooth(args) => mesh::smooth(&Session::new(&args.common)?, &args),
+        Command::Decimate(args) => mesh::decimate(&Session::new(&args.common)?, &args),
         Command::Layout(args) => layout::layout(&Session::new(&args.common)?, &args),
         Command::Fit(args) => fit::fit(&Session::new(&args.common)?, &args),
         Command::Edit(args) => edit::edit(&Session::new(&args.common)?, &args),
@@ -59,8 +79,11 @@ pub fn run(cli: Cli) -> Result<Status, Failure> {
         Command::Export(args) => export::export(&Session::new(&args.common)?, &args),
         Command::Compare(args) => compare::compare(&Session::new(&args.common)?, &args),
         Command::Transform(args) => transform::transform(&Session::new(&args.common)?, &args),
+        Command::Info(args) if info::is_several(&args) => info::several(&Session::new(&args.common)?, args),
         Command::Info(args) => info::info(&Session::new(&args.common)?, &args),
         Command::Studio(args) => studio::studio(&Session::new(&args.common)?, &args),
+        Command::Completions(args) => manual::completions(&args),
+        Command::Man(args) => manual::man(&args),
     }
 }
 
@@ -181,8 +204,9 @@ fn displaced_grids(model: &Model) -> Result<Option<Vec<Grid>>, ReliefError> {
     model.surfaces.iter().zip(&model.reliefs).map(one).collect::<Result<_, _>>().map(Some)
 }
 
-/// Writes the report into its staged file and moves it to its place.
+/// Writes the report into its staged file and moves it to its place; and to standard output, where that was asked for.
 fn commit_report(staged: Option<Staged>, report: &Report) -> Result<(), Failure> {
+    stdout::report(report);
     let Some(staged) = staged else { return Ok(()) };
     write_text(&staged.file_path(), &report.to_json())?;
     staged.commit()

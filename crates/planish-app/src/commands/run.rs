@@ -18,13 +18,14 @@ use planish_io::{StepInput, Up, WriteError, WriteOptions};
 use std::path::Path;
 
 pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
+    let input = &args.inputs[0];
     let staged = Staged::folder(&args.output)?;
     let scan = ScanParams { points: args.points.params(None)?, ..args.meshing.params()? };
-    let units = session.units_of(&args.input);
+    let units = session.units_of(input);
     let params = args.stages.run_params(scan, session.common.seed, units);
     let job = Job {
         command: "run",
-        path: &args.input,
+        path: input,
         network_path: args.network.as_deref(),
         params,
         units,
@@ -34,15 +35,15 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
         up: args.up.into(),
         truth: None,
     };
-    if planish_io::is_scan(&args.input) {
-        let ((scan, far_off), read) = session.step("read", || files::scan_body(&args.input, &args.scan))?;
+    if planish_io::is_scan(input) {
+        let ((scan, far_off), read) = session.step("read", || files::scan_body(input, &args.scan))?;
         return produce(session, job, From { warning: far_off, ..From::scan(&scan) }, staged, vec![read]);
     }
     args.meshing.refuse("use `planish mesh` first")?;
     if let Some(flag) = args.points.first_given() {
         return Err(Failure::usage(flag, "is for scans, and the input is none").hint("leave it out"));
     }
-    let (placed, read) = session.step("read", || Placed::read(&args.input))?;
+    let (placed, read) = session.step("read", || Placed::read(input))?;
     let network = files::optional_network(args.network.as_deref(), &placed.mesh)?;
     network.as_ref().map_or(Ok(()), |network| args.stages.check_curves(network))?;
     let from = From { input: placed.input(network), shift: placed.shift, warning: placed.warning(units.symbol()) };

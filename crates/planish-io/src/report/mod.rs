@@ -9,7 +9,7 @@ mod verdict;
 mod words;
 
 pub use gallery::{Picture, Place, Scale};
-pub use page::html;
+pub use page::{html, table_page};
 pub use verdict::{State, verdict};
 pub use words::{count, distance, number, percent};
 

@@ -126,6 +126,36 @@ pub fn html(report: &Report, pictures: &[Picture]) -> String {
     page
 }
 
+/// A page with one table: a heading, a line above it, the heads of its columns, and its rows. A cell is a text and where it
+/// leads to, if anywhere.
+pub fn table_page(name: &str, lead: &str, heads: &[String], rows: &[Vec<(String, Option<String>)>]) -> String {
+    let mut page = String::new();
+    let _ = write!(
+        page,
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{0} - planish report</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n\
+         <header>\n<p class=\"mark\">planish report</p>\n<h1>{0}</h1>\n</header>\n<p class=\"lead\">{1}</p>\n<table>\n<tr>",
+        escape(name),
+        escape(lead)
+    );
+    heads.iter().for_each(|head| _ = write!(page, "<th>{}</th>", escape(head)));
+    page.push_str("</tr>\n");
+    for row in rows {
+        page.push_str("<tr>");
+        for (text, link) in row {
+            let text = escape(text);
+            let _ = match link {
+                Some(link) => write!(page, "<td><a href=\"{}\">{text}</a></td>", escape(link)),
+                None => write!(page, "<td>{text}</td>"),
+            };
+        }
+        page.push_str("</tr>\n");
+    }
+    page.push_str("</table>\n</main>\n</body>\n</html>\n");
+    page
+}
+
 fn header(page: &mut String, report: &Report, name: &str) {
     let input = &report.input;
     let mut facts: Vec<String> = input.counts.iter().map(|(what, &n)| format!("{} {what}", count(n))).collect();

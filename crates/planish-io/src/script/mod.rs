@@ -130,12 +130,28 @@ difference = ["block", "bore"]
     }
 
     #[test]
+    fn a_formula_is_a_solid_that_ends_at_its_box() {
+        let text = "[solid.a]\nformula = { text = \"x^2 + y^2 - 1\", from = [-2, -2, -3], to = [2, 2, 3] }\nmove = [1, 0, 0]\n";
+        let part = part(text).unwrap();
+        assert_eq!(part.value(DVec3::new(3.0, 0.0, 0.0)), 3.0);
+        assert_eq!(part.value(DVec3::new(1.0, 0.0, 3.5)), 0.5);
+        assert_eq!(part.bounds().size(), DVec3::new(4.0, 4.0, 6.0));
+    }
+
+    #[test]
     fn faults_are_told_with_their_line() {
         let cases = [
             ("[solid.a]\nsphere = { radius = 1 }\ncolour = 3\n", "unknown key \"colour\"", "line 3"),
             ("units = \"furlong\"\n[solid.a]\nsphere = { radius = 1 }\n", "furlong", "line 1"),
             ("[solid.a]\nsphere = { radius = -1 }\n", "radius", "line 2"),
             ("[solid.a]\nunion = [\"b\"]\n", "\"b\"", "line 2"),
+            ("[solid.a]\nformula = { text = \"x +* y\", from = [0,0,0], to = [1,1,1] }\n", "column 4", "line 2"),
+            ("[solid.a]\nformula = { text = \"x\", from = [0,0,0], to = [1,1,0] }\n", "beyond", "line 2"),
+            (
+                "[solid.a]\nformula = { text = \"x\", from = [0,0,0], to = [1,1,1] }\noffset = 1\n",
+                "distances",
+                "line 3",
+            ),
             ("[solid.a]\nunion = [\"a\"]\n", "itself", "line 2"),
             ("[solid.a]\nbox = { size = [1, 2] }\n", "3 numbers", "line 2"),
             ("[solid.a\nsphere = 1", "", "line 1"),

@@ -3,13 +3,14 @@
 use super::ScriptError;
 use super::toml::{Table, Value};
 use planish::field::csg::Operation;
-use planish::field::{MeshBody, Part, Polygon, Solid};
+use planish::field::{Formula, MeshBody, Part, Polygon, Solid};
+use planish::geom::Aabb;
 use planish::{DVec2, DVec3};
 use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-const SHAPES: [&str; 13] = [
+const SHAPES: [&str; 14] = [
     "sphere",
     "box",
     "cylinder",
@@ -18,6 +19,7 @@ const SHAPES: [&str; 13] = [
     "plane",
     "capsule",
     "extrusion",
+    "formula",
     "mesh",
     "union",
     "intersection",
@@ -69,7 +71,7 @@ impl Reader<'_> {
             [_] => Ok(()),
             [] => Err(solid.fault(
                 format!("solid \"{}\" has no shape", solid.name()),
-                format!("give one of {}", known[..13].join(", ")),
+                format!("give one of {}", known[..SHAPES.len()].join(", ")),
             )),
             _ => Err(solid.fault(
                 format!("solid \"{}\" has {} shapes ({})", solid.name(), shapes.len(), shapes.join(", ")),
@@ -97,6 +99,10 @@ impl Reader<'_> {
         };
         let mut part = self.shape(&shape, above)?;
         if let Some(distance) = table.optional("offset") {
+            if matches!(&part, Part::Solid(solid) if solid.has_formula()) {
+                let what = "an offset needs distances, and the values of a formula are none";
+                return Err(distance.fault(what, "change the formula itself"));
+            }
             part = part.offset(distance.number()?);
         }
         let scale = table.optional("scale").map(|s| s.positive()).transpose()?.unwrap_or(1.0);
@@ -204,6 +210,19 @@ fn primitive(shape: &Value) -> Result<Solid, ScriptError> {
             t.only(&["from", "to", "radius"])?;
             let (from, to) = (t.required("from")?.vector()?, t.required("to")?.vector()?);
             Solid::Capsule { from, to, radius: t.positive("radius")? }
+        }
+        "formula" => {
+            t.only(&["text", "from", "to"])?;
+            let text = t.required("text")?;
+            let formula = Formula::parse(text.text()?)
+                .map_err(|e| text.fault(format!("{} (column {} of the formula)", e.what, e.column), e.hint))?;
+            let (from, to) = (t.required("from")?.vector()?, t.required("to")?.vector()?);
+            if !(to - from).cmpgt(DVec3::ZERO).all() {
+                return Err(
+                    shape.fault("\"to\" must lie beyond \"from\" along every axis", "give two opposite corners")
+                );
+            }
+            Solid::of_formula(formula, &Aabb { min: from, max: to })
         }
         _ => {
             t.only(&["points", "height"])?;

@@ -10,7 +10,7 @@ def main() -> None:
 
     # Python's handler would wait for the interpreter, which waits for the program: the program has handlers of its own.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    sys.exit(program(["planish", *sys.argv[1:]]))
+    sys.exit(program(["planish", *sys.argv[1:]], [sys.executable, "-m", "planish"]))
 
 
 if __name__ == "__main__":

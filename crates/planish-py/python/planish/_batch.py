@@ -1,36 +1,29 @@
 """Whole runs: one part, or many beside each other.
 
-Each run is the program in a process of its own, as on the command line: its options are keywords, its products and its
-report are the same, and a run that fails or is killed takes nothing else along.
+Both are `planish run` in a process of its own: its options are keywords, its products and its report are the same, and a run
+that fails or is killed takes nothing else along.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
-import signal
 import subprocess
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ._planish import Cloud, Mesh, Model, RunError, __version__, read
+from ._planish import Cloud, Mesh, Model, RunError, read
 
 #: Exit statuses of the program with a result: done, and a demanded tolerance is missed.
 _DONE, _MISSED = 0, 1
 #: Seconds that the program has to end by itself after Ctrl-C.
 _GRACE = 2.0
-#: Products whose presence tells that a run was finished.
-_PRODUCTS = ("mesh.ply", "model.planish", "surface.step", "preview.glb", "report.json", "report.html", "relief")
-#: Name of the file that tells which runs of a batch are finished.
-_MANIFEST = "manifest.json"
 
 Option = bool | int | float | str | list[int] | tuple[int, ...] | None
 
@@ -111,7 +104,7 @@ _COLUMNS = (
     ("patches", "patches.count", "{:.0f}"),
     ("RMS %", "surface.rms_rel", "{:.4%}"),
     ("max %", "surface.max_rel", "{:.4%}"),
-    ("seam deg", "seam.angle_max_deg", "{:.2f}"),
+    ("seam deg", "seam.inner_angle_max_deg", "{:.2f}"),
 )
 
 
@@ -154,143 +147,93 @@ def run_many(
     progress: bool | Callable[[Row], None] = False,
     **options: Option,
 ) -> Batch:
-    """Everything for many files: one folder of products each, below `output`.
+    """Everything for many files: one folder of products each, below `output`; as `planish run` with several inputs.
 
     One that fails does not stop the others. One that was finished by an earlier call is skipped if its content, the options
-    and the version of planish are the same and its products are there: `output/manifest.json` tells.
+    and the version of planish are the same and its products are there: `output/manifest.json` tells. `output/batch.html` is
+    the table as a page, `output/batch.json` for programs.
 
-    * sources: files
+    * sources: files, and patterns such as "scans/*.e57"
     * jobs: runs beside each other; `threads` of each is a share of the cores unless it is given
     * progress: True writes a line for each row to stderr; a function is called with it
     * options: as of `run`, for all of them
 
     Returns the table; raises KeyboardInterrupt on Ctrl-C when all runs have ended, and what is finished stays finished.
+    Raises RunError for options that there are not, and for a folder that cannot be written to.
     """
     if jobs < 1:
         raise ValueError(f"jobs={jobs}: at least 1 is needed")
-    folder = Path(output)
-    folder.mkdir(parents=True, exist_ok=True)
-    if options.get("threads") is None:
-        options = {**options, "threads": max(1, (os.cpu_count() or 1) // jobs)}
-    paths = [Path(source) for source in sources]
-    manifest, children = _Manifest(folder / _MANIFEST), _Children()
-    rows: dict[int, Row] = {}
-    with ThreadPoolExecutor(jobs) as pool:
-        places = zip(paths, _names(paths), strict=True)
-        work = {pool.submit(_one, path, folder / name, options, manifest, children): k for k, (path, name) in enumerate(places)}
+    paths = [os.fspath(source) for source in sources]
+    if not paths:
+        return Batch()
+    command = ["run", "--output", os.fspath(output), f"--jobs={jobs}", *_flags(options), "--", *paths]
+    return _batch(command, len(paths), progress)
+
+
+def _batch(command: list[str], least: int, progress: bool | Callable[[Row], None]) -> Batch:
+    """Runs the program for a batch of at least so many rows."""
+    tell = progress if callable(progress) else None
+    quiet = [] if progress and tell is None else ["--quiet"]
+    children, rows = _Children(), dict[int, Row]()
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as told:
+        process = children.start([command[0], "--json", *quiet, *command[1:]], subprocess.PIPE, told if quiet else None)
+        assert process.stdout is not None
         try:
-            for done, row in _ended(work):
-                rows[done] = row
-                _tell(row, progress)
+            for line in process.stdout:
+                index, row = _row(json.loads(line))
+                rows[index] = row
+                if tell is not None:
+                    tell(row)
+            process.wait()
         except BaseException:
             children.stop()
-            for future in work:
-                future.cancel()
             raise
+        finally:
+            children.ended(process)
+        # Without a row for each input the batch itself failed.
+        if len(rows) < least:
+            told.seek(0)
+            raise _failure(told.read(), process.returncode)
     return Batch(rows[k] for k in sorted(rows))
 
 
-def _ended(work: dict[Future[Row], int]) -> Iterator[tuple[int, Row]]:
-    """Rows as they end. It wakes often: a thread that waits for a lock hears no Ctrl-C on some systems."""
-    left = set(work)
-    while left:
-        ended, left = wait(left, timeout=0.1, return_when=FIRST_COMPLETED)
-        for future in ended:
-            yield work[future], future.result()
-
-
-def _one(path: Path, folder: Path, options: dict[str, Option], manifest: _Manifest, children: _Children) -> Row:
-    """One row of a batch."""
-    try:
-        key = _key(path, options)
-    except OSError as error:
-        return Row(path, folder, "failed", 0.0, f"error: {path}: cannot be read ({error.strerror})")
-    if (known := manifest.finished(folder, key)) is not None:
-        report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-        return Row(path, folder, "skipped", known["seconds"], quality=report["quality"])
-    start = time.monotonic()
-    try:
-        made = _run(path, folder, options, children, progress=False)
-    except RunError as error:
-        return Row(path, folder, "failed", time.monotonic() - start, str(error))
-    seconds = time.monotonic() - start
-    status = "missed" if made.missed else "done"
-    manifest.add(folder, {"key": key, "source": str(path), "status": status, "seconds": round(seconds, 3)})
-    return Row(path, folder, status, seconds, quality=made.quality)
+def _row(told: dict[str, Any]) -> tuple[int, Row]:
+    """A row from the program's line of JSON."""
+    error = told.get("error")
+    row = Row(
+        Path(told["source"]),
+        Path(told["folder"]),
+        told["status"],
+        told["seconds"],
+        None if error is None else error.removeprefix("error: "),
+        told["quality"],
+    )
+    return told["index"], row
 
 
 def _tell(row: Row, progress: bool | Callable[[Row], None]) -> None:
+    """Tells of a row."""
     if callable(progress):
         progress(row)
     elif progress:
         print(f"{row.source}: {row.status} in {row.seconds:.1f} s{f' - {row.error}' if row.error else ''}", file=sys.stderr)
 
 
-def _names(paths: list[Path]) -> Iterator[str]:
-    """A folder's name for each file: its stem, with its extension where two have one stem, and a number where that helps not."""
-    taken: set[str] = set()
-    stems = [path.stem for path in paths]
-    for path in paths:
-        name = path.stem if stems.count(path.stem) == 1 else path.name.replace(".", "-")
-        number, plain = 2, name
-        while name in taken:
-            name, number = f"{plain}-{number}", number + 1
-        taken.add(name)
-        yield name
-
-
-def _key(path: Path, options: dict[str, Option]) -> str:
-    """What the products depend on: content, options, version."""
-    told = {name: value for name, value in options.items() if value is not None and name not in ("threads", "force")}
-    digest = hashlib.sha256(json.dumps([__version__, path.suffix.lower(), told], sort_keys=True).encode())
-    with path.open("rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()
-
-
-class _Manifest:
-    """Which runs of a batch are finished: one JSON file, replaced as a whole after each."""
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._lock = path, threading.Lock()
-        try:
-            self._rows: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))["runs"]
-        except (OSError, ValueError, KeyError, TypeError):
-            # None yet, or one that a crash of the machine cut off: everything is run.
-            self._rows = {}
-
-    def finished(self, folder: Path, key: str) -> dict[str, Any] | None:
-        """The entry of a folder, if its products are those of this key and all there."""
-        with self._lock:
-            row: dict[str, Any] | None = self._rows.get(folder.name)
-        whole = row is not None and row["key"] == key and all((folder / name).exists() for name in _PRODUCTS)
-        return row if whole else None
-
-    def add(self, folder: Path, row: dict[str, Any]) -> None:
-        """Adds an entry and writes the file."""
-        with self._lock:
-            self._rows[folder.name] = row
-            text = json.dumps({"planish": __version__, "runs": dict(sorted(self._rows.items()))}, indent=1)
-            beside = self._path.with_suffix(".json.part")
-            beside.write_text(text + "\n", encoding="utf-8")
-            beside.replace(self._path)
-
-
 class _Children:
-    """The processes that run, so that they can be stopped."""
+    """The processes that run, so that they can be stopped. Each ends by itself when its standard input does: also when this
+    process dies."""
 
     def __init__(self) -> None:
         self._lock, self._stopped = threading.Lock(), False
         self._running: set[subprocess.Popen[str]] = set()
 
-    def start(self, command: list[str], progress: bool) -> subprocess.Popen[str]:
-        """Starts a process, unless all are to stop."""
+    def start(self, command: list[str], stdout: int, stderr: Any) -> subprocess.Popen[str]:
+        """Starts the program with a command line, unless all are to stop."""
         with self._lock:
             if self._stopped:
                 raise RunError("interrupted")
-            errors = None if progress else subprocess.PIPE
-            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors, stdin=subprocess.DEVNULL, text=True)
+            program = [sys.executable, "-m", "planish", command[0], "--tied", *command[1:]]
+            process = subprocess.Popen(program, stdin=subprocess.PIPE, stdout=stdout, stderr=stderr, text=True, encoding="utf-8")
             self._running.add(process)
             return process
 
@@ -298,35 +241,43 @@ class _Children:
         """Forgets a process."""
         with self._lock:
             self._running.discard(process)
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                pipe.close()
 
     def stop(self) -> None:
-        """Ends all processes: as Ctrl-C does, and by force if they do not hear."""
+        """Ends all processes as Ctrl-C does, and by force if they do not hear."""
         with self._lock:
             self._stopped = True
             running = list(self._running)
         for process in running:
-            process.send_signal(signal.SIGINT)
+            if process.stdin is not None:
+                process.stdin.close()
         end = time.monotonic() + _GRACE
         for process in running:
             try:
                 process.wait(max(0.0, end - time.monotonic()))
             except subprocess.TimeoutExpired:
                 process.kill()
+                process.wait()
 
 
 def _run(path: Path, output: Path, options: dict[str, Option], children: _Children, progress: bool) -> Run:
     """Runs the program on a file."""
-    command = [sys.executable, "-m", "planish", "run", str(path), "-o", str(output), *_flags(options)]
-    process = children.start(command if progress else [*command, "--quiet"], progress)
-    try:
-        _, told = process.communicate()
-    except BaseException:
-        children.stop()
-        raise
-    finally:
-        children.ended(process)
-    if process.returncode not in (_DONE, _MISSED):
-        raise _failure(told or "", process.returncode)
+    quiet = [] if progress else ["--quiet"]
+    command = ["run", *quiet, "--output", str(output), *_flags(options), "--", str(path)]
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as told:
+        process = children.start(command, subprocess.DEVNULL, None if progress else told)
+        try:
+            process.wait()
+        except BaseException:
+            children.stop()
+            raise
+        finally:
+            children.ended(process)
+        told.seek(0)
+        if process.returncode not in (_DONE, _MISSED):
+            raise _failure(told.read(), process.returncode)
     report = json.loads((output / "report.json").read_text(encoding="utf-8"))
     return Run(output, report, process.returncode == _MISSED)
 
@@ -358,7 +309,7 @@ def _flags(options: dict[str, Option]) -> Iterator[str]:
 
 
 #: Options without a value.
-_SWITCHES = ("force", "no_clobber", "in_place", "open", "close", "quiet", "verbose")
+_SWITCHES = ("force", "no_clobber", "in_place", "json", "open", "close", "quiet", "verbose")
 
 
 class _file_of:

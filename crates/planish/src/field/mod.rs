@@ -44,7 +44,7 @@ pub use polygon::{Polygon, PolygonError};
 pub use sample::sample;
 pub use sample_field::SampleField;
 pub use scalar_grid::{Body, GradientRule, GridParams, ScalarGrid};
-pub use solid::Solid;
+pub use solid::{Formula, FormulaError, Solid};
 pub use sweep::{Milling, Move, Tool};
 pub use winding::Winding;
 

@@ -110,6 +110,12 @@ pub fn voxel_for(samples: &Samples) -> f64 {
     usual.min(CELL_GAPS * gap).max(FINEST_CELL * usual)
 }
 
+/// The field of the samples of a scan, and whether its holes are closed.
+pub fn field_of(samples: &Samples, params: &ScanParams) -> (SampleField, bool) {
+    let closed = params.close.unwrap_or_else(|| samples.closed.first().copied().unwrap_or(false));
+    (SampleField::new(samples, closed), closed)
+}
+
 /// Meshes a scan.
 /// # Errors
 /// [`ScanError`].
@@ -128,8 +134,7 @@ pub fn mesh_samples(
     params: &ScanParams,
     observer: &dyn Observer,
 ) -> Result<ScanMeshed, ScanError> {
-    let closed = params.close.unwrap_or_else(|| samples.closed.first().copied().unwrap_or(false));
-    let field = SampleField::new(&samples, closed);
+    let (field, closed) = field_of(&samples, params);
     let spacing = params.cells.unwrap_or_else(|| Spacing::Voxel(voxel_for(&samples)));
     let sampling = Sampling { spacing, memory: params.memory };
     let mut meshed = contour::from_field(&field, sampling, &params.contour, &Part::new(observer, 0.0, 0.88))?;

@@ -4,12 +4,13 @@
 //! 1. a frame at every node - `frame`      2. bake and displace - `bake`, eq. 7.1
 //! 3. maps of one number, folds - `scalar`      4. one mesh of all patches - `weld`
 //! 5. images of any size and kind - `maps`, `resample`      6. one sample on both sides of a seam - `seam`, §8.2
-//! 7. edits as layers - `layers`, §7.6
+//! 7. edits as layers - `layers`, §7.6      8. places of the surfaces closest to points - `closest`
 //!
 //! Departs from [K98]: its frame `(S_u, S_v, N)` with dot products (eq. 7.1) is exact only where `S_u` and `S_v` are
 //! orthogonal; an orthonormal frame is exact everywhere.
 
 mod bake;
+mod closest;
 mod frame;
 pub mod layers;
 pub mod maps;
@@ -20,6 +21,7 @@ mod waves;
 mod weld;
 
 pub use bake::{bake, bake_network, displace};
+pub use closest::{SurfacePlace, closest};
 pub use frame::{Frame, frame_at, frames};
 pub use resample::{resample, resample_all};
 pub use scalar::{fold_over, length, normal_component};

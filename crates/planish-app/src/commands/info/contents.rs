@@ -24,7 +24,8 @@ pub(super) struct Contents {
 
 impl Contents {
     fn new(path: &Path, kind: &str, units: Units) -> Contents {
-        let (path, kind, units) = (path.display().to_string(), kind.to_owned(), units.symbol().to_owned());
+        let (path, kind, units) =
+            (crate::words::told(&path.display().to_string()), kind.to_owned(), units.symbol().to_owned());
         let mut table = Summary::default();
         table.row("file", format!("{path}: {kind}"));
         Contents { input: Input { path, kind, units, ..Input::default() }, table }

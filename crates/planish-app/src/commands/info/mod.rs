@@ -3,12 +3,12 @@
 mod contents;
 
 use self::contents::Contents;
-use super::{Session, commit_report};
-use crate::args::{Info, ScanArgs};
+use super::{Session, batch, commit_report};
+use crate::args::{Info, ScanArgs, is_pattern};
 use crate::failure::{Failure, Status};
 use crate::files::{self, Content};
-use crate::progress;
 use crate::summary::Summary;
+use crate::{progress, stdout};
 use planish::DVec3;
 use planish::mesh::{Adjacency, Diagnosis, TriMesh, diagnose, self_intersections};
 use planish::model::{Model, Units};
@@ -16,14 +16,43 @@ use planish::pipeline::{Figure, Warning};
 use planish_io::report::{Report, count, number};
 use planish_io::{FileUnits, MeshFormat};
 
+/// True if there is more than one file, or a pattern that may mean so.
+pub fn is_several(args: &Info) -> bool {
+    args.files.len() > 1 || args.files.iter().any(|path| is_pattern(path))
+}
+
+/// One file after the other; one that cannot be used does not stop the others.
+pub fn several(session: &Session, args: Info) -> Result<Status, Failure> {
+    if let Some(report) = &session.common.report {
+        return Err(Failure::usage(report, "takes the report of one file").hint("say --json: a line for each file"));
+    }
+    let mut status = Status::Done;
+    for (n, path) in batch::expanded(&args.files)?.into_iter().enumerate() {
+        if n > 0 && !session.common.quiet {
+            stdout::table_line("");
+        }
+        let one = Info { files: vec![path], from: args.from.clone(), common: args.common.clone() };
+        match info(session, &one) {
+            Err(failure) if failure.status == Status::Interrupted => return Err(failure),
+            Err(failure) => {
+                failure.print();
+                status = failure.status;
+            }
+            Ok(_) => {}
+        }
+    }
+    Ok(status)
+}
+
 pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
+    let file = &args.files[0];
     let own_report = session.stage_report()?;
-    if planish_io::is_scan(&args.file) {
+    if planish_io::is_scan(file) {
         let report = scan_info(session, args)?;
         return commit_report(own_report, &report).map(|()| Status::Done);
     }
     let units = session.common.units.map(Units::from);
-    let (other, read) = session.step("read", || contents::of(&args.file, units))?;
+    let (other, read) = session.step("read", || contents::of(file, units))?;
     if let Some(Contents { input, table }) = other {
         let report = Report { stages: vec![read], ..Report::new("info", input) };
         if !session.common.quiet {
@@ -31,24 +60,24 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
         }
         return commit_report(own_report, &report).map(|()| Status::Done);
     }
-    if !files::is_model(&args.file) && MeshFormat::of(&args.file).is_none() && args.file.exists() {
+    if !files::is_model(file) && MeshFormat::of(file).is_none() && file.exists() {
         let scans = planish_io::SCAN_EXTENSIONS.map(|e| format!(".{e}")).join(", ");
         let meshes = MeshFormat::ALL.map(|f| format!(".{}", f.extension())).join(", ");
-        return Err(Failure::input(&args.file, "is of no kind that planish knows").hint(format!(
+        return Err(Failure::input(file, "is of no kind that planish knows").hint(format!(
             "meshes are {meshes}; scans {scans}; models .planish; volumes .nrrd, .npy; scripts .toml; networks and reports \
              .json; .step, .exr, folders of maps"
         )));
     }
-    let (content, read) = session.step("read", || files::content(&args.file))?;
+    let (content, read) = session.step("read", || files::content(file))?;
     let (mesh, model) = match &content {
         Content::Mesh(mesh) => (mesh, None),
         Content::Model(model) => (&model.mesh, Some(model.as_ref())),
     };
     let units =
-        session.common.units.map(Into::into).or(model.map(|m| m.units)).unwrap_or_else(|| session.units_of(&args.file));
+        session.common.units.map(Into::into).or(model.map(|m| m.units)).unwrap_or_else(|| session.units_of(file));
     let input = match model {
-        Some(model) => files::model_facts(&args.file, model, units),
-        None => files::mesh_facts(&args.file, mesh, units),
+        Some(model) => files::model_facts(file, model, units),
+        None => files::mesh_facts(file, mesh, units),
     };
     let mut report = Report::new("info", input);
     let facts = diagnose(mesh);
@@ -91,8 +120,9 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
 
 /// What is in a scan.
 fn scan_info(session: &Session, args: &Info) -> Result<Report, Failure> {
-    let (scan, read) = session.step("read", || files::scan(&args.file, &ScanArgs::default()))?;
-    let mut report = Report::new("info", super::clean::scan_facts(&args.file, &scan, session.units_of(&args.file)));
+    let file = &args.files[0];
+    let (scan, read) = session.step("read", || files::scan(file, &ScanArgs::default()))?;
+    let mut report = Report::new("info", super::clean::scan_facts(file, &scan, session.units_of(file)));
     report.stages.push(read);
     let lost = scan.points.iter().filter(|p| !p.is_finite()).count();
     let mut places: Vec<[u64; 3]> =
@@ -221,8 +251,9 @@ fn folds(model: &Model, report: &mut Report) {
 
 /// The unit, and how sure it is.
 fn told_units(session: &Session, args: &Info, is_model: bool, report: &Report) -> String {
+    let file = &args.files[0];
     let unit = &report.input.units;
-    match planish_io::file_units(&args.file) {
+    match planish_io::file_units(file) {
         _ if is_model || session.common.units.is_some() => unit.clone(),
         FileUnits::Standard(_) => format!("{unit}, as the format has it"),
         FileUnits::Usual(_) | FileUnits::Unknown => {

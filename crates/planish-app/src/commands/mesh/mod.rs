@@ -1,5 +1,11 @@
 //! `planish mesh`: a mesh with sharp edges from a mesh, a solid script, a milling job or a volume.
 
+mod decimate;
+mod smooth;
+
+pub use decimate::decimate;
+pub use smooth::smooth;
+
 use super::{Session, commit_report, write_failure};
 use crate::args::Mesh;
 use crate::failure::{Failure, Status};
@@ -9,14 +15,17 @@ use crate::products::Staged;
 use crate::progress;
 use crate::summary::Summary;
 use planish::DVec3;
+use planish::cloud;
 use planish::contour::{self, Meshed, MeshingError, Sampling};
-use planish::field::{Part, Spacing};
+use planish::field::{Field, Formula, MeshBody, Part, ScalarGrid, Solid, Spacing};
+use planish::geom::Aabb;
 use planish::mesh::{TriMesh, diagnose};
 use planish::model::Units;
-use planish::pipeline::{self, Figure, ScanError, ScanMeshed, Warning};
+use planish::pipeline::{self, Figure, ScanError, ScanMeshed, ScanParams, StageRecord, Warning};
 use planish_io::report::{Input, Report, count, number};
 use planish_io::script::Script;
 use planish_io::{MeshFormat, WriteOptions};
+use std::path::Path;
 
 /// Cells along the longest side unless the user says.
 const RESOLUTION: usize = 129;
@@ -41,7 +50,7 @@ impl Source {
 }
 
 pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
-    files::check_extension(&args.output, &["ply", "obj", "stl", "glb"])?;
+    files::check_extension(&args.output, &["ply", "obj", "stl", "glb", "nrrd", "npy"])?;
     let staged = Staged::file(&args.output)?;
     let own_report = session.stage_report()?;
     let params = args.meshing.params()?;
@@ -55,6 +64,10 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
         Source::Mesh(_) | Source::Script(_) => {
             args.meshing.refuse_cleaning("leave it out: the result is closed anyway")?
         }
+    }
+    if planish_io::is_grid(&args.output) {
+        let from = Sampled { staged, own_report, source, input, read };
+        return volume(session, args, from, &params);
     }
     let spacing = params.cells.unwrap_or(Spacing::Resolution(RESOLUTION));
     let sampling = Sampling { spacing, memory: params.memory };
@@ -115,6 +128,69 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     Ok(Status::Done)
 }
 
+/// A source that is to become a volume.
+struct Sampled {
+    staged: Staged,
+    own_report: Option<Staged>,
+    source: Source,
+    input: Input,
+    read: StageRecord,
+}
+
+/// Writes the field of a source as a volume: its values at the nodes of the lattice that its mesh would be made on.
+fn volume(session: &Session, args: &Mesh, from: Sampled, params: &ScanParams) -> Result<Status, Failure> {
+    let Sampled { staged, own_report, source, input, read } = from;
+    let (sampled, record) = session.bars.step("sample", |o| {
+        let shift = source.shift();
+        let sampled = |field: &dyn Field, usual: Spacing| {
+            let spacing = params.cells.unwrap_or(usual);
+            ScalarGrid::of_field(field, spacing, params.memory, o).map_err(|e| Trouble::Meshing(e.into()))
+        };
+        let usual = Spacing::Resolution(RESOLUTION);
+        let mut grid = match source {
+            Source::Grid(grid) => *grid,
+            Source::Script(Script::Part(part)) => sampled(&part, usual)?,
+            Source::Script(Script::Job(milling)) => sampled(&milling, usual)?,
+            Source::Mesh(placed) => {
+                let body = MeshBody::new(placed.mesh).map_err(|e| Trouble::Meshing(e.into()))?;
+                sampled(&Part::Mesh(Box::new(body)), usual)?
+            }
+            Source::Scan(scan, _) => {
+                let samples = cloud::clean(&scan, &params.clean, o).map_err(|e| Trouble::Scan(e.into()))?;
+                sampled(&pipeline::field_of(&samples, params).0, Spacing::Voxel(pipeline::voxel_for(&samples)))?
+            }
+        };
+        grid.origin += shift;
+        Ok::<ScalarGrid, Trouble>(grid)
+    });
+    if progress::interrupted() {
+        return Err(Failure::interrupted());
+    }
+    let told = |e: &dyn std::fmt::Display| Failure::input(&args.input, super::with_hint(&e.to_string()));
+    let grid = sampled.map_err(|e| match e {
+        Trouble::Meshing(e) => told(&e),
+        Trouble::Scan(e) => told(&e),
+    })?;
+    let (_, write) = session.step("write", || {
+        planish_io::write_grid(staged.file_path(), &grid).map_err(|e| write_failure(&args.input, &args.output, e))
+    })?;
+    let mut report = Report::new("mesh", input);
+    report.stages = vec![read, record, write];
+    let [x, y, z] = grid.size;
+    report.quality.insert("volume.samples".into(), Figure::Count(grid.values.len() as u64));
+    report.quality.insert("volume.spacing".into(), Figure::Number(grid.spacing.x));
+    staged.commit()?;
+    commit_report(own_report, &report)?;
+    if !session.common.quiet {
+        let mut table = Summary::default();
+        table.row("input", format!("{}: {}", report.input.path, report.input.kind));
+        table.row("volume", format!("{x} x {y} x {z} samples, {} apart", report.length("volume.spacing")));
+        table.row("written", args.output.display().to_string());
+        table.print();
+    }
+    Ok(Status::Done)
+}
+
 /// What a source became.
 enum Made {
     OfScan(ScanMeshed),
@@ -142,6 +218,9 @@ impl From<ScanError> for Trouble {
 /// Reads whatever the input is, by its extension.
 fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Source, Input, Units), Failure> {
     let path = &args.input;
+    if let Some(bounds) = &args.bounds {
+        return formula(session, path, bounds);
+    }
     let chosen = session.common.units.map(Units::from);
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         let file = planish_io::script::read_script(path).map_err(|e| Failure::input(path, e))?;
@@ -155,7 +234,7 @@ fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Sourc
                 .hint("intersect planes with something of finite size"));
         }
         let input = Input {
-            path: path.display().to_string(),
+            path: crate::words::told(&path.display().to_string()),
             kind: kind.into(),
             counts: [(what.to_owned(), file.count as u64)].into(),
             units: units.symbol().into(),
@@ -180,7 +259,7 @@ fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Sourc
         let units = session.units();
         let size = grid.spacing * glam::DVec3::from_array(grid.size.map(|n| n as f64 - 1.0));
         let input = Input {
-            path: path.display().to_string(),
+            path: crate::words::told(&path.display().to_string()),
             kind: "volume".into(),
             counts: [("samples".to_owned(), grid.values.len() as u64)].into(),
             units: units.symbol().into(),
@@ -208,6 +287,24 @@ fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Sourc
     let units = session.units_of(path);
     let input = files::mesh_facts(path, &placed.mesh, units);
     Ok((Source::Mesh(placed), input, units))
+}
+
+/// A formula in its box.
+fn formula(session: &Session, text: &Path, bounds: &Aabb) -> Result<(Source, Input, Units), Failure> {
+    let Some(text) = text.to_str() else {
+        return Err(Failure::usage(text, "is a formula with letters that are none").hint("write it in plain letters"));
+    };
+    let formula = Formula::parse(text).map_err(|e| Failure::usage(format!("\"{text}\""), e))?;
+    let units = session.units();
+    let input = Input {
+        path: text.to_owned(),
+        kind: "formula".into(),
+        counts: Default::default(),
+        units: units.symbol().into(),
+        diagonal: bounds.diagonal(),
+    };
+    let part = Part::Solid(Solid::of_formula(formula, bounds));
+    Ok((Source::Script(Script::Part(part)), input, units))
 }
 
 fn failure(args: &Mesh, source: &Source, error: MeshingError) -> Failure {

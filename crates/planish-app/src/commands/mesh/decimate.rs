@@ -1,6 +1,6 @@
 //! `planish decimate`: fewer triangles, features kept.
 
-use super::{Session, commit_report, write_failure};
+use super::super::{Session, commit_report, write_failure};
 use crate::args::Decimate;
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -28,9 +28,9 @@ pub fn decimate(session: &Session, args: &Decimate) -> Result<Status, Failure> {
     }
     let made = made.map_err(|e| {
         if let DecimateError::Target { .. } = e {
-            return Failure::usage(&args.mesh, super::with_hint(&e.to_string()));
+            return Failure::usage(&args.mesh, super::super::with_hint(&e.to_string()));
         }
-        Failure::input(&args.mesh, super::with_hint(&e.to_string())).hint("look for faults with `planish info`")
+        Failure::input(&args.mesh, super::super::with_hint(&e.to_string())).hint("look for faults with `planish info`")
     })?;
     let options = WriteOptions { units, ..WriteOptions::default() };
     let moved = placed::write(&staged.file_path(), &made.mesh, &made.tags, placed.shift, &options)

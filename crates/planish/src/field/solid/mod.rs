@@ -2,7 +2,12 @@
 //!
 //! [K01] §3: union is the least of two values, intersection the greatest, difference the greatest of one and the other
 //! negated. Primitives are true distances, so gradients are unit vectors in closed form and a box of space is skipped
-//! where the interval of values over it has one sign (a distance changes by no more than the way).
+//! where the interval of values over it has one sign (a distance changes by no more than the way). A formula of the user's own
+//! (`formula`) is no distance; its intervals come from the formula itself.
+
+mod formula;
+
+pub use formula::{Formula, FormulaError};
 
 use super::Field;
 use super::polygon::Polygon;
@@ -70,6 +75,8 @@ pub enum Solid {
         /// Height.
         height: f64,
     },
+    /// Where a formula is negative. It has no end by itself, and where it has no value nothing is known.
+    Formula(Formula),
     /// A solid scaled, then turned, then moved.
     Placed {
         /// The solid.
@@ -97,6 +104,24 @@ pub enum Solid {
 }
 
 impl Solid {
+    /// Where a formula is negative, within a box.
+    pub fn of_formula(formula: Formula, bounds: &Aabb) -> Solid {
+        let cut = Solid::Cuboid { size: bounds.size(), round: 0.0 }.moved(bounds.center());
+        Solid::Formula(formula).intersection(cut)
+    }
+
+    /// True if its values are those of a formula, which is no distance.
+    pub fn has_formula(&self) -> bool {
+        match self {
+            Solid::Formula(_) => true,
+            Solid::Placed { solid, .. } | Solid::Offset { solid, .. } => solid.has_formula(),
+            Solid::Union(parts) | Solid::Intersection(parts) | Solid::Difference(parts) => {
+                parts.iter().any(Solid::has_formula)
+            }
+            _ => false,
+        }
+    }
+
     /// The solid moved.
     pub fn moved(self, shift: DVec3) -> Solid {
         Solid::Placed { solid: Box::new(self), scale: 1.0, turn: DQuat::IDENTITY, shift }
@@ -175,6 +200,7 @@ impl Solid {
                     (z, DVec3::Z * up)
                 }
             }
+            Solid::Formula(formula) => formula.evaluate(p),
             Solid::Placed { solid, scale, turn, shift } => {
                 let (d, g) = solid.evaluate(turn.inverse() * (p - *shift) / *scale);
                 (d * scale, *turn * g)
@@ -192,7 +218,7 @@ impl Solid {
                     true => (d, g),
                     false => {
                         let (e, f) = best(rest, p, |a, b| a > b, -1.0);
-                        if e > d { (e, f) } else { (d, g) }
+                        if e > d || e.is_nan() { (e, f) } else { (d, g) }
                     }
                 }
             }
@@ -215,6 +241,15 @@ impl Solid {
             Solid::Placed { solid, scale, turn, shift } if *turn == DQuat::IDENTITY => {
                 let back = |p: DVec3| (p - *shift) / *scale;
                 solid.interval(&Aabb { min: back(aabb.min), max: back(aabb.max) }).map(|v| v * scale)
+            }
+            Solid::Formula(formula) => formula.interval(aabb),
+            // Turned, the box of a formula's variables is the one around the turned box.
+            Solid::Placed { solid, scale, turn, shift } if solid.has_formula() => {
+                let corners: [DVec3; 8] = std::array::from_fn(|c| {
+                    let pick = |k: usize| if c >> k & 1 == 0 { aabb.min[k] } else { aabb.max[k] };
+                    turn.inverse() * (DVec3::new(pick(0), pick(1), pick(2)) - *shift) / *scale
+                });
+                solid.interval(&Aabb::of(&corners)).map(|v| v * scale)
             }
             _ => {
                 let d = self.evaluate(aabb.center()).0;
@@ -252,6 +287,7 @@ impl Solid {
                 let [low, high] = polygon.bounds();
                 Aabb { min: low.extend(0.0), max: high.extend(*height) }
             }
+            Solid::Formula(_) => centred(DVec3::INFINITY),
             Solid::Placed { solid, scale, turn, shift } => {
                 let b = solid.bounding_box();
                 if *turn != DQuat::IDENTITY && !(b.min.is_finite() && b.max.is_finite()) {
@@ -284,12 +320,15 @@ impl Solid {
 /// What nothing evaluates to.
 const NOWHERE: (f64, DVec3) = (f64::INFINITY, DVec3::ZERO);
 
+/// Bounds of a value that may be missing.
+const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
 fn least(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0].min(b[0]), a[1].min(b[1])]
+    if a == ANY || b == ANY { ANY } else { [a[0].min(b[0]), a[1].min(b[1])] }
 }
 
 fn greatest(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0].max(b[0]), a[1].max(b[1])]
+    if a == ANY || b == ANY { ANY } else { [a[0].max(b[0]), a[1].max(b[1])] }
 }
 
 fn side(x: f64) -> f64 {
@@ -301,7 +340,8 @@ fn best(parts: &[Solid], p: DVec3, better: impl Fn(f64, f64) -> bool, sign: f64)
     let mut found: Option<(f64, DVec3)> = None;
     for part in parts {
         let (d, g) = part.evaluate(p);
-        if found.is_none_or(|f| better(d * sign, f.0)) {
+        // Where a formula has no value, what is made of it has none, either.
+        if found.is_none_or(|f| better(d * sign, f.0) || d.is_nan()) {
             found = Some((d * sign, g * sign));
         }
     }
@@ -483,6 +523,38 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn formulas_turned_and_combined_keep_their_intervals_and_lose_no_unknown_place() {
+        let formula = |text: &str| Solid::Formula(Formula::parse(text).unwrap());
+        let bounds = Aabb { min: DVec3::splat(-0.9), max: DVec3::new(0.7, 0.8, 0.9) };
+        let wavy = Solid::of_formula(Formula::parse("sin(4*x) + y*z - 0.2").unwrap(), &bounds);
+        let all = [
+            wavy.clone().turned(DVec3::new(1.0, 2.0, 3.0), 40.0).scaled(0.8).moved(DVec3::splat(0.1)),
+            Solid::Sphere { radius: 0.9 }.difference(wavy.clone()),
+            Solid::Sphere { radius: 0.4 }.union(wavy.clone()).turned(DVec3::X, 20.0),
+        ];
+        for solid in all {
+            for n in 0..200 {
+                let c = place(n);
+                let aabb = Aabb { min: c - 0.1, max: c + 0.15 };
+                let [low, high] = solid.interval(&aabb);
+                for m in 0..10u64 {
+                    let r = |k: u64| random::unit(n, 3 * m + k);
+                    let d = solid.value(aabb.min + (aabb.max - aabb.min) * DVec3::new(r(0), r(1), r(2)));
+                    assert!(low <= d && d <= high);
+                }
+            }
+        }
+        assert_eq!(wavy.bounding_box().size(), bounds.size());
+        let half = formula("sqrt(x)");
+        let p = DVec3::new(-0.1, 0.0, 0.0);
+        let ball = Solid::Sphere { radius: 1.0 };
+        for solid in [ball.clone().union(half.clone()), half.clone().intersection(ball.clone()), ball.difference(half)]
+        {
+            assert!(solid.value(p).is_nan() && solid.crosses(&Aabb { min: p - 0.01, max: p + 0.01 }));
         }
     }
 

@@ -1,6 +1,6 @@
 //! `planish smooth`: noise off a mesh, features kept.
 
-use super::{Session, commit_report, write_failure};
+use super::super::{Session, commit_report, write_failure};
 use crate::args::Smooth;
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -25,7 +25,7 @@ pub fn smooth(session: &Session, args: &Smooth) -> Result<Status, Failure> {
         return Err(Failure::interrupted());
     }
     let made = made.map_err(|e| {
-        Failure::input(&args.mesh, super::with_hint(&e.to_string())).hint("look for faults with `planish info`")
+        Failure::input(&args.mesh, super::super::with_hint(&e.to_string())).hint("look for faults with `planish info`")
     })?;
     let options = WriteOptions { units, ..WriteOptions::default() };
     let tags = tags.unwrap_or_default();

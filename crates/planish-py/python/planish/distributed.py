@@ -1,0 +1,134 @@
+"""Many files on many machines: `run_many` with a Dask cluster in the place of one machine's cores.
+
+    from planish import distributed
+
+    distributed.run_many(["a.ply", "b.e57"], "out", patches=60)                            # a cluster of this machine's own
+    distributed.run_many(["a.ply", "b.e57"], "out", cluster="tcp://10.0.0.1:8786")         # any Dask cluster, by its address
+
+Each input is one task, and each task is `planish run` in a process of its own on its worker: the products are the same bytes,
+in the same folders, as those of `planish.run_many`, whatever the number of workers. Workers read `sources` and write `output`
+by these paths, so on several machines both lie on a file system that all of them have. A task whose worker dies is started
+again on another one; products appear whole or not at all, and what is finished is skipped.
+
+A script that starts a cluster of its own needs `if __name__ == "__main__":` around the call, as everything does that starts
+processes. It needs `dask.distributed`, imported when it is asked for.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+from ._batch import Batch, Option, Row, _batch, _flags, _tell
+from ._planish import folder_names
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+__all__ = ["run_many"]
+
+#: Workers that may die under one task before it counts as failed.
+_DEATHS = 3
+
+
+def run_many(
+    sources: Iterable[str | os.PathLike[str]],
+    output: str | os.PathLike[str],
+    *,
+    cluster: Any = None,
+    jobs: int | None = None,
+    progress: bool | Callable[[Row], None] = False,
+    **options: Option,
+) -> Batch:
+    """Everything for many files on a cluster: one folder of products each, below `output`.
+
+    * sources: files
+    * cluster: the address of a scheduler, a `dask.distributed.Client` or a cluster of Dask's; None makes one of this machine's
+      cores for the time of the call
+    * jobs: workers of a cluster that is made here, one for each core unless given; `threads` of each run is 1 unless given
+    * progress: True writes a line for each row to stderr; a function is called with it
+    * options: as of `planish.run`, for all of them
+
+    Returns the table, as `planish.run_many` does; an input whose workers died three times is a row that failed. Raises
+    RunError for options that there are not, ImportError without `dask.distributed`.
+    """
+    import pathlib
+
+    paths = [pathlib.Path(source).absolute() for source in sources]
+    folder = pathlib.Path(output).absolute()
+    if jobs is not None and jobs < 1:
+        raise ValueError(f"jobs={jobs}: at least 1 is needed")
+    if not paths:
+        return Batch()
+    if options.get("threads") is None:
+        options = {**options, "threads": 1}
+    with _client(cluster, jobs) as client:
+        work = {
+            client.submit(_task, str(path), str(folder), name, options, key=f"planish-{k}-{_stamp()}", pure=False): k
+            for k, (path, name) in enumerate(zip(paths, folder_names([str(path) for path in paths]), strict=True))
+        }
+        return _gathered(work, paths, folder, progress)
+
+
+def _task(source: str, output: str, name: str, options: dict[str, Option]) -> Row:
+    """One input, on a worker: the program itself skips what is finished."""
+    command = ["run", "--output", output, "--jobs=1", f"--folder={name}", *_flags(options), "--", source]
+    return _batch(command, 1, progress=False)[0]
+
+
+def _gathered(work: dict[Any, int], paths: list[Path], folder: Path, progress: bool | Callable[[Row], None]) -> Batch:
+    """The rows as they come, in the order of the inputs."""
+    from distributed import as_completed
+    from distributed.scheduler import KilledWorker
+
+    rows: dict[int, Row] = {}
+    try:
+        for future in as_completed(list(work)):
+            k = work[future]
+            try:
+                row = future.result()
+            except KilledWorker as error:
+                row = Row(paths[k], folder, "failed", 0.0, f"{paths[k]}: {_DEATHS} workers died under it ({error})")
+            rows[k] = row
+            _tell(row, progress)
+    except BaseException:
+        for future in work:
+            future.cancel()
+        raise
+    return Batch(rows[k] for k in sorted(rows))
+
+
+def _stamp() -> str:
+    """Something that no earlier task of the cluster is named by: a result that it still knows would be taken for this one."""
+    import uuid
+
+    return uuid.uuid4().hex
+
+
+class _client:
+    """A client of a cluster, which is closed if it was made here."""
+
+    def __init__(self, cluster: Any, jobs: int | None) -> None:
+        try:
+            import distributed
+        except ImportError as error:
+            hint = "install it with pip install 'planish[distributed]'"
+            raise ImportError(f"planish.distributed needs dask.distributed - hint: {hint}") from error
+        self._own: list[Any] = []
+        if isinstance(cluster, distributed.Client):
+            self._client = cluster
+            return
+        if cluster is None:
+            # One task at a time for each worker: the runs have threads of their own.
+            cluster = distributed.LocalCluster(n_workers=jobs or os.cpu_count() or 1, threads_per_worker=1, dashboard_address=None)
+            self._own.append(cluster)
+        self._client = distributed.Client(cluster)
+        self._own.insert(0, self._client)
+
+    def __enter__(self) -> Any:
+        return self._client
+
+    def __exit__(self, *_: object) -> None:
+        for thing in self._own:
+            thing.close()

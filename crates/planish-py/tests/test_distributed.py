@@ -1,0 +1,80 @@
+"""Batches on a Dask cluster: workers are processes, one is killed, and a scheduler is reached by its address."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import planish
+
+distributed_library = pytest.importorskip("distributed")
+from planish import distributed  # noqa: E402
+
+QUICK: dict[str, Any] = {"patches": 6}
+#: Products that are the same bytes at every run: reports have times.
+SAME = ("mesh.ply", "surface.step", "preview.glb", "relief/relief.json")
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("parts")
+    for k in range(3):
+        planish.cuboid((3.0 + k, 3.0, 2.0), cells=3).write(folder / f"box-{k}.stl")
+    (folder / "box-0.ply").write_text("this is no mesh")
+    return sorted(folder.iterdir())
+
+
+def test_a_cluster_makes_the_bytes_of_run_many_and_skips_what_is_finished(parts: list[Path], tmp_path: Path) -> None:
+    here = planish.run_many(parts, tmp_path / "here", jobs=2, **QUICK)
+    told: list[planish.Row] = []
+    with distributed_library.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        # By the address on the loopback interface, as that of any cluster.
+        address = cluster.scheduler_address
+        there = distributed.run_many(parts, tmp_path / "there", cluster=address, progress=told.append, **QUICK)
+        assert [row.status for row in there] == [row.status for row in here] == ["failed", "done", "done", "done"]
+        assert len(told) == 4 and there[0].error is not None and "box-0.ply" in there[0].error
+        for a, b in zip(here[1:], there[1:], strict=True):
+            assert a.folder.name == b.folder.name
+            for name in SAME:
+                assert (a.folder / name).read_bytes() == (b.folder / name).read_bytes(), name
+        with distributed_library.Client(cluster) as client:
+            again = distributed.run_many(parts, tmp_path / "there", cluster=client, **QUICK)
+    assert [row.status for row in again] == ["failed", "skipped", "skipped", "skipped"]
+    # And the other way about: one manifest for all ways.
+    assert [r.status for r in planish.run_many(parts[1:], tmp_path / "there", **QUICK)][1:] == ["skipped", "skipped"]
+
+
+def test_a_killed_worker_costs_only_time(tmp_path: Path) -> None:
+    part = tmp_path / "part.ply"
+    planish.demo_part(triangles=8_000).write(part)
+    killed: list[int] = []
+
+    def kill(cluster: Any) -> None:
+        end = time.monotonic() + 60.0
+        while not list((tmp_path / "out").glob("part/.planish-partial-*")) and time.monotonic() < end:
+            time.sleep(0.05)
+        for worker in list(cluster.workers.values())[:1]:
+            killed.append(worker.process.process.pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    with distributed_library.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        killer = threading.Thread(target=kill, args=(cluster,))
+        killer.start()
+        table = distributed.run_many([part], tmp_path / "out", cluster=cluster, patches=20, threads=2)
+        killer.join()
+    assert len(killed) == 1 and [row.status for row in table] == ["done"]
+    planish.run(part, tmp_path / "alone", patches=20, threads=1)
+    for name in SAME:
+        assert (tmp_path / "alone" / name).read_bytes() == (table[0].folder / name).read_bytes(), name
+
+
+def test_wrong_options_are_told_as_elsewhere(parts: list[Path], tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="jobs=0"):
+        distributed.run_many(parts, tmp_path, jobs=0)
+    assert distributed.run_many([], tmp_path) == []
