@@ -151,6 +151,11 @@ impl AllStages {
     pub fn demanded_tolerance(&self) -> Option<Tolerance> {
         self.fit.given_tolerance("resolution")
     }
+
+    /// The tolerance of the angle along smooth seams in degrees, if the user demanded one.
+    pub fn demanded_angle(&self) -> Option<f64> {
+        self.stitch.number("angle_tolerance")
+    }
 }
 
 impl StageParams for ContourParams {
