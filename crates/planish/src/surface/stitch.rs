@@ -729,13 +729,14 @@ fn wishes(work: &Work, curves: &[Vec<DVec3>], params: &StitchParams) -> Vec<Wish
     wishes
 }
 
-/// Unit normals along one side of a patch, perpendicular to its curve: those of the patch's own grid within a knot span.
+/// Unit normals along one side of a patch, perpendicular to its curve: those of the patch's own grid,
+/// continued to it.
 fn own_normals(means: &MeanNormals, side: &Side, knots: &[f64], control: &[DVec3], samples: &[f64]) -> Vec<DVec3> {
     let along = super::basis::BasisRows::new(knots, samples, 1);
     let one = |(s, &t): (usize, &f64)| {
         let (u, v) = super::sides::place(side.side, side.reversed, t);
         let tangent: DVec3 = (0..4).map(|a| control[along.first[s] + a] * along.weights[s][a]).sum();
-        let (tangent, field) = (tangent.normalize_or_zero(), means.at(u, v));
+        let (tangent, field) = (tangent.normalize_or_zero(), means.beside(side.side, u, v));
         (field - tangent * tangent.dot(field)).try_normalize().unwrap_or(field)
     };
     samples.iter().enumerate().map(one).collect()
