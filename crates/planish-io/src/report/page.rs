@@ -51,7 +51,7 @@ const TRUTH_FIGURES: [(&str, &str, Reading); 12] = [
 ];
 
 /// Figures of quality in words: key, meaning, and how the value is read.
-const FIGURES: [(&str, &str, Reading); 27] = [
+const FIGURES: [(&str, &str, Reading); 30] = [
     ("mesh.triangles", "Triangles of the mesh after repair", Reading::Plain),
     ("mesh.watertight", "The mesh is closed", Reading::Plain),
     ("mesh.manifold", "The mesh is manifold", Reading::Plain),

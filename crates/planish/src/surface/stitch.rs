@@ -47,6 +47,8 @@ const ROUNDS: usize = 20;
 /// effect a condition.
 const FIRST_WEIGHT: f64 = 1e-3;
 const MOST_WEIGHT: f64 = 1e4;
+/// Weight that seams around a folded patch keep at least: a hundredth of the first.
+const LEAST_WEIGHT: f64 = 1e-5;
 /// What a seam's weight is raised by while it misses the tolerance.
 const RAISE: f64 = 3.0;
 /// From weight 1 on a raise has to bring the angle of a seam below this share of what it was, or it is the last.
@@ -55,9 +57,9 @@ const HELPS: f64 = 0.95;
 const RMS_SHARE: f64 = 0.4;
 /// How often its share of the loss a single patch may lose while the whole has not lost its own.
 const LOCAL: f64 = 2.0;
-/// What the weights around a folded patch are lowered by, and how often before its seams are left alone.
+/// What the weights around a folded patch are lowered by, and how often.
 const EASE: f64 = 0.1;
-const EASINGS: usize = 3;
+const EASINGS: usize = 4;
 /// Passes in which patches that turned over get their curves back: neighbours may turn over in turn.
 const REVERTS: usize = 3;
 /// The loss is measured against a fit that misses by this share of the diagonal at least: rounding.
@@ -155,7 +157,7 @@ pub fn stitch(
             observer.progress(1.0);
             return Ok(made);
         }
-        system.ease(&worse, if easing + 1 == EASINGS { 0.0 } else { EASE });
+        system.ease(&worse);
     }
     unreachable!("the last easing returns")
 }
@@ -550,9 +552,9 @@ impl<'a> System<'a> {
     }
 
     /// Lowers the weights around some patches, and starts there anew.
-    fn ease(&mut self, patches: &[usize], by: f64) {
+    fn ease(&mut self, patches: &[usize]) {
         for wish in self.wishes.iter_mut().filter(|w| w.sides.iter().any(|s| patches.contains(&s.patch))) {
-            wish.ceiling = wish.weight.min(1.0) * by;
+            wish.ceiling = (wish.weight.min(1.0) * EASE).max(LEAST_WEIGHT);
         }
         for wish in &mut self.wishes {
             (wish.weight, wish.last) = (FIRST_WEIGHT.min(wish.ceiling), f64::INFINITY);
