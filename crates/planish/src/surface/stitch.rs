@@ -85,12 +85,16 @@ pub struct StitchParams {
     /// Share by which the RMS distance of the fit may grow for the seams' sake.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub fit_loss: f64,
+    /// Read from models of earlier versions, and not used.
+    #[serde(skip_serializing)]
+    #[schemars(skip)]
+    pub stiffness: Option<f64>,
 }
 
 impl Default for StitchParams {
     /// .05 degrees, which reflections do not show; a degree for sharp seams; a tenth.
     fn default() -> StitchParams {
-        StitchParams { angle_tolerance: 0.05, sharp_tolerance: 1.0, fit_loss: 0.1 }
+        StitchParams { angle_tolerance: 0.05, sharp_tolerance: 1.0, fit_loss: 0.1, stiffness: None }
     }
 }
 
