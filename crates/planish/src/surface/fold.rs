@@ -98,27 +98,4 @@ impl MeanNormals {
         let at = |i: usize, j: usize| self.sums[j * self.cols + i];
         (at(b, d) - at(a, d) - at(b, c) + at(a, c)).normalize_or_zero()
     }
-
-    /// Unit normal on a side of the patch at `(u, v)`: what the cells of the first half of a knot span inside and those of the
-    /// second say, continued to the side. A mean of the first span alone is that of its middle, which on a bent surface
-    /// stands otherwise.
-    pub fn beside(&self, side: usize, u: f64, v: f64) -> DVec3 {
-        let is_row = side.is_multiple_of(2);
-        let (t, count, reach) = if is_row { (u, self.cols, self.reach[0]) } else { (v, self.rows, self.reach[1]) };
-        let (deep, inwards) = if is_row { (self.rows, self.reach[1]) } else { (self.cols, self.reach[0]) };
-        let middle = (t * (count - 1) as f64).round() as usize;
-        let (a, b) = (middle.saturating_sub(reach), (middle + reach).min(count - 1));
-        let mean = |from: usize, to: usize| -> DVec3 {
-            let (c, d) = if side == 0 || side == 3 { (from, to) } else { (deep - 1 - to, deep - 1 - from) };
-            let at = |along: usize, across: usize| match is_row {
-                true => self.sums[across * self.cols + along],
-                false => self.sums[along * self.cols + across],
-            };
-            (at(b, d) - at(a, d) - at(b, c) + at(a, c)).normalize_or_zero()
-        };
-        let half = (inwards / 2).clamp(1, ((deep - 1) / 2).max(1));
-        let near = mean(0, half);
-        let far = if 2 * half < deep { mean(half, 2 * half) } else { near };
-        (near * 1.5 - far * 0.5).try_normalize().unwrap_or(near)
-    }
 }

@@ -18,12 +18,6 @@ const DAMPING: f64 = 1e-7;
 /// How far a leg of the control polygon may change, over its length: a turn of 35 degrees. Curves that are
 /// bent more than that turn their patches over.
 const LEEWAY: f64 = 0.6;
-/// Passes over the conditions of a control point, one after the other: planes at 45 degrees or more to each other are
-/// met to a thousandth of the first miss.
-const PROJECTIONS: usize = 10;
-/// Share of its length that the first leg of a curve must keep when its control point is put into the planes.
-const SHORTEST_LEG: f64 = 0.2;
-
 /// One linear condition on a curve: `<normal, control point> = value`.
 struct Condition {
     point: usize,
@@ -38,22 +32,7 @@ pub(crate) fn constrain(index: usize, curve: &[DVec3], planes: &[Vec<Plane>; 2],
     }
     let conditions = conditions(index, curve, planes);
     let moved = meet(curve, &conditions, direction);
-    if keeps_shape(curve, &moved) {
-        return moved;
-    }
-    // Where the planes would distort the whole, the control points in them alone: the corner comes first.
-    let mut moved = curve.to_vec();
-    for _ in 0..PROJECTIONS {
-        for Condition { point, normal, value } in &conditions {
-            let off = value - normal.dot(moved[*point]);
-            moved[*point] += *normal * off;
-        }
-    }
-    let n = curve.len();
-    let legs = [(0, 1), (n - 1, n - 2)].map(|(corner, point)| {
-        (moved[point] - moved[corner]).length() / (curve[point] - curve[corner]).length().max(f64::MIN_POSITIVE)
-    });
-    if legs.iter().all(|leg| *leg > SHORTEST_LEG) { moved } else { curve.to_vec() }
+    if keeps_shape(curve, &moved) { moved } else { curve.to_vec() }
 }
 
 /// True if no leg of the control polygon turned or grew by more than [`LEEWAY`] of its length.

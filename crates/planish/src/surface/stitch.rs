@@ -742,7 +742,7 @@ fn own_normals(means: &MeanNormals, side: &Side, knots: &[f64], control: &[DVec3
     let one = |(s, &t): (usize, &f64)| {
         let (u, v) = super::sides::place(side.side, side.reversed, t);
         let tangent: DVec3 = (0..4).map(|a| control[along.first[s] + a] * along.weights[s][a]).sum();
-        let (tangent, field) = (tangent.normalize_or_zero(), means.beside(side.side, u, v));
+        let (tangent, field) = (tangent.normalize_or_zero(), means.at(u, v));
         (field - tangent * tangent.dot(field)).try_normalize().unwrap_or(field)
     };
     samples.iter().enumerate().map(one).collect()
