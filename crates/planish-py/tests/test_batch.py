@@ -109,7 +109,7 @@ def test_a_batch_that_is_killed_takes_its_runs_along(tmp_path: Path) -> None:
     process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stderr=subprocess.DEVNULL)
 
     def runs() -> list[str]:
-        told = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True).stdout.splitlines()
+        told = subprocess.run(["ps", "-eww", "-o", "args"], capture_output=True, text=True).stdout.splitlines()
         return [line for line in told if str(tmp_path) in line and "planish run" in line]
 
     end = time.monotonic() + 10.0
