@@ -90,7 +90,7 @@ fn a_pipe_is_closed_at_one_end_and_stays_open_at_the_other() {
         let mut page = server.connect().await;
         page.state_with(|s| s["holes"].as_array().is_some_and(|h| h.len() == 2)).await;
         let around = page.state["holes"][0]["around"].as_f64().unwrap();
-        assert!((around - 6.28).abs() < 0.1, "{around}");
+        assert!((around - std::f64::consts::TAU).abs() < 0.1, "{around}");
         assert_eq!(page.ask(json!({ "type": "close_hole", "hole": 0 })).await["type"], "done");
         page.state_with(|s| s["holes"].as_array().is_some_and(|h| h.len() == 1)).await;
         assert_eq!(page.ask(json!({ "type": "close_hole", "hole": 7 })).await["type"], "refused");

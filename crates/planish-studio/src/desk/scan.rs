@@ -88,7 +88,7 @@ impl<'env> Table<'_, '_, 'env> {
         let less = Arc::new(scan.select(&keep));
         // Geometry stays relative to the middle that it was sent with.
         project.middle.get_or_insert(center);
-        let before = std::mem::replace(&mut project.scan, Some(less));
+        let before = project.scan.replace(less);
         project.left_out.extend(before);
         self.points_changed();
         self.done(client, id, format!("{gone} point{} left out.", if gone == 1 { "" } else { "s" }));

@@ -234,7 +234,8 @@ pub(super) fn lay(
             }
             let Some(trouble) = trouble else { break };
             why = trouble;
-            if why.places().is_empty() {
+            // Where no number had room, finer edges hardly ever help.
+            if best.is_none() || why.places().is_empty() {
                 break;
             }
             halve(&mut sizing, why.places());

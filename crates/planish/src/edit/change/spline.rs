@@ -35,7 +35,7 @@ pub fn handles(
     control: usize,
     ground: &Ground,
 ) -> Result<Vec<DVec3>, ApplyError> {
-    let edit = Spline { curve: curve.clone(), control, moves: Vec::new() };
+    let edit = Spline { curve: *curve, control, moves: Vec::new() };
     edit.check()?;
     let mut copy = drawing.clone();
     let others: &Others = &|_| Err("no other model is looked at".into());
