@@ -16,7 +16,7 @@ use super::map::{self, Charts};
 use super::proxy::{self, Proxy, Sizing};
 use super::recut::Bench;
 use super::{LayoutParams, SETTLING_PER_SMOOTHING, improve};
-use crate::mesh::{NONE, TriMesh, next};
+use crate::mesh::TriMesh;
 use crate::network::Network;
 use crate::network::field::{self, FieldParams};
 use crate::observe::{Cancelled, Observer};
@@ -43,14 +43,20 @@ const VIA: usize = 4;
 /// Rounds of making it finer where there was no room for a map, its whole numbers or its squares.
 const FINER_ROUNDS: usize = 1;
 
-/// How gently the field follows the form.
+/// One way to a map.
 struct Attempt {
+    /// Weight of principal directions.
     curvature: f64,
-    smoothing: f64,
+    /// Whether cones beside lines are moved off.
+    roomy: bool,
 }
 
-/// The attempts in their order: the field with principal directions, and without them.
-const ATTEMPTS: [Attempt; 2] = [Attempt { curvature: 1.0, smoothing: 1.0 }, Attempt { curvature: 0.0, smoothing: 1.0 }];
+/// The attempts in their order.
+const ATTEMPTS: [Attempt; 3] = [
+    Attempt { curvature: 1.0, roomy: false },
+    Attempt { curvature: 1.0, roomy: true },
+    Attempt { curvature: 0.0, roomy: true },
+];
 
 /// A mesh with its seamless map.
 struct Aligned {
@@ -74,7 +80,7 @@ impl Aligned {
         let (proxy, charts) = loop {
             let Some(proxy) = proxy::proxy(mesh, sharp, &[], sizing, observer) else { return Ok(None) };
             let charts = charts(&proxy, attempt, observer)?;
-            let tight = tight(&proxy, &charts);
+            let tight: Vec<DVec3> = charts.tight.iter().map(|&v| proxy.mesh.points[v as usize]).collect();
             if tight.is_empty() || rounds == 0 {
                 break (proxy, charts);
             }
@@ -99,29 +105,12 @@ fn charts(proxy: &Proxy, attempt: &Attempt, observer: &dyn Observer) -> Result<C
     let side = (area / TYPICAL_PATCHES).sqrt();
     let params = FieldParams {
         curvature: attempt.curvature,
-        smoothing: attempt.smoothing,
+        smoothing: 1.0,
         radius: RADIUS_TO_SIDE * side,
         pair_distance: PAIR_TO_SIDE * side,
     };
     let field = field::field(mesh, adjacency, lines, &params, observer)?;
-    Ok(Charts::new(mesh, adjacency, lines, &field))
-}
-
-/// The cones beside a line or another cone.
-fn tight(proxy: &Proxy, charts: &Charts) -> Vec<DVec3> {
-    let Proxy { mesh, adjacency, lines, .. } = proxy;
-    let on_line = |h: u32| lines[h as usize] || adjacency.opposite[h as usize] == NONE;
-    let mut lined = vec![false; mesh.points.len()];
-    for h in (0..lines.len() as u32).filter(|&h| on_line(h)) {
-        lined[mesh.origin(h) as usize] = true;
-        lined[mesh.origin(next(h)) as usize] = true;
-    }
-    let corners = charts.corners();
-    let is_tight = |v: u32| {
-        let bound = |h: u32| lined[mesh.origin(next(h)) as usize] || corners[mesh.origin(next(h)) as usize];
-        corners[v as usize] && !lined[v as usize] && adjacency.fan(v).any(bound)
-    };
-    (0..mesh.points.len() as u32).filter(|&v| is_tight(v)).map(|v| mesh.points[v as usize]).collect()
+    Ok(Charts::new(mesh, adjacency, lines, &field, attempt.roomy))
 }
 
 /// Why no network follows the form.
@@ -215,13 +204,19 @@ pub(super) fn lay(
     }
     let mut why = AlignError::Unmapped;
     let mut best: Option<Laid> = None;
+    let mut has_tight = false;
     for attempt in &ATTEMPTS {
+        // Where no cone is to be moved it would be the same again.
+        if attempt.roomy && attempt.curvature > 0.0 && !has_tight {
+            continue;
+        }
         let mut sizing = Sizing::even(mesh, PROXY_TRIANGLES);
         for _ in 0..=FINER_ROUNDS {
             let Some(aligned) = Aligned::on((mesh, sharp), attempt, &mut sizing, observer)? else {
                 observer.check()?;
                 break;
             };
+            has_tight |= !aligned.charts.tight.is_empty();
             observer.progress(0.3);
             let (laid, trouble) = aligned.choose(params, observer)?;
             if let Some(laid) = laid

@@ -2,6 +2,7 @@
 //!
 //! `docs/methods/layout.md`, step 3.
 
+use super::room::Room;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::field::CrossField;
 use crate::network::field::cones::Matching;
@@ -21,14 +22,23 @@ pub(in crate::layout) struct Charts {
     pub index: Vec<i32>,
     /// Sectors between lines with their width in quarter turns.
     pub sectors: Vec<(Sector, i32)>,
+    /// Cones of the field that stand beside a line or another cone ([`Room`]).
+    pub tight: Vec<u32>,
 }
 
 impl Charts {
     /// The charts of `field`.
-    pub fn new(mesh: &TriMesh, adjacency: &Adjacency, lines: &[bool], field: &CrossField) -> Charts {
+    /// * `roomy` - whether cones beside lines are moved off
+    pub fn new(mesh: &TriMesh, adjacency: &Adjacency, lines: &[bool], field: &CrossField, roomy: bool) -> Charts {
         let faces = mesh.triangles.len();
-        let matching = Matching::new(adjacency, field);
-        let index = matching.indices(mesh, adjacency);
+        let mut matching = Matching::new(adjacency, field);
+        let mut index = matching.indices(mesh, adjacency);
+        let mut theta = field.theta.clone();
+        let room = Room::new(mesh, adjacency, lines);
+        let tight = room.tight(&index);
+        if roomy {
+            room.move_off(&tight, field, &mut matching, &mut index, &mut theta);
+        }
         let Matching { turns, drift } = matching;
         let mut jump: Vec<u8> = turns.iter().map(|t| (4 - t) % 4).collect();
         let width = |s: &Sector| {
@@ -44,9 +54,9 @@ impl Charts {
                 jump[h] = (jump[h] + turned[f] + 4 - turned[g]) % 4;
             }
         }
-        let axis = field.theta.iter().zip(&turned).map(|(theta, &m)| theta + f64::from(m) * FRAC_PI_2).collect();
+        let axis = theta.iter().zip(&turned).map(|(theta, &m)| theta + f64::from(m) * FRAC_PI_2).collect();
         let cut = prune(mesh, adjacency, &jump, &index, &tree);
-        Charts { axis, jump, cut, index, sectors }
+        Charts { axis, jump, cut, index, sectors, tight }
     }
 
     /// Vertices where a map has to have a corner of a patch: cones, and places where lines end, meet or turn.

@@ -14,6 +14,7 @@ mod eliminate;
 mod energy;
 #[cfg(test)]
 pub(in crate::layout) mod polycube;
+mod room;
 mod seams;
 mod untangle;
 
@@ -221,7 +222,12 @@ pub(super) fn smooth_integers(
     };
     let mut free = match carry::carry(&maps, &laplacian, (&start, free), &maps_at, observer)? {
         Carried::There(free) => free,
-        Carried::Stuck(faces) => return Ok(Err(faces)),
+        Carried::Stuck(faces) => {
+            // The thinned mesh has been stretched to these numbers already; what that turns over may be untangled.
+            let Some(start) = seams.read(&whole) else { return Ok(Err(faces)) };
+            let best = untangled((mesh, adjacency), &maps, &laplacian, charts, &[start], observer)?;
+            return Ok(if best.is_injective() { Ok(best) } else { Err(faces) });
+        }
     };
     untangle::untangle(&maps, &laplacian, &mut free, (0.0, HOLD), observer)?;
     Ok(Ok(certified((mesh, adjacency), &maps, charts, free)))
@@ -299,7 +305,7 @@ mod tests {
     fn charts(mesh: &TriMesh, lines: &[bool]) -> Charts {
         let adjacency = Adjacency::new(mesh);
         let field = field(mesh, &adjacency, lines, &PARAMS, &Silent).unwrap();
-        Charts::new(mesh, &adjacency, lines, &field)
+        Charts::new(mesh, &adjacency, lines, &field, false)
     }
 
     fn mapped(mesh: &TriMesh, lines: &[bool]) -> (Charts, Mapped) {

@@ -31,11 +31,11 @@ const FACE_TURN_COSINE: f64 = 0.8;
 /// Cosine of the greatest angle between the faces of a diagonal that is turned.
 const FLAT_COSINE: f64 = 0.9;
 
-/// Cosine of the greatest turn of a line at a vertex: a circle keeps eleven.
-const LINE_TURN_COSINE: f64 = 0.82;
+/// Greatest turn of a line at a vertex, radians: a circle keeps eleven.
+const LINE_TURN: f64 = 0.61;
 
-/// A line may turn as it likes where it leaves out no more than this beside it, in wanted edges: rims of scans are jagged.
-const LINE_DETAIL: f64 = 0.1;
+/// Teeth of lines that are no higher than this, in wanted edges, go: rims of scans are jagged.
+const LINE_DETAIL: f64 = 0.25;
 
 /// Greatest number of neighbours.
 const VALENCE: usize = 12;
@@ -43,6 +43,9 @@ const VALENCE: usize = 12;
 /// Least shape of a new face (1 for an equilateral triangle), unless it was worse before: the next one is for what is still
 /// finer than wanted.
 const LEAST_FACE_SHAPES: [f64; 3] = [0.45, 0.3, 0.15];
+
+/// A face of less than this, lower than what lines may leave out, is a sliver.
+const SLIVER_SHAPE: f64 = LEAST_FACE_SHAPES[2];
 
 /// The cotangents of the angles opposite to a diagonal must sum to less than this for it to be turned; below zero, so that
 /// four points on a circle stay as they are.
@@ -230,20 +233,40 @@ impl<'a> Melt<'a> {
         Some(star)
     }
 
-    /// True if the line stays without a sharp turn when `v` between `a` and `b` is gone.
+    /// True if the line gets no sharp turn when `v` between `a` and `b` is gone; or none that is sharper than before, where
+    /// it leaves out no more than a detail of a line that is straight beyond it.
     fn is_straight(&self, v: u32, a: u32, b: u32) -> bool {
-        let turn = |[p, q, r]: [u32; 3]| {
-            let (s, t) = (self.at(q) - self.at(p), self.at(r) - self.at(q));
-            s.dot(t) > LINE_TURN_COSINE * s.length() * t.length()
+        let turn = |[p, q, r]: [u32; 3]| (self.at(q) - self.at(p)).angle_between(self.at(r) - self.at(q));
+        // What a line that goes on to `to` turns by at `a`.
+        let at_end = |a: u32, to: u32| match self.kind[a as usize] {
+            Kind::Fixed => 0.0,
+            _ => {
+                let before = self.line_ends(a).into_iter().filter(|&w| w != v);
+                before.map(|w| turn([w, a, to])).fold(0.0, f64::max)
+            }
         };
-        let still = |a: u32, b: u32| {
-            self.kind[a as usize] == Kind::Fixed
-                || self.line_ends(a).into_iter().filter(|&w| w != v).all(|w| turn([w, a, b]))
-        };
+        let (here, after) = (turn([a, v, b]), at_end(a, b).max(at_end(b, a)));
+        if here.max(after) < LINE_TURN {
+            return true;
+        }
         let (to, chord) = (self.at(v) - self.at(a), self.at(b) - self.at(a));
-        let within = to.dot(chord) > 0.0 && to.dot(chord) < chord.length_squared();
-        let detail = within && to.cross(chord).length() < LINE_DETAIL * self.edge[v as usize] * chord.length();
-        detail || turn([a, v, b]) && still(a, b) && still(b, a)
+        let along = (to.dot(chord) / chord.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let is_detail = to.distance(along * chord) < LINE_DETAIL * self.edge[v as usize];
+        is_detail
+            && after <= here.max(at_end(a, v)).max(at_end(b, v))
+            && turn([self.away(v, a), v, self.away(v, b)]) < LINE_TURN
+    }
+
+    /// The first vertex of a line from `v` over `a` that is a wanted edge away from `v`, or where the line ends before.
+    fn away(&self, v: u32, a: u32) -> u32 {
+        let (mut before, mut here) = (v, a);
+        while self.kind[here as usize] == Kind::Inside && self.at(here).distance(self.at(v)) < self.edge[v as usize] {
+            match self.line_ends(here).into_iter().find(|&w| w != before) {
+                Some(next) if next != v => (before, here) = (here, next),
+                _ => break,
+            }
+        }
+        here
     }
 
     /// The least shape of a face of the fan from corner `apex` of the ring; `None` unless it is above `least` and the
@@ -261,19 +284,25 @@ impl<'a> Melt<'a> {
         };
         let sides = [0..far.unwrap_or(n), far.unwrap_or(n)..n];
         let means = sides.map(|side| side.map(normal).sum::<DVec3>().normalize_or_zero());
+        // Where a line is jagged there are slivers, which have no direction: they go next, one by one.
+        let detail = LINE_DETAIL * self.edge[star.vertex as usize];
+        let is_near = top.distance(here) < detail;
         let mut shapes = f64::INFINITY;
         for i in 1..n - 1 {
             let (p, q) = (at(i), at(i + 1));
             let face = (p - top).cross(q - top);
             let mean = means[far.is_some_and(|m| i >= m) as usize];
-            shapes = shapes.min(shape([top, p, q]));
             let lines = [0, i, i + 1].iter().all(|&k| self.on_line(name(k)));
-            if shapes <= least
-                || lines
-                || orient2d(flat[ring(0)], flat[ring(i)], flat[ring(i + 1)]) <= 0.0
-                || face.dot(mean) <= FACE_TURN_COSINE * face.length()
-                || normal(i).dot(face) < 0.0
-            {
+            if lines || orient2d(flat[ring(0)], flat[ring(i)], flat[ring(i + 1)]) <= 0.0 {
+                return None;
+            }
+            let longest = top.distance(p).max(top.distance(q)).max(p.distance(q));
+            let own = shape([top, p, q]);
+            if is_near && face.length() < detail * longest && own < SLIVER_SHAPE {
+                continue;
+            }
+            shapes = shapes.min(own);
+            if shapes <= least || face.dot(mean) <= FACE_TURN_COSINE * face.length() || normal(i).dot(face) < 0.0 {
                 return None;
             }
         }

@@ -42,6 +42,15 @@ impl Matching {
         Matching { turns, drift }
     }
 
+    /// Turns the match across half-edge `h`, with opposite `o`, by quarters: that many more are missing around its start,
+    /// and that many fewer around its end.
+    pub fn turn(&mut self, h: usize, o: usize, quarters: i32) {
+        self.turns[h] = (i32::from(self.turns[h]) + quarters).rem_euclid(4) as u8;
+        self.turns[o] = (4 - self.turns[h]) % 4;
+        self.drift[h] -= f64::from(quarters) * FRAC_PI_2;
+        self.drift[o] += f64::from(quarters) * FRAC_PI_2;
+    }
+
     /// For each inner vertex the quarter turns that are missing around it: 1 where three patches meet, -1 where five do, 0
     /// where four do; for each vertex of the boundary those that are missing to half a turn. On a closed mesh they sum to four
     /// times its Euler number, and so they do on one with boundaries.

@@ -1,0 +1,176 @@
+//! Cones beside lines and beside each other are moved off, to where they have room.
+//!
+//! On whole numbers a cone may come to lie level with a line that it does not touch. A triangle between an edge of the line
+//! and the cone then has no area, however the rest of the map is shaped; so has one between two cones and a line. Around a
+//! cone with only free vertices beside it no triangle has three corners that are bound.
+
+use crate::mesh::{Adjacency, NONE, TriMesh, next};
+use crate::network::field::CrossField;
+use crate::network::field::cones::Matching;
+use std::collections::{HashMap, VecDeque};
+
+/// Rings around the way of a cone in which the field is made smooth again.
+const SMOOTHED_RINGS: usize = 5;
+
+/// Sweeps of making it smooth: each face takes the mean of its neighbours, and what was turned by a quarter is spread over
+/// the rings after about the square of their number.
+const SMOOTHING_SWEEPS: usize = 2 * SMOOTHED_RINGS * SMOOTHED_RINGS;
+
+/// A mesh whose cones are moved.
+pub(super) struct Room<'a> {
+    mesh: &'a TriMesh,
+    adjacency: &'a Adjacency,
+    /// For each half-edge whether it lies on a line or on the boundary.
+    bound_edge: Vec<bool>,
+    /// For each vertex whether it lies on a line or on the boundary.
+    on_line: Vec<bool>,
+}
+
+impl<'a> Room<'a> {
+    pub fn new(mesh: &'a TriMesh, adjacency: &'a Adjacency, lines: &[bool]) -> Room<'a> {
+        let bound_edge: Vec<bool> = adjacency.opposite.iter().zip(lines).map(|(&o, &line)| line || o == NONE).collect();
+        let mut on_line = vec![false; mesh.points.len()];
+        for h in (0..bound_edge.len() as u32).filter(|&h| bound_edge[h as usize]) {
+            on_line[mesh.origin(h) as usize] = true;
+            on_line[mesh.origin(next(h)) as usize] = true;
+        }
+        Room { mesh, adjacency, bound_edge, on_line }
+    }
+
+    fn beside(&self, v: u32) -> impl Iterator<Item = u32> + '_ {
+        self.adjacency.fan(v).map(|h| self.mesh.origin(next(h)))
+    }
+
+    /// The cones that stand beside a line or another cone.
+    /// * `index` - of each vertex
+    pub fn tight(&self, index: &[i32]) -> Vec<u32> {
+        let is_tight = |v: &u32| {
+            index[*v as usize] != 0 && !self.on_line[*v as usize] && {
+                self.beside(*v).any(|w| self.on_line[w as usize] || index[w as usize] != 0)
+            }
+        };
+        (0..index.len() as u32).filter(is_tight).collect()
+    }
+
+    /// Moves `cones` to the nearest vertices with room, if there are any, and makes `theta` smooth again around their ways.
+    /// Lines keep their sectors.
+    pub fn move_off(
+        &self,
+        cones: &[u32],
+        field: &CrossField,
+        matching: &mut Matching,
+        index: &mut [i32],
+        theta: &mut [f64],
+    ) {
+        let mut touched = vec![false; self.mesh.points.len()];
+        for &cone in cones {
+            let Some(way) = self.way(cone, index) else { continue };
+            for &h in &way {
+                let o = self.adjacency.opposite[h as usize] as usize;
+                let moved = index[self.mesh.origin(h) as usize];
+                matching.turn(h as usize, o, -moved);
+                index[self.mesh.origin(h) as usize] -= moved;
+                index[self.mesh.origin(next(h)) as usize] += moved;
+                touched[self.mesh.origin(h) as usize] = true;
+                touched[self.mesh.origin(next(h)) as usize] = true;
+            }
+        }
+        if touched.contains(&true) {
+            self.smooth(touched, field, matching, theta);
+        }
+    }
+
+    /// The half-edges from a cone to the nearest vertex with room.
+    fn way(&self, cone: u32, index: &[i32]) -> Option<Vec<u32>> {
+        let is_bound = |v: u32| self.on_line[v as usize] || (index[v as usize] != 0 && v != cone);
+        let has_room = |v: u32| !self.beside(v).any(is_bound);
+        let mut from: HashMap<u32, u32> = HashMap::from([(cone, NONE)]);
+        let mut queue = VecDeque::from([cone]);
+        while let Some(v) = queue.pop_front() {
+            if has_room(v) {
+                let mut way = Vec::new();
+                let mut h = from[&v];
+                while h != NONE {
+                    way.push(h);
+                    h = from[&self.mesh.origin(h)];
+                }
+                way.reverse();
+                return Some(way);
+            }
+            for h in self.adjacency.fan(v) {
+                let w = self.mesh.origin(next(h));
+                if !is_bound(w) && !from.contains_key(&w) {
+                    from.insert(w, h);
+                    queue.push_back(w);
+                }
+            }
+        }
+        None
+    }
+
+    /// Gives each face near touched vertices the mean of its neighbours' directions, as they match; faces beside lines stay.
+    fn smooth(&self, mut touched: Vec<bool>, field: &CrossField, matching: &mut Matching, theta: &mut [f64]) {
+        for _ in 1..SMOOTHED_RINGS {
+            let before = touched.clone();
+            for h in 0..self.bound_edge.len() as u32 {
+                touched[self.mesh.origin(h) as usize] |= before[self.mesh.origin(next(h)) as usize];
+                touched[self.mesh.origin(next(h)) as usize] |= before[self.mesh.origin(h) as usize];
+            }
+        }
+        let faces: Vec<usize> = (0..theta.len())
+            .filter(|&f| self.mesh.triangles[f].iter().any(|&v| touched[v as usize]))
+            .filter(|&f| (3 * f..3 * f + 3).all(|h| !self.bound_edge[h]))
+            .collect();
+        for _ in 0..SMOOTHING_SWEEPS {
+            for &f in &faces {
+                let drift = |h: usize| matching.drift[h] - field.opening[h];
+                let step = (3 * f..3 * f + 3).map(drift).sum::<f64>() / 3.0;
+                theta[f] += step;
+                for h in 3 * f..3 * f + 3 {
+                    matching.drift[h] -= step;
+                    matching.drift[self.adjacency.opposite[h] as usize] += step;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::field::{FieldParams, field};
+    use crate::observe::Silent;
+    use crate::synthetic::shapes;
+
+    #[test]
+    fn a_cone_beside_the_rim_moves_to_where_it_has_room_and_the_indices_keep_their_sum() {
+        let mesh = shapes::rectangle(1.0, 1.0, 16, 16);
+        let (adjacency, lines) = (Adjacency::new(&mesh), vec![false; 3 * mesh.triangles.len()]);
+        let params = FieldParams { curvature: 0.0, smoothing: 1.0, radius: 0.1, pair_distance: 0.0 };
+        let field = field(&mesh, &adjacency, &lines, &params, &Silent).unwrap();
+        let mut matching = Matching::new(&adjacency, &field);
+        // A pair of cones, drawn apart: one beside the rim, the other far inside.
+        let at = |x: f64, y: f64| {
+            let near = |v: &u32| (mesh.points[*v as usize].truncate() - glam::DVec2::new(x, y)).length_squared();
+            (0..mesh.points.len() as u32).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap()
+        };
+        let middle = mesh.bounds().center();
+        let column: Vec<u32> = (1..=8).map(|k| at(middle.x, mesh.bounds().min.y + f64::from(k) / 16.0)).collect();
+        for pair in column.windows(2) {
+            let h = adjacency.fan(pair[0]).find(|&h| mesh.origin(next(h)) == pair[1]).unwrap();
+            matching.turn(h as usize, adjacency.opposite[h as usize] as usize, 1);
+        }
+        let mut index = matching.indices(&mesh, &adjacency);
+        assert_eq!((index[column[0] as usize], index[column[7] as usize]), (1, -1));
+        let room = Room::new(&mesh, &adjacency, &lines);
+        let tight = room.tight(&index);
+        assert_eq!(tight, [column[0]]);
+        let (before, mut theta) = (index.iter().sum::<i32>(), field.theta.clone());
+        room.move_off(&tight, &field, &mut matching, &mut index, &mut theta);
+        assert_eq!(index.iter().sum::<i32>(), before);
+        assert_eq!(index, matching.indices(&mesh, &adjacency));
+        assert!(room.tight(&index).is_empty());
+        let moved = (0..index.len()).find(|&v| index[v] == 1 && !room.on_line[v]).unwrap();
+        assert!(mesh.points[moved].distance(mesh.points[column[0] as usize]) < 2.5 / 16.0);
+    }
+}
