@@ -17,13 +17,15 @@ function spotAt(app: App, event: { offsetX: number; offsetY: number }): Spot {
   const { view } = app;
   const state = store.state.value;
   const lines = store.show.value.curves;
-  const feature = lines ? curveAt(view, x, y, 'feature') : null;
+  // Until the curves of an edit are there, numbers of the old ones would name others.
+  const curves = lines && store.areCurvesOfNow.value;
+  const feature = curves ? curveAt(view, x, y, 'feature') : null;
   return {
     x,
     y,
     place: view.pick(x, y)?.place ?? null,
     corner: lines ? cornerAt(view, state, x, y) : null,
-    curve: lines ? (curveAt(view, x, y) ?? feature) : null,
+    curve: curves ? (curveAt(view, x, y) ?? feature) : null,
   };
 }
 

@@ -157,8 +157,10 @@ function expose(bound: App): void {
         const hit = bound.view.pick(x, y);
         return hit ? bound.world(hit.place) : null;
       },
+      // Nothing while the curves on the screen are those of an earlier state.
       curve: (k: number) => {
         const { position, offset } = bound.view.curves;
+        if (!store.areCurvesOfNow.value || k + 1 >= offset.length) return null;
         return Array.from(position.subarray(3 * offset[k]!, 3 * offset[k + 1]!));
       },
       frames: () => bound.view.drawn,

@@ -152,6 +152,28 @@ export class Studio {
     }
   }
 
+  /** Course of a curve of the state, once the page has it: three numbers a point. */
+  async curve(k: number): Promise<number[]> {
+    const course = await this.page.waitForFunction(
+      (n) => (window as never as { __studio: { curve(n: number): number[] | null } }).__studio.curve(n),
+      k,
+      { polling: 30 },
+    );
+    return (await course.jsonValue())!;
+  }
+
+  /** Waits until lines of a kind are shown. */
+  async seen(line: 'preview' | 'erase'): Promise<void> {
+    type Lines = Record<string, { object: { visible: boolean } }>;
+    await this.page.waitForFunction(
+      (name) =>
+        (window as never as { __studio: { app: { view: { lines: Lines } } } }).__studio.app.view.lines[name]!.object
+          .visible,
+      line,
+      { polling: 30 },
+    );
+  }
+
   /** Pixel of the page of a world position. */
   async pixel(p: readonly number[]): Promise<{ x: number; y: number }> {
     const box = (await this.page.locator('canvas').boundingBox())!;
