@@ -19,14 +19,30 @@ function spotAt(app: App, event: { offsetX: number; offsetY: number }): Spot {
   const lines = store.show.value.curves;
   // Until the curves of an edit are there, numbers of the old ones would name others.
   const curves = lines && store.areCurvesOfNow.value;
-  const feature = curves ? curveAt(view, x, y, 'feature') : null;
-  return {
-    x,
-    y,
-    place: view.pick(x, y)?.place ?? null,
-    corner: lines ? cornerAt(view, state, x, y) : null,
-    curve: curves ? (curveAt(view, x, y) ?? feature) : null,
-  };
+  return once<Spot>({
+    x: () => x,
+    y: () => y,
+    place: () => view.pick(x, y)?.place ?? null,
+    corner: () => (lines ? cornerAt(view, state, x, y) : null),
+    curve: () => (curves ? (curveAt(view, x, y) ?? curveAt(view, x, y, 'feature')) : null),
+  });
+}
+
+/** Values that are looked for when they are asked for, once: a drag seeks no curve. */
+function once<T extends object>(found: { [K in keyof T]: () => T[K] }): T {
+  const values = {} as T;
+  for (const name of Object.keys(found) as (keyof T)[]) {
+    Object.defineProperty(values, name, {
+      configurable: true,
+      enumerable: true,
+      get() {
+        const value = found[name]();
+        Object.defineProperty(values, name, { value, enumerable: true });
+        return value;
+      },
+    });
+  }
+  return values;
 }
 
 export function listen(app: App, canvas: HTMLCanvasElement): void {

@@ -141,6 +141,15 @@ export class Studio {
     );
   }
 
+  /** Waits until what the state names is on the screen; figures of it may still be measured. */
+  async shown(timeout = 80_000): Promise<void> {
+    await this.page.waitForFunction(
+      () => (window as never as { __studio: { shown(): boolean } }).__studio.shown(),
+      null,
+      { timeout, polling: 5 },
+    );
+  }
+
   /** Waits until the state is as wanted. */
   async until(wanted: (state: State) => boolean, timeout = 80_000): Promise<State> {
     const end = Date.now() + timeout;
@@ -164,11 +173,15 @@ export class Studio {
 
   /** Waits until lines of a kind are shown. */
   async seen(line: 'preview' | 'erase'): Promise<void> {
-    type Lines = Record<string, { object: { visible: boolean } }>;
+    type View = {
+      lines: Record<string, { object: { visible: boolean } }>;
+      overlay: { has(name: string): boolean };
+    };
     await this.page.waitForFunction(
-      (name) =>
-        (window as never as { __studio: { app: { view: { lines: Lines } } } }).__studio.app.view.lines[name]!.object
-          .visible,
+      (name) => {
+        const { view } = (window as never as { __studio: { app: { view: View } } }).__studio.app;
+        return view.lines[name]?.object.visible ?? view.overlay.has(name);
+      },
       line,
       { polling: 30 },
     );
@@ -176,7 +189,7 @@ export class Studio {
 
   /** Pixel of the page of a world position. */
   async pixel(p: readonly number[]): Promise<{ x: number; y: number }> {
-    const box = (await this.page.locator('canvas').boundingBox())!;
+    const box = (await this.page.locator('canvas').first().boundingBox())!;
     const at = await this.page.evaluate(
       (q) => (window as never as { __studio: { project(p: number[]): { x: number; y: number } } }).__studio.project(q),
       [...p],
