@@ -87,7 +87,7 @@ export function same(a: Float32Array | undefined, b: Float32Array | undefined): 
 }
 
 /** Lines wider than this mark others, pixels. */
-const OVER = 4;
+const MARKING_PIXELS = 4;
 
 /** Thick lines of one colour. */
 export class Thick {
@@ -103,7 +103,7 @@ export class Thick {
       vertexColors,
     });
     // What is pointed at lies over the line that it is.
-    this.material.polygonOffset = width > OVER;
+    this.material.polygonOffset = width > MARKING_PIXELS;
     this.material.polygonOffsetFactor = -2;
     this.material.polygonOffsetUnits = -8;
     this.object = new LineSegments2(new LineSegmentsGeometry(), this.material);

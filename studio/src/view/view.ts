@@ -26,10 +26,10 @@ import { type OverLine, Overlay } from './overlay';
 import { HALF_FOV, Rig } from './rig';
 
 /** The full mesh comes back so long after the last move, milliseconds. */
-const STILL = 150;
+const STILL_MS = 150;
 const NOTHING = new Float32Array();
 /** Renderers that draw with the processor: fewer pixels for them. */
-const SLOW = /swiftshader|llvmpipe|software|basic render/i;
+const SOFTWARE_RENDERER = /swiftshader|llvmpipe|software|basic render/i;
 
 ColorManagement.enabled = false;
 
@@ -87,7 +87,7 @@ export class View {
     const info = probe?.getExtension('WEBGL_debug_renderer_info');
     const name = info && probe ? String(probe.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
     probe?.getExtension('WEBGL_lose_context')?.loseContext();
-    const slow = SLOW.test(name);
+    const slow = SOFTWARE_RENDERER.test(name);
     this.renderer = new WebGLRenderer({ canvas, antialias: !slow, preserveDrawingBuffer: true });
     // Colours are written as they are named.
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
@@ -163,7 +163,7 @@ export class View {
       this.moving = false;
       this.swap();
       this.draw();
-    }, STILL);
+    }, STILL_MS);
     this.draw();
   }
 
