@@ -21,7 +21,7 @@ PYTHON  := .venv/bin/python
 DATA    := $(or $(PLANISH_DATA),../shared/data)
 
 .NOTPARALLEL:
-.PHONY: build demo studio site wheel fuzz deny test test-rust test-readers test-studio test-tools test-python lint bench bench-studio figures docs clean
+.PHONY: build demo studio site wheel fuzz deny test test-rust test-readers test-studio test-python lint bench bench-studio figures docs clean
 .DELETE_ON_ERROR:
 
 build: .stamp/packages .stamp/page
@@ -50,10 +50,6 @@ test-studio: .stamp/packages .stamp/page .stamp/browser
 	cd studio && ../.ci/node npm test --silent
 	$(CARGO) test --release --locked --workspace --no-run --quiet
 	cd studio && ../.ci/node npm run --silent e2e
-
-# Every tool of the studio in a browser. Five of the ten do not pass each time yet, so `test` leaves them out.
-test-tools: build .stamp/browser
-	cd studio && ../.ci/node npm run --silent tools
 
 # Figures of the studio in a browser that draws with the processor; nothing else should run beside them.
 bench-studio: build .stamp/browser

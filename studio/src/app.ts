@@ -302,11 +302,15 @@ export class App implements Bench {
     this.view.moved();
   }
 
-  /** True once nothing is asked for, shown or moving. */
-  isIdle(): boolean {
+  /** True once all that the state names is on the screen, and nothing moves. */
+  isShown(): boolean {
     const shown = store.wanted.value.every((l) => store.geometry.value.get(l)?.name === store.state.value.layers[l]);
-    const quiet = this.open === 0 && !this.trying && store.jobs.value.length === 0;
-    return quiet && shown && !this.view.isQueued && store.connection.value === 'open';
+    return shown && !this.view.isQueued && store.connection.value === 'open';
+  }
+
+  /** True once nothing is asked for, computed, shown or moving. */
+  isIdle(): boolean {
+    return this.open === 0 && !this.trying && store.jobs.value.length === 0 && this.isShown();
   }
 
   private follow(): void {

@@ -7,9 +7,9 @@ import type { ViewName } from './view/rig';
 import { cornerAt, curveAt } from './view/seek';
 
 /** A drag begins after so many pixels; less is a click. */
-const DRAG = 4;
+const DRAG_PIXELS = 4;
 /** Zoom per step of the wheel. */
-const WHEEL = 0.0012;
+const ZOOM_PER_WHEEL_STEP = 0.0012;
 const VIEWS: ViewName[] = ['front', 'back', 'right', 'left', 'top', 'bottom'];
 
 function spotAt(app: App, event: { offsetX: number; offsetY: number }): Spot {
@@ -17,14 +17,32 @@ function spotAt(app: App, event: { offsetX: number; offsetY: number }): Spot {
   const { view } = app;
   const state = store.state.value;
   const lines = store.show.value.curves;
-  const feature = lines ? curveAt(view, x, y, 'feature') : null;
-  return {
-    x,
-    y,
-    place: view.pick(x, y)?.place ?? null,
-    corner: lines ? cornerAt(view, state, x, y) : null,
-    curve: lines ? (curveAt(view, x, y) ?? feature) : null,
-  };
+  // Until the curves of an edit are there, numbers of the old ones would name others.
+  const curves = lines && store.areCurvesOfNow.value;
+  return once<Spot>({
+    x: () => x,
+    y: () => y,
+    place: () => view.pick(x, y)?.place ?? null,
+    corner: () => (lines ? cornerAt(view, state, x, y) : null),
+    curve: () => (curves ? (curveAt(view, x, y) ?? curveAt(view, x, y, 'feature')) : null),
+  });
+}
+
+/** Values that are looked for when they are asked for, once: a drag seeks no curve. */
+function once<T extends object>(found: { [K in keyof T]: () => T[K] }): T {
+  const values = {} as T;
+  for (const name of Object.keys(found) as (keyof T)[]) {
+    Object.defineProperty(values, name, {
+      configurable: true,
+      enumerable: true,
+      get() {
+        const value = found[name]();
+        Object.defineProperty(values, name, { value, enumerable: true });
+        return value;
+      },
+    });
+  }
+  return values;
 }
 
 export function listen(app: App, canvas: HTMLCanvasElement): void {
@@ -45,7 +63,7 @@ export function listen(app: App, canvas: HTMLCanvasElement): void {
   canvas.addEventListener('pointermove', (e) => {
     const [dx, dy] = [e.offsetX - last.x, e.offsetY - last.y];
     if (down) {
-      down.moved ||= Math.hypot(e.offsetX - down.x, e.offsetY - down.y) > DRAG;
+      down.moved ||= Math.hypot(e.offsetX - down.x, e.offsetY - down.y) > DRAG_PIXELS;
       if (!down.moved) return;
       last = { x: e.offsetX, y: e.offsetY };
       if (down.has) return app.tool().drag?.(spotAt(app, e));
@@ -89,7 +107,7 @@ export function listen(app: App, canvas: HTMLCanvasElement): void {
       e.preventDefault();
       const anchor = view.pick(e.offsetX, e.offsetY)?.place;
       // Pinching on a touchpad comes as a wheel with Ctrl, in small steps.
-      view.rig.zoom(Math.exp(e.deltaY * WHEEL * (e.ctrlKey ? 6 : 1)), anchor);
+      view.rig.zoom(Math.exp(e.deltaY * ZOOM_PER_WHEEL_STEP * (e.ctrlKey ? 6 : 1)), anchor);
       view.moved();
     },
     { passive: false },

@@ -92,11 +92,12 @@ let app: App | null = null;
 
 function Page() {
   const canvas = useRef<HTMLCanvasElement>(null);
+  const over = useRef<HTMLCanvasElement>(null);
   const ready = store.connection.value === 'open' || store.state.value.project !== null;
   useEffect(() => {
     const shown = canvas.current;
-    if (!shown) return;
-    const view = new View(shown);
+    if (!shown || !over.current) return;
+    const view = new View(shown, over.current);
     app = new App(view, location.hash.slice(1));
     const fit = () => view.resize(shown.parentElement!.clientWidth, shown.parentElement!.clientHeight);
     new ResizeObserver(fit).observe(shown.parentElement!);
@@ -119,6 +120,7 @@ function Page() {
       {bound && project && <ToolBar app={bound} />}
       <div class="stage-view">
         <canvas ref={canvas} tabIndex={0} aria-label={TEXT.view} />
+        <canvas ref={over} class="over" />
         {project && <Legend />}
         {project && <Angles />}
       </div>
@@ -148,6 +150,7 @@ function expose(bound: App): void {
   Object.assign(window, {
     __studio: {
       idle: () => bound.isIdle(),
+      shown: () => bound.isShown(),
       state: () => store.state.value,
       project: (p: number[]) => {
         const c = store.state.value.project?.center ?? [0, 0, 0];
@@ -157,8 +160,10 @@ function expose(bound: App): void {
         const hit = bound.view.pick(x, y);
         return hit ? bound.world(hit.place) : null;
       },
+      // Nothing while the curves on the screen are those of an earlier state.
       curve: (k: number) => {
         const { position, offset } = bound.view.curves;
+        if (!store.areCurvesOfNow.value || k + 1 >= offset.length) return null;
         return Array.from(position.subarray(3 * offset[k]!, 3 * offset[k + 1]!));
       },
       frames: () => bound.view.drawn,

@@ -161,6 +161,8 @@ fn a_sphere_is_laid_out_fitted_and_exported_and_a_stopped_job_leaves_all_as_it_w
         let [_, patches, _] = counts(&page.state);
         assert!(patches >= 6, "{patches} patches");
         assert_eq!(page.state["patches"][0]["fitted"]["control"], json!([6, 6]));
+        // Surfaces are there first, their figures follow.
+        page.state_with(|s| s["figures"]["seam.gap_max"].is_number()).await;
         assert!(page.state["figures"]["seam.gap_max"].as_f64().unwrap() < 1e-9);
         for (format, begins) in [("step", "ISO-10303-21;"), ("glb", "glTF"), ("report", "<!")] {
             let made = page.ask(json!({ "type": "export", "format": format })).await;

@@ -7,7 +7,7 @@
 //!    what follows are those that suit its noise ([`params_for`])
 //! 2. [`fit`], from a mesh on: repair, layout, imprint, grids, surfaces, seams, relief, measure. [`layout()`] stops at the
 //!    network, for one that is edited before
-//! 3. [`rework`], a model whose curves were edited: from the imprint on; [`refit`], surfaces, seams and relief anew on the
+//! 3. [`rework`], a model whose curves were edited: from the imprint on, or [`remake`] without the measuring; [`refit`], surfaces, seams and relief anew on the
 //!    grids that are there; [`assess`], the measuring alone
 //!
 //! A [`PipelineObserver`] hears which stage runs and how far the run is, and may stop it; [`StageRecord`] keeps what each
@@ -16,6 +16,7 @@
 mod deform;
 mod quality;
 mod record;
+mod rework;
 mod scan;
 mod truth;
 
@@ -25,6 +26,7 @@ pub use quality::{
     surface_mesh_cut, surface_patches, worst_seams,
 };
 pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
+pub use rework::{Earlier, Remade, remake, rework};
 pub use scan::{
     ScanError, ScanMeshed, ScanParams, field_of, mesh_samples, mesh_scan, params_for, sample_figures, scan_figures,
     voxel_for,
@@ -36,14 +38,13 @@ use crate::grid::{self, FeatureError, Grid, GridError, GridParams};
 use crate::layout::{self, Known, Layout, LayoutError, LayoutParams};
 use crate::mend::{self, Repairs};
 use crate::mesh::{CompareError, FeatureTags, MeshError, TriMesh};
-use crate::model::{Model, Sketch};
-use crate::network::{self, ImprintError, Network, PatchMesh};
-use crate::observe::{Cancelled, Observer};
+use crate::model::Model;
+use crate::network::{self, ImprintError, Network};
+use crate::observe::Cancelled;
 use crate::pipeline::record::Clock;
 use crate::pipeline::scan::run_figures;
 use crate::relief::{self, ReliefError};
 use crate::surface::{self, FitError, FitParams, SeamQuality, StitchParams};
-use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -395,103 +396,6 @@ pub fn relevel(
         model.layers.begin(&model.reliefs);
     }
     made.map(|()| clock.records)
-}
-
-/// What a model was before an edit, as far as its grids can be made from it.
-#[derive(Clone, Debug)]
-pub struct Earlier {
-    network: Network,
-    grids: Vec<Grid>,
-    sketch: Sketch,
-}
-
-impl Earlier {
-    /// The state of a model with grids; nothing for one without.
-    pub fn of(model: &Model) -> Option<Earlier> {
-        let Model { network, grids, sketch, .. } = model;
-        (!grids.is_empty()).then(|| Earlier { network: network.clone(), grids: grids.clone(), sketch: sketch.clone() })
-    }
-}
-
-/// Makes grids, surfaces, seams and reliefs of a model whose network or feature curves were edited, and measures it.
-///
-/// * `earlier` - the model before the edit, made with the same grid parameters. Where the edit moved a few curves and nothing
-///   else, grids of the patches beside them follow ([`grid::follow`]) and all others are kept; if one that followed is folded
-///   or misses its patch by more than is allowed, all are made from nothing, as they are with `None`.
-///
-/// On an error the model is what it was.
-/// # Errors
-/// As [`fit`]; the network must part the whole mesh into four-sided patches.
-pub fn rework(
-    model: &mut Model,
-    earlier: Option<&Earlier>,
-    params: &PipelineParams,
-    observer: &dyn PipelineObserver,
-) -> Result<Assessed, PipelineError> {
-    let mut clock = Clock::new(observer, &WEIGHTS);
-    let before =
-        (std::mem::take(&mut model.grids), std::mem::take(&mut model.surfaces), std::mem::take(&mut model.reliefs));
-    let made = remade(model, earlier, params, &mut clock);
-    if made.is_err() {
-        (model.grids, model.surfaces, model.reliefs) = before;
-    }
-    let quality::Measured { quality, seams, warnings } = made?;
-    Ok(Assessed { stages: clock.records, quality, seams, warnings })
-}
-
-fn remade(
-    model: &mut Model,
-    earlier: Option<&Earlier>,
-    params: &PipelineParams,
-    clock: &mut Clock,
-) -> Result<quality::Measured, PipelineError> {
-    let (mesh, network) = (&model.mesh, &model.network);
-    let patches = clock.stage("imprint", |o| network::imprint(mesh, network, o), |p| [("patches", p.len())])?;
-    let drawn = (&model.sketch.features[..], &model.sketch.sections[..]);
-    model.grids = clock.stage(
-        "grids",
-        |o| -> Result<_, PipelineError> {
-            if let Some(earlier) = earlier
-                && let Some(grids) = followed(model, earlier, &patches, &params.grid, o)?
-            {
-                return Ok(grids);
-            }
-            Ok(grid::resample(mesh, network, &patches, drawn, &params.grid, o)?)
-        },
-        |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
-    )?;
-    surfaces(model, params, clock)?;
-    let repairs = Repairs::default();
-    clock.stage("measure", |o| quality::measure(model, &patches, &repairs, o), |m| [("seams", m.seams.len())])
-}
-
-/// Grids of an edited model from those that it had; nothing where they must be made from nothing.
-fn followed(
-    model: &Model,
-    earlier: &Earlier,
-    patches: &[PatchMesh],
-    params: &GridParams,
-    observer: &dyn Observer,
-) -> Result<Option<Vec<Grid>>, GridError> {
-    let drawn = |s: &Sketch| !s.features.is_empty() || !s.sections.is_empty();
-    let Some(which) = network::changed_patches(&earlier.network, &model.network) else { return Ok(None) };
-    if drawn(&earlier.sketch) || drawn(&model.sketch) || earlier.grids.len() != patches.len() {
-        return Ok(None);
-    }
-    let some: Vec<PatchMesh> = which.iter().map(|&p| patches[p].clone()).collect();
-    let old: Vec<Grid> = which.iter().map(|&p| earlier.grids[p].clone()).collect();
-    let made = grid::follow(&model.mesh, &some, &old, params, observer)?;
-    let allowed = params.miss * model.mesh.bounds().diagonal();
-    let is_good = |(grid, patch): (&Grid, &PatchMesh)| {
-        let found = grid::measure(grid, patch);
-        found.folds == 0 && found.miss_max * patch.mesh.bounds().diagonal() <= allowed
-    };
-    if !made.par_iter().zip(&some).all(is_good) {
-        return Ok(None);
-    }
-    let mut grids = earlier.grids.clone();
-    which.into_iter().zip(made).for_each(|(p, grid)| grids[p] = grid);
-    Ok(Some(grids))
 }
 
 /// What [`assess`] finds.

@@ -203,6 +203,35 @@ fn surfaces_beside_a_dragged_curve_are_fitted_on_the_seams_of_all_others_bit_for
     assert!(warm.quality["relief.rounding_max_rel"].value() < 1e-12);
 }
 
+#[test]
+fn a_model_remade_edit_by_edit_is_that_of_the_whole_way_to_the_bit() {
+    let (mesh, adjacency, before, after, _) = edited(0.05);
+    let params = PipelineParams::default();
+    let mut model = Model { mesh, network: before.clone(), ..Model::default() };
+    let mut whole = model.clone();
+    let mut earlier = None;
+    // From nothing, an edit, the edit taken back, and nothing at all.
+    for network in [&before, &after, &before, &before] {
+        let known = Earlier::of(&whole);
+        whole.network = network.clone();
+        let told = pipeline::rework(&mut whole, known.as_ref(), &params, &Silent).unwrap();
+        model.network = network.clone();
+        let made = pipeline::remake(&mut model, &adjacency, earlier.as_ref(), &params, &Silent).unwrap();
+        earlier = made.earlier;
+        assert!(model == whole);
+        // Patches that the edit left alone are not cut out again.
+        let cut = made.stages.iter().find(|s| s.name == "imprint").map(|s| s.counts["patches"]).unwrap();
+        assert!(cut == network.patches.len() as u64 || cut == 2 || cut == 0, "{cut}");
+        // What is measured later is what would have been told at once.
+        let found = pipeline::assess(&model, &Silent).unwrap();
+        assert_eq!((&found.quality, &found.seams, &found.warnings), (&told.quality, &told.seams, &told.warnings));
+        // The surfaces are those of the grids, whatever was there before.
+        let mut anew = Model { surfaces: Vec::new(), reliefs: Vec::new(), ..model.clone() };
+        pipeline::refit(&mut anew, &params, &Silent).unwrap();
+        assert!(anew == model);
+    }
+}
+
 /// An ellipsoid whose triangles are not symmetric in x, drawn as a box of six patches: two on the sides of the plane
 /// x = 0 and four across it. What lies behind the plane is drawn badly.
 fn box_across() -> Vec<String> {

@@ -216,6 +216,11 @@ export const wanted = computed<Layer[]>(() => {
   return want;
 });
 
+/** True once the curves on the screen are those of the state, so that their numbers name what is seen. */
+export const areCurvesOfNow = computed(() =>
+  (['curves', 'features'] as const).every((l) => geometry.value.get(l)?.name === state.value.layers[l]),
+);
+
 /** Layers that are to be asked for: those that are neither there nor asked for by the name of now. */
 export function missing(asked: ReadonlyMap<Layer, string>): Layer[] {
   const names = state.value.layers;

@@ -379,6 +379,7 @@ export const TEXT = {
     fit: 'Fit surfaces',
     coarse: 'Pause at coarse grids',
     measured: 'Measured',
+    measuring: 'The surfaces are being measured against the mesh …',
     rms: 'Distance to the mesh, RMS',
     max: 'Distance to the mesh, largest',
     points: 'Control points',

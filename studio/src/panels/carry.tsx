@@ -5,7 +5,7 @@ import { TEXT } from '../model/texts';
 import { Choice, Section } from './parts';
 
 /** Pairs of places that a rigid fit needs. */
-const FEWEST = 3;
+const FEWEST_PAIRS = 3;
 
 export function CarrySection({ app }: { app: App }) {
   const { files, peer } = store.state.value;
@@ -43,7 +43,7 @@ export function CarrySection({ app }: { app: App }) {
             <button
               type="button"
               class="primary"
-              disabled={pairs < FEWEST || peer.curves === 0}
+              disabled={pairs < FEWEST_PAIRS || peer.curves === 0}
               onClick={() => void app.carry()}
             >
               {words.go}

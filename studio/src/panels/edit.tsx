@@ -92,7 +92,7 @@ function ToolOptions({ app }: { app: App }) {
 }
 
 /** Stiffness of the brush: steps of about three. */
-const STIFF = [0.1, 0.3, 1, 3, 10, 30, 100];
+const STIFFNESSES = [0.1, 0.3, 1, 3, 10, 30, 100];
 
 function HoldOptions() {
   const holds = store.holds.value;
@@ -101,13 +101,13 @@ function HoldOptions() {
     <Section title={words.title}>
       <Slider
         label={words.brush}
-        value={STIFF.indexOf(store.stiffness.value)}
+        value={STIFFNESSES.indexOf(store.stiffness.value)}
         min={0}
-        max={STIFF.length - 1}
+        max={STIFFNESSES.length - 1}
         step={1}
-        show={(k) => (STIFF[k] === 1 ? words.none : words.times(digits(STIFF[k]!)))}
+        show={(k) => (STIFFNESSES[k] === 1 ? words.none : words.times(digits(STIFFNESSES[k]!)))}
         onInput={(k) => {
-          store.stiffness.value = STIFF[k]!;
+          store.stiffness.value = STIFFNESSES[k]!;
         }}
       />
       {holds && (

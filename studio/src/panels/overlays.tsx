@@ -7,13 +7,13 @@ import { FORMATS, KEYS, SAMPLES, SHADINGS, SHAPES, TEXT, TOOLS } from '../model/
 import { capital, short } from './edit';
 
 /** What was told goes by itself after this, milliseconds; what was refused stays. */
-const TOLD = 4000;
+const TOLD_MS = 4000;
 
 export function Toasts({ app }: { app: App }) {
   const told = store.toasts.value.find((t) => t.kind === 'told');
   useEffect(() => {
     if (!told) return;
-    const timer = setTimeout(() => store.dismiss(told.id), TOLD);
+    const timer = setTimeout(() => store.dismiss(told.id), TOLD_MS);
     return () => clearTimeout(timer);
   }, [told?.id]);
   return (

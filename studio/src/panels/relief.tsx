@@ -11,7 +11,7 @@ import { Choice, Fact, Section, Slider } from './parts';
 
 type DisplacementMap = Extract<Message, { type: 'map' }>;
 /** Wavelengths of the slider, of the diagonal. */
-const WAVES = [0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005];
+const WAVELENGTHS = [0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005];
 const patch = signal(0);
 const map = signal<DisplacementMap | null>(null);
 const draft = signal<number | null>(null);
@@ -113,8 +113,9 @@ function Waves({ app }: { app: App }) {
   const words = TEXT.relief;
   const diagonal = project?.diagonal ?? 1;
   const at = (l: number) =>
-    WAVES.reduce(
-      (a, w, k) => (Math.abs(Math.log((w * diagonal) / l)) < Math.abs(Math.log((WAVES[a]! * diagonal) / l)) ? k : a),
+    WAVELENGTHS.reduce(
+      (a, w, k) =>
+        Math.abs(Math.log((w * diagonal) / l)) < Math.abs(Math.log((WAVELENGTHS[a]! * diagonal) / l)) ? k : a,
       0,
     );
   return (
@@ -128,7 +129,7 @@ function Waves({ app }: { app: App }) {
         ]}
         onPick={(which) => {
           store.showShape('displaced');
-          void app.relief(which === 'all' ? null : WAVES[2]! * diagonal);
+          void app.relief(which === 'all' ? null : WAVELENGTHS[2]! * diagonal);
         }}
       />
       {longest != null && (
@@ -136,15 +137,15 @@ function Waves({ app }: { app: App }) {
           label={words.wavelength}
           value={draft.value ?? at(longest)}
           min={0}
-          max={WAVES.length - 1}
+          max={WAVELENGTHS.length - 1}
           step={1}
-          show={(k) => length(WAVES[k]! * diagonal, project?.units ?? '')}
+          show={(k) => length(WAVELENGTHS[k]! * diagonal, project?.units ?? '')}
           onInput={(k) => {
             draft.value = k;
           }}
           onChange={(k) => {
             draft.value = null;
-            void app.relief(WAVES[k]! * diagonal);
+            void app.relief(WAVELENGTHS[k]! * diagonal);
           }}
         />
       )}

@@ -100,9 +100,18 @@ function Fineness({ app }: { app: App }) {
 }
 
 function Measured({ app }: { app: App }) {
-  const { figures, project, seams, warnings, layers } = store.state.value;
+  const { figures, project, seams, warnings, layers, stages } = store.state.value;
   const units = project?.units ?? '';
-  if (figures['surface.rms'] === undefined) return null;
+  if (figures['surface.rms'] === undefined) {
+    const isFresh = stages.some((s) => s.name === 'surfaces' && s.is === 'fresh');
+    if (!isFresh) return null;
+    return (
+      <Section title={words.measured}>
+        <p class="faint">{words.measuring}</p>
+        {layers.surfaces && <Histogram />}
+      </Section>
+    );
+  }
   const rows: [string, string][] = [
     [words.rms, length(figures['surface.rms']!, units)],
     [words.max, length(figures['surface.max'] ?? 0, units)],

@@ -30,7 +30,7 @@ export type Body = Request extends infer R ? (R extends { id: number } ? Omit<R,
 export type Answer = Extract<Message, { id: number }>;
 
 /** Waiting times before the next try, milliseconds. */
-const RETRY = [200, 500, 1000, 2000, 4000];
+const RETRY_MS = [200, 500, 1000, 2000, 4000];
 /** The protocol that this page speaks. */
 const PROTOCOL = 1;
 
@@ -73,7 +73,7 @@ export class Client {
       // A server that never let this page in will not do so the next time.
       const hopeless = !opened && !this.run && this.tries >= 3;
       this.listener.connection(hopeless ? 'refused' : 'lost');
-      if (!hopeless) setTimeout(() => this.connect(), RETRY[Math.min(this.tries++, RETRY.length - 1)]);
+      if (!hopeless) setTimeout(() => this.connect(), RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)]);
     };
     this.socket = socket;
   }

@@ -4,9 +4,9 @@ import type { Edit } from '../protocol/types';
 import type { Bench, Spot, Tool } from './tool';
 
 /** A line shorter than this is none, pixels. */
-const SHORTEST = 12;
+const SHORTEST_STROKE_PIXELS = 12;
 /** Places along the line where the part is looked for. */
-const LOOKS = 40;
+const PLACES_ALONG_STROKE = 40;
 
 export class Cut implements Tool {
   cursor = 'crosshair';
@@ -33,14 +33,14 @@ export class Cut implements Tool {
   }
 
   private cut(a: Spot, b: Spot): Edit | null {
-    if (Math.hypot(a.x - b.x, a.y - b.y) < SHORTEST) return null;
+    if (Math.hypot(a.x - b.x, a.y - b.y) < SHORTEST_STROKE_PIXELS) return null;
     const { view } = this.bench;
     const [r, s] = [view.ray(a.x, a.y), view.ray(b.x, b.y)];
     // The plane of both lines of sight: with parallel ones that through their starts.
     const across = s.origin.clone().add(s.direction).sub(r.origin).sub(r.direction);
     const normal = across.cross(r.direction).normalize();
     // The place of the part nearest to the middle of the line.
-    const order = Array.from({ length: LOOKS + 1 }, (_, k) => k / LOOKS).sort(
+    const order = Array.from({ length: PLACES_ALONG_STROKE + 1 }, (_, k) => k / PLACES_ALONG_STROKE).sort(
       (p, q) => Math.abs(p - 0.5) - Math.abs(q - 0.5),
     );
     for (const t of order) {

@@ -6,7 +6,7 @@ import type { CurveName, Edit } from '../protocol/types';
 import type { Bench, Spot, Tool } from './tool';
 
 /** A handle this near is meant, pixels. */
-const NEAR = 12;
+const GRAB_PIXELS = 12;
 
 export class Handles implements Tool {
   cursor = 'pointer';
@@ -19,7 +19,7 @@ export class Handles implements Tool {
   constructor(private readonly bench: Bench) {}
 
   private under(spot: Spot): number {
-    let [best, least] = [-1, NEAR];
+    let [best, least] = [-1, GRAB_PIXELS];
     this.points.forEach((p, k) => {
       const at = this.bench.view.project(p);
       const away = Math.hypot(at.x - spot.x, at.y - spot.y);

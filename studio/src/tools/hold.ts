@@ -4,7 +4,7 @@ import type { Found } from '../view/seek';
 import type { Bench, Spot, Tool } from './tool';
 
 /** A pin this near to a click is taken out, share of the curve. */
-const SAME = 0.03;
+const SAME_PIN_SHARE = 0.03;
 
 export class Hold implements Tool {
   cursor = 'cell';
@@ -34,7 +34,7 @@ export class Hold implements Tool {
     const found = this.found(spot);
     if (!found) return;
     const now = this.of(found);
-    const others = now.pins.filter((p) => Math.abs(p - found.at) > SAME);
+    const others = now.pins.filter((p) => Math.abs(p - found.at) > SAME_PIN_SHARE);
     const pins = others.length < now.pins.length ? others : [...now.pins, found.at].sort((a, b) => a - b);
     holds.value = { ...now, pins };
     selected.value = found.picked;
@@ -59,7 +59,7 @@ export class Hold implements Tool {
     this.from = null;
     if (!from) return;
     const [a, b] = [Math.min(from.at, to), Math.max(from.at, to)];
-    if (b - a < SAME) return;
+    if (b - a < SAME_PIN_SHARE) return;
     const now = this.of(from);
     // The last stroke counts where two lie over each other.
     const rest = now.stretches.filter((s) => s.to <= a || s.from >= b);

@@ -3,7 +3,7 @@ import { Matrix4, Vector3 } from 'three';
 import type { Bench, Spot, Tool } from './tool';
 
 /** Corners of the line are this far apart at least, pixels. */
-const STEP = 5;
+const STEP_PIXELS = 5;
 
 export class Lasso implements Tool {
   cursor = 'crosshair';
@@ -18,7 +18,7 @@ export class Lasso implements Tool {
 
   drag(spot: Spot): void {
     const last = this.line[this.line.length - 1];
-    if (!last || Math.hypot(last.x - spot.x, last.y - spot.y) < STEP) return;
+    if (!last || Math.hypot(last.x - spot.x, last.y - spot.y) < STEP_PIXELS) return;
     this.line.push({ x: spot.x, y: spot.y });
     const { view } = this.bench;
     const at = this.line.map(({ x, y }) =>

@@ -6,7 +6,7 @@ import type { Found } from '../view/seek';
 import type { Bench, Spot, Tool } from './tool';
 
 /** A curve is not dragged at its very ends: those are corners. */
-const END = 0.02;
+const END_SHARE = 0.02;
 
 export class Pull implements Tool {
   cursor = 'grab';
@@ -44,7 +44,7 @@ export class Pull implements Tool {
       return { edit: 'drag_corner', corner: index, to: this.bench.world(to), reach: dragWidth.value };
     const by = to.clone().sub(held.place).toArray();
     const curve: CurveName = kind === 'feature' ? { feature: index } : index;
-    const at = Math.min(1 - END, Math.max(END, held.at));
+    const at = Math.min(1 - END_SHARE, Math.max(END_SHARE, held.at));
     const kept = holds.value;
     const own = kept && kept.picked.kind === kind && kept.picked.index === index ? kept : null;
     const { pins = [], stretches: stiffness = [] } = own ?? {};

@@ -6,7 +6,7 @@ import type { Edit } from '../protocol/types';
 import type { Bench, Spot, Tool } from './tool';
 
 /** A click this near to the first pick closes the curve, pixels. */
-const CLOSE = 12;
+const CLOSE_PIXELS = 12;
 
 export class Stroke implements Tool {
   cursor = 'crosshair';
@@ -30,7 +30,7 @@ export class Stroke implements Tool {
     const first = this.picks[0];
     if (this.kind === 'feature' || !first || this.picks.length < 3) return false;
     const p = this.bench.view.project(first);
-    return Math.hypot(p.x - spot.x, p.y - spot.y) < CLOSE;
+    return Math.hypot(p.x - spot.x, p.y - spot.y) < CLOSE_PIXELS;
   }
 
   /** Where a pick goes: to a corner or curve that is near, else where it is. */

@@ -78,46 +78,57 @@ export function placeAt(all: Courses, curve: number, at: number): number[] {
   return [...all.position.subarray(3 * first, 3 * first + 3)];
 }
 
+/** True if two lists hold the same numbers: what is the same need not be drawn again. */
+export function same(a: Float32Array | undefined, b: Float32Array | undefined): boolean {
+  if (a === b) return true;
+  if (!a || !b || a.length !== b.length) return false;
+  for (let k = 0; k < a.length; k++) if (a[k] !== b[k]) return false;
+  return true;
+}
+
 /** Lines wider than this mark others, pixels. */
-const OVER = 4;
+const MARKING_PIXELS = 4;
 
 /** Thick lines of one colour. */
 export class Thick {
   readonly object: LineSegments2;
   readonly material: LineMaterial;
+  private positions: Float32Array = new Float32Array();
+  private colors: Float32Array | undefined;
 
-  constructor(color: string, width: number, inFront = false, vertexColors = false) {
+  constructor(color: string, width: number, vertexColors = false) {
     this.material = new LineMaterial({
       color,
       linewidth: width,
-      depthTest: !inFront,
-      transparent: inFront,
       vertexColors,
     });
     // What is pointed at lies over the line that it is.
-    this.material.polygonOffset = width > OVER;
+    this.material.polygonOffset = width > MARKING_PIXELS;
     this.material.polygonOffsetFactor = -2;
     this.material.polygonOffsetUnits = -8;
     this.object = new LineSegments2(new LineSegmentsGeometry(), this.material);
     this.object.frustumCulled = false;
     this.object.visible = false;
-    if (inFront) this.object.renderOrder = 10;
   }
 
-  /** Shows pieces; `colors` has three numbers for each end of one. */
-  set(positions: Float32Array, colors?: Float32Array): void {
+  /** Shows pieces; `colors` has three numbers for each end of one. False if they are those that are shown. */
+  set(positions: Float32Array, colors?: Float32Array): boolean {
+    if (same(positions, this.positions) && same(colors, this.colors)) return false;
+    this.positions = positions;
+    this.colors = colors;
     this.object.geometry.dispose();
     this.object.geometry = new LineSegmentsGeometry();
     this.object.visible = positions.length > 0;
-    if (positions.length === 0) return;
-    this.object.geometry.setPositions(positions);
-    if (colors) this.object.geometry.setColors(colors);
+    if (positions.length > 0) this.object.geometry.setPositions(positions);
+    if (positions.length > 0 && colors) this.object.geometry.setColors(colors);
+    return true;
   }
 }
 
 /** Thin lines of one colour. */
 export class Thin {
   readonly object: LineSegments;
+  private positions: Float32Array = new Float32Array();
 
   constructor(color: string, opacity: number) {
     const material = new LineBasicMaterial({ color, opacity, transparent: opacity < 1 });
@@ -126,10 +137,14 @@ export class Thin {
     this.object.visible = false;
   }
 
-  set(positions: Float32Array, _colors?: Float32Array): void {
+  /** Shows pieces. False if they are those that are shown. */
+  set(positions: Float32Array, _colors?: Float32Array): boolean {
+    if (same(positions, this.positions)) return false;
+    this.positions = positions;
     this.object.geometry.dispose();
     this.object.geometry = new BufferGeometry();
     this.object.geometry.setAttribute('position', new BufferAttribute(positions, 3));
     this.object.visible = positions.length > 0;
+    return true;
   }
 }

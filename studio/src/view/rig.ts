@@ -6,10 +6,10 @@ export type ViewName = 'front' | 'back' | 'right' | 'left' | 'top' | 'bottom' | 
 /** Half the angle of view, up and down. */
 export const HALF_FOV = (17 * Math.PI) / 180;
 /** Half the height that can be seen, as shares of the radius of what there is. */
-const LEAST = 1e-4;
-const MOST = 20;
+const LEAST_HALF = 1e-4;
+const MOST_HALF = 20;
 /** The eye of a turntable stays so far off the poles, radians. */
-const POLE = 0.01;
+const POLE_RAD = 0.01;
 
 type Sides = Record<ViewName, [number, number, number]>;
 const UP_Z: Sides = {
@@ -17,8 +17,8 @@ const UP_Z: Sides = {
   back: [0, 1, 0],
   right: [1, 0, 0],
   left: [-1, 0, 0],
-  top: [0, -POLE, 1],
-  bottom: [0, -POLE, -1],
+  top: [0, -POLE_RAD, 1],
+  bottom: [0, -POLE_RAD, -1],
   corner: [-0.85, -0.75, 0.6],
 };
 const UP_Y: Sides = {
@@ -26,8 +26,8 @@ const UP_Y: Sides = {
   back: [0, 0, -1],
   right: [1, 0, 0],
   left: [-1, 0, 0],
-  top: [0, 1, POLE],
-  bottom: [0, -1, POLE],
+  top: [0, 1, POLE_RAD],
+  bottom: [0, -1, POLE_RAD],
   corner: [0.62, 0.42, 1],
 };
 
@@ -56,7 +56,7 @@ export class Rig {
     let tilt = -dy * Math.PI;
     if (how === 'turntable') {
       const now = Math.acos(Math.max(-1, Math.min(1, this.toEye().dot(this.up))));
-      tilt = Math.min(Math.PI - POLE, Math.max(POLE, now + tilt)) - now;
+      tilt = Math.min(Math.PI - POLE_RAD, Math.max(POLE_RAD, now + tilt)) - now;
     }
     const along = new Quaternion().setFromAxisAngle(right, tilt);
     const across = new Quaternion().setFromAxisAngle(about, -dx * Math.PI);
@@ -72,7 +72,7 @@ export class Rig {
 
   /** Zooms; the place under the cursor stays there. */
   zoom(factor: number, anchor?: Vector3): void {
-    const half = Math.min(MOST * this.radius, Math.max(LEAST * this.radius, this.half * factor));
+    const half = Math.min(MOST_HALF * this.radius, Math.max(LEAST_HALF * this.radius, this.half * factor));
     if (anchor) {
       const eye = this.toEye();
       const aside = anchor.clone().sub(this.target);

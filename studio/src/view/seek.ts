@@ -6,8 +6,8 @@ import { share } from './lines';
 import type { View } from './view';
 
 /** Corners and curves this near are meant, pixels. */
-const CORNER = 11;
-const CURVE = 8;
+const CORNER_PIXELS = 11;
+const CURVE_PIXELS = 8;
 
 export interface Found {
   picked: Picked;
@@ -20,7 +20,7 @@ export interface Found {
 export function cornerAt(view: View, state: State, x: number, y: number): Found | null {
   const center = state.project?.center ?? [0, 0, 0];
   let best: Found | null = null;
-  let least = CORNER;
+  let least = CORNER_PIXELS;
   state.corners.forEach((c, index) => {
     const place = new Vector3(c[0] - center[0], c[1] - center[1], c[2] - center[2]);
     const p = view.project(place);
@@ -42,7 +42,7 @@ export function curveAt(view: View, x: number, y: number, kind: 'curve' | 'featu
   const found: { away: number; curve: number; segment: number; part: number }[] = [];
   for (let k = 0; k + 1 < all.offset.length; k++) {
     let [px, py] = [0, 0];
-    let nearest = { away: CURVE, curve: k, segment: -1, part: 0 };
+    let nearest = { away: CURVE_PIXELS, curve: k, segment: -1, part: 0 };
     for (let i = all.offset[k]!; i < all.offset[k + 1]!; i++) {
       p.fromArray(all.position, 3 * i).project(camera);
       const [qx, qy] = [((p.x + 1) / 2) * width, ((1 - p.y) / 2) * height];

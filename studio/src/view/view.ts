@@ -20,14 +20,16 @@ import {
 } from 'three';
 import { MeshBVH } from 'three-mesh-bvh';
 import type { Geometry } from '../protocol/frames';
-import { type Courses, courses, pieces, placeAt, stretch, Thick, Thin } from './lines';
+import { type Courses, courses, pieces, placeAt, same, stretch, Thick, Thin } from './lines';
 import { cloudMaterial, dotMaterial, MODES, surfaceMaterial } from './materials';
+import { type OverLine, Overlay } from './overlay';
 import { HALF_FOV, Rig } from './rig';
 
 /** The full mesh comes back so long after the last move, milliseconds. */
-const STILL = 150;
+const STILL_MS = 150;
+const NOTHING = new Float32Array();
 /** Renderers that draw with the processor: fewer pixels for them. */
-const SLOW = /swiftshader|llvmpipe|software|basic render/i;
+const SOFTWARE_RENDERER = /swiftshader|llvmpipe|software|basic render/i;
 
 ColorManagement.enabled = false;
 
@@ -59,32 +61,33 @@ export class View {
     sharp: new Thick('#c2410c', 2.6),
     boundary: new Thick('#4d5560', 2.2),
     features: new Thick('#7e22ce', 2),
-    angles: new Thick('#ffffff', 4, false, true),
+    angles: new Thick('#ffffff', 4.5, true),
     held: new Thick('#be185d', 5.5),
     hover: new Thick('#0ea5a0', 4.5),
     chosen: new Thick('#f59e0b', 4.5),
     erase: new Thick('#dc2626', 4.5),
-    preview: new Thick('#0891b2', 3, true),
-    helper: new Thick('#0f172a', 1.5, true),
   };
   private readonly corners = new Points(new BufferGeometry(), dotMaterial(9, '#12343b'));
   private readonly pins = new Points(new BufferGeometry(), dotMaterial(13, '#ffffff'));
-  private readonly marks = new Points(new BufferGeometry(), dotMaterial(12, '#ffffff'));
   curves: Courses = courses(undefined);
   features: Courses = courses(undefined);
   private moving = false;
   private stillTimer = 0;
   private queued = false;
+  /** True if the scene has changed since it was drawn, and not only what lies over it. */
+  private stale = false;
   private frames = 0;
+  readonly overlay: Overlay;
   onFrame: (() => void) | null = null;
 
-  constructor(canvas: HTMLCanvasElement) {
+  constructor(canvas: HTMLCanvasElement, over: HTMLCanvasElement) {
     this.canvas = canvas;
+    this.overlay = new Overlay(over);
     const probe = document.createElement('canvas').getContext('webgl2');
     const info = probe?.getExtension('WEBGL_debug_renderer_info');
     const name = info && probe ? String(probe.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
     probe?.getExtension('WEBGL_lose_context')?.loseContext();
-    const slow = SLOW.test(name);
+    const slow = SOFTWARE_RENDERER.test(name);
     this.renderer = new WebGLRenderer({ canvas, antialias: !slow, preserveDrawingBuffer: true });
     // Colours are written as they are named.
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
@@ -92,28 +95,36 @@ export class View {
     this.renderer.setPixelRatio(slow ? 1 : Math.min(2, window.devicePixelRatio));
     this.coarseSurface = this.surface;
     for (const line of Object.values(this.lines)) this.scene.add(line.object);
-    for (const dots of [this.corners, this.pins, this.marks]) {
+    for (const dots of [this.corners, this.pins]) {
       dots.frustumCulled = false;
       dots.visible = false;
       this.scene.add(dots);
     }
-    this.marks.renderOrder = 11;
     // What holds a curve lies over the mark that it is chosen.
     this.lines.held.material.polygonOffsetFactor = -4;
     this.lines.held.material.polygonOffsetUnits = -24;
-    (this.marks.material as ShaderMaterial).depthTest = false;
     this.rig.look('corner');
   }
 
   /** Draws soon. */
   draw(): void {
+    this.stale = true;
+    this.drawOver();
+  }
+
+  /** Draws soon what lies over the scene, and the scene if it has changed. */
+  private drawOver(): void {
     if (this.queued) return;
     this.queued = true;
     requestAnimationFrame(() => {
       this.queued = false;
-      this.frames++;
       this.updateCamera();
-      this.renderer.render(this.scene, this.camera());
+      if (this.stale) {
+        this.stale = false;
+        this.frames++;
+        this.renderer.render(this.scene, this.camera());
+      }
+      this.overlay.draw(this.camera());
       this.onFrame?.();
     });
   }
@@ -132,6 +143,7 @@ export class View {
 
   resize(width: number, height: number): void {
     this.renderer.setSize(width, height, false);
+    this.overlay.resize(width, height, Math.min(2, window.devicePixelRatio));
     for (const line of Object.values(this.lines)) {
       if (line instanceof Thick) line.material.resolution.set(width, height);
     }
@@ -151,7 +163,7 @@ export class View {
       this.moving = false;
       this.swap();
       this.draw();
-    }, STILL);
+    }, STILL_MS);
     this.draw();
   }
 
@@ -291,16 +303,21 @@ export class View {
   }
 
   shade(mode: keyof typeof MODES, most: number): void {
-    this.surface.uniforms.mode!.value = MODES[mode];
-    this.surface.uniforms.most!.value = Math.max(most, 1e-30);
-    this.draw();
+    this.tell({ mode: MODES[mode], most: Math.max(most, 1e-30) });
   }
 
   mark(hovered: number, chosen: number, alone: number): void {
-    this.surface.uniforms.hovered!.value = hovered;
-    this.surface.uniforms.chosen!.value = chosen;
-    this.surface.uniforms.alone!.value = alone;
-    this.draw();
+    this.tell({ hovered, chosen, alone });
+  }
+
+  /** Numbers for the material of surfaces; draws if one is another. */
+  private tell(values: Record<string, number>): void {
+    for (const [name, value] of Object.entries(values)) {
+      const uniform = this.surface.uniforms[name]!;
+      if (uniform.value === value) continue;
+      uniform.value = value;
+      this.draw();
+    }
   }
 
   cut(normal: Vector3, at: number): void {
@@ -309,34 +326,35 @@ export class View {
     this.cloud.uniforms.cut!.value = cut;
     (this.corners.material as ShaderMaterial).uniforms.cut!.value = cut;
     const plane = new Plane(normal.clone().negate(), at);
-    for (const [name, line] of Object.entries(this.lines)) {
+    for (const line of Object.values(this.lines)) {
       const material = line instanceof Thick ? line.material : line.object.material;
-      const isTool = name === 'preview' || name === 'helper';
-      Object.assign(material, { clippingPlanes: normal.lengthSq() > 0 && !isTool ? [plane] : [] });
+      Object.assign(material, { clippingPlanes: normal.lengthSq() > 0 ? [plane] : [] });
     }
     this.draw();
   }
 
   setCorners(positions: Float32Array, colors: Float32Array): void {
-    setDots(this.corners, positions, colors);
-    this.draw();
+    if (setDots(this.corners, positions, colors)) this.draw();
   }
 
   /** Places that stay marked: pins and holes. */
   setPins(positions: Float32Array, colors: Float32Array): void {
-    setDots(this.pins, positions, colors);
-    this.draw();
+    if (setDots(this.pins, positions, colors)) this.draw();
   }
 
   /** Dots of a tool, over everything. */
   setMarks(positions: Float32Array, colors: Float32Array): void {
-    setDots(this.marks, positions, colors);
-    this.draw();
+    this.overlay.setDots(positions, colors);
+    this.drawOver();
   }
 
-  setLine(name: keyof View['lines'], positions: Float32Array, colors?: Float32Array): void {
-    this.lines[name].set(positions, colors);
+  setLine(name: keyof View['lines'] | OverLine, positions: Float32Array, colors?: Float32Array): void {
+    if (name === 'preview' || name === 'helper') {
+      this.overlay.setLine(name, positions);
+      return this.drawOver();
+    }
     const line = this.lines[name];
+    if (!line.set(positions, colors)) return;
     if (line instanceof Thick) line.material.resolution.set(this.canvas.clientWidth, this.canvas.clientHeight);
     this.draw();
   }
@@ -446,10 +464,14 @@ function buffersOf(geometry: Geometry): BufferGeometry {
   return buffers;
 }
 
-function setDots(dots: Points, positions: Float32Array, colors: Float32Array): void {
+/** Shows dots; false if they are those that are shown. */
+function setDots(dots: Points, positions: Float32Array, colors: Float32Array): boolean {
+  const shown = (name: string) => (dots.geometry.getAttribute(name)?.array ?? NOTHING) as Float32Array;
+  if (same(positions, shown('position')) && same(colors, shown('color'))) return false;
   dots.geometry.dispose();
   dots.geometry = new BufferGeometry();
   dots.geometry.setAttribute('position', new BufferAttribute(positions, 3));
   dots.geometry.setAttribute('color', new BufferAttribute(colors, 3));
   dots.visible = positions.length > 0;
+  return true;
 }

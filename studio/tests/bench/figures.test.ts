@@ -18,6 +18,8 @@ function tell(what: string, value: number, unit: string, aim: number): void {
 
 const share = (list: number[], at: number) => [...list].sort((a, b) => a - b)[Math.floor(at * (list.length - 1))]!;
 
+const fresh = (s: State) => s.stages.find((x) => x.name === 'surfaces')?.is === 'fresh';
+
 type Page = {
   __studio: {
     idle(): boolean;
@@ -116,7 +118,7 @@ describe.skipIf(!chromiumPath)('figures', () => {
     const setting = (resolution: object) =>
       page.evaluate((r) => (window as never as Page).__studio.app.setting(r, true), resolution);
     await page.evaluate(() => (window as never as Page).__studio.app.edit({ edit: 'complete', patches: 100 }));
-    const laid = await studio.until((s) => s.stages.find((x) => x.name === 'surfaces')?.is === 'fresh');
+    const laid = await studio.until(fresh);
     printed.push(`on a ball of 43 thousand triangles with ${laid.patches.length} patches:`);
     await page.getByRole('tab', { name: 'View' }).click();
     await page.getByRole('radio', { name: 'Surfaces' }).click();
@@ -124,11 +126,11 @@ describe.skipIf(!chromiumPath)('figures', () => {
     await studio.idle();
     let since = Date.now();
     await setting({ control: [9, 9] });
-    await studio.until((s) => s.jobs.length === 0);
-    await studio.idle();
+    await studio.until(fresh);
+    await studio.shown();
     tell('fit anew with deviation on the screen', (Date.now() - since) / 1000, 's', 1);
     await page.evaluate(() => (window as never as Page).__studio.app.edit({ edit: 'relax', curve: 0 }));
-    await studio.until((s) => s.stages.find((x) => x.name === 'surfaces')?.is === 'fresh');
+    await studio.until(fresh);
     await studio.idle();
     since = Date.now();
     await page.evaluate(() =>
@@ -140,9 +142,12 @@ describe.skipIf(!chromiumPath)('figures', () => {
         width: 0.5,
       }),
     );
-    await studio.until((s) => s.stages.find((x) => x.name === 'surfaces')?.is === 'fresh');
-    await studio.idle();
+    await studio.until(fresh);
+    await studio.shown();
     tell('patches beside an edited curve anew', (Date.now() - since) / 1000, 's', 0.3);
+    since = Date.now();
+    await studio.idle();
+    printed.push(`  figures of it measured ${((Date.now() - since) / 1000).toPrecision(3)} s later`);
     // The snake: from the event to the picture with it.
     await page.keyboard.press('d');
     const curve = await page.evaluate(() => {

@@ -141,6 +141,15 @@ export class Studio {
     );
   }
 
+  /** Waits until what the state names is on the screen; figures of it may still be measured. */
+  async shown(timeout = 80_000): Promise<void> {
+    await this.page.waitForFunction(
+      () => (window as never as { __studio: { shown(): boolean } }).__studio.shown(),
+      null,
+      { timeout, polling: 5 },
+    );
+  }
+
   /** Waits until the state is as wanted. */
   async until(wanted: (state: State) => boolean, timeout = 80_000): Promise<State> {
     const end = Date.now() + timeout;
@@ -152,9 +161,35 @@ export class Studio {
     }
   }
 
+  /** Course of a curve of the state, once the page has it: three numbers a point. */
+  async curve(k: number): Promise<number[]> {
+    const course = await this.page.waitForFunction(
+      (n) => (window as never as { __studio: { curve(n: number): number[] | null } }).__studio.curve(n),
+      k,
+      { polling: 30 },
+    );
+    return (await course.jsonValue())!;
+  }
+
+  /** Waits until lines of a kind are shown. */
+  async seen(line: 'preview' | 'erase'): Promise<void> {
+    type View = {
+      lines: Record<string, { object: { visible: boolean } }>;
+      overlay: { has(name: string): boolean };
+    };
+    await this.page.waitForFunction(
+      (name) => {
+        const { view } = (window as never as { __studio: { app: { view: View } } }).__studio.app;
+        return view.lines[name]?.object.visible ?? view.overlay.has(name);
+      },
+      line,
+      { polling: 30 },
+    );
+  }
+
   /** Pixel of the page of a world position. */
   async pixel(p: readonly number[]): Promise<{ x: number; y: number }> {
-    const box = (await this.page.locator('canvas').boundingBox())!;
+    const box = (await this.page.locator('canvas').first().boundingBox())!;
     const at = await this.page.evaluate(
       (q) => (window as never as { __studio: { project(p: number[]): { x: number; y: number } } }).__studio.project(q),
       [...p],

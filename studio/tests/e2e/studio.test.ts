@@ -73,12 +73,7 @@ describe.skipIf(!chromiumPath)('the studio', () => {
     await studio.until((s) => s.curves.length === 4);
     await studio.idle();
     await studio.page.keyboard.press('d');
-    const curve = (k: number) =>
-      studio.page.evaluate(
-        (n) => (window as never as { __studio: { curve(n: number): number[] } }).__studio.curve(n),
-        k,
-      );
-    const before = await curve(0);
+    const before = await studio.curve(0);
     const at = before.slice(3 * Math.floor(before.length / 6), 3 * Math.floor(before.length / 6) + 3);
     const from = await studio.pixel(at);
     const to = await studio.pixel(middle);
@@ -86,23 +81,19 @@ describe.skipIf(!chromiumPath)('the studio', () => {
     await studio.page.mouse.move(from.x, from.y);
     await studio.page.mouse.down();
     await studio.page.mouse.move(towards.x, towards.y, { steps: 10 });
-    await studio.page.waitForFunction(
-      () =>
-        (window as never as { __studio: { app: { view: { lines: { preview: { object: { visible: boolean } } } } } } })
-          .__studio.app.view.lines.preview.object.visible,
-    );
+    await studio.seen('preview');
     await studio.shot('drag');
     expect((await studio.state()).done.length).toBe(4);
     await studio.page.mouse.up();
     await studio.until((s) => s.done.length === 5);
     await studio.idle();
-    const after = await curve(0);
+    const after = await studio.curve(0);
     const moved = Math.hypot(...[0, 1, 2].map((x) => (after[3 * Math.floor(after.length / 6) + x] ?? 0) - at[x]!));
     expect(moved).toBeGreaterThan(0.05);
     await studio.page.keyboard.press('Control+z');
     await studio.until((s) => s.done.length === 4);
     await studio.idle();
-    expect(await curve(0)).toEqual(before);
+    expect(await studio.curve(0)).toEqual(before);
     await studio.close();
   });
 

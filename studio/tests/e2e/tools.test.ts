@@ -1,8 +1,9 @@
-// Every tool and panel by mouse and keys, with a picture of each; and a session that is saved and replayed.
+// Every tool and panel by mouse and keys, with a picture of each; and a session that is saved and replayed. Each test has a
+// program and a folder of its own: none stands on what another has left.
 import { spawnSync } from 'node:child_process';
 import { copyFileSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import { afterEach, beforeEach, describe, expect, it } from 'vitest';
 import { chromiumPath, PROGRAM, Program, SHOTS, Studio, withBrowser } from './harness';
 import { scan, sphere, square } from './shapes';
 
@@ -17,13 +18,6 @@ async function edit(studio: Studio, edit: object): Promise<void> {
   expect(done, JSON.stringify(edit)).toBe(true);
 }
 
-async function curve(studio: Studio, k: number): Promise<number[]> {
-  return studio.page.evaluate(
-    (n) => (window as never as { __studio: { curve(n: number): number[] } }).__studio.curve(n),
-    k,
-  );
-}
-
 const middleOf = (course: number[]) => {
   const k = 3 * Math.floor(course.length / 6);
   return course.slice(k, k + 3);
@@ -31,25 +25,29 @@ const middleOf = (course: number[]) => {
 
 describe.skipIf(!chromiumPath)('tools', () => {
   withBrowser();
-  const program = new Program();
   const { corners, middle } = square();
+  let program: Program;
 
-  beforeAll(async () => {
-    writeFileSync(join(program.folder, 'ball.obj'), sphere(40));
-    writeFileSync(join(program.folder, 'stone.xyz'), scan(6000, 0.004));
-    await program.start('ball.obj');
+  beforeEach(() => {
+    program = new Program();
   });
-  afterAll(async () => {
+  afterEach(async () => {
     await program.end();
     program.remove();
   });
 
-  async function four(): Promise<Studio> {
-    const studio = await Studio.open(program.url);
+  /** A page on a ball. */
+  async function ball(): Promise<Studio> {
+    writeFileSync(join(program.folder, 'ball.obj'), sphere(40));
+    const studio = await Studio.open(await program.start('ball.obj'));
     await studio.until((s) => s.layers.mesh !== undefined);
-    if ((await studio.state()).curves.length === 0) {
-      for (let k = 0; k < 4; k++) await edit(studio, { edit: 'paint', picks: [corners[k], corners[(k + 1) % 4]] });
-    }
+    return studio;
+  }
+
+  /** A page on a ball with four curves that make two patches. */
+  async function four(): Promise<Studio> {
+    const studio = await ball();
+    for (let k = 0; k < 4; k++) await edit(studio, { edit: 'paint', picks: [corners[k], corners[(k + 1) % 4]] });
     await studio.until((s) => s.stages.find((x) => x.name === 'surfaces')?.is === 'fresh');
     await studio.idle();
     return studio;
@@ -59,7 +57,7 @@ describe.skipIf(!chromiumPath)('tools', () => {
     const studio = await four();
     const { page } = studio;
     await page.keyboard.press('h');
-    const course = await curve(studio, 0);
+    const course = await studio.curve(0);
     const n = course.length / 3;
     const at = (share: number) => {
       const k = 3 * Math.round(share * (n - 1));
@@ -78,7 +76,7 @@ describe.skipIf(!chromiumPath)('tools', () => {
     const state = await studio.until((s) => s.done.length === 5);
     expect(state.done[4]!.edit).toBe('drag_curve');
     await studio.idle();
-    const after = await curve(studio, 0);
+    const after = await studio.curve(0);
     const nearest = (p: number[]) => {
       let least = Infinity;
       for (let k = 0; k < after.length; k += 3) {
@@ -98,7 +96,7 @@ describe.skipIf(!chromiumPath)('tools', () => {
     const studio = await four();
     const { page } = studio;
     await page.keyboard.press('b');
-    const before = middleOf(await curve(studio, 1));
+    const before = middleOf(await studio.curve(1));
     await studio.click(before);
     await page.getByText('Drag a handle').waitFor();
     const handle = await page.evaluate(
@@ -114,18 +112,15 @@ describe.skipIf(!chromiumPath)('tools', () => {
     await page.mouse.move(from.x, from.y);
     await page.mouse.down();
     await page.mouse.move(from.x + 0.3 * (to.x - from.x), from.y + 0.3 * (to.y - from.y), { steps: 8 });
-    await page.waitForTimeout(200);
+    await studio.seen('preview');
+    await studio.idle();
     await studio.shot('handles');
     await page.mouse.up();
     const state = await studio.until((s) => s.done.length === 5);
     expect(state.done[4]!.edit).toBe('spline');
     await studio.idle();
-    const after = middleOf(await curve(studio, 1));
+    const after = middleOf(await studio.curve(1));
     expect(Math.hypot(...after.map((x, k) => x - before[k]!))).toBeGreaterThan(0.02);
-    await page.keyboard.press('Escape');
-    await page.keyboard.press('Control+z');
-    await studio.until((s) => s.done.length === 4);
-    await studio.idle();
     await studio.close();
   });
 
@@ -138,7 +133,7 @@ describe.skipIf(!chromiumPath)('tools', () => {
     await page.getByText(/^Distance/).waitFor();
     await studio.shot('measure');
     await page.keyboard.press('f');
-    const [c0, c2] = [middleOf(await curve(studio, 0)), middleOf(await curve(studio, 2))];
+    const [c0, c2] = [middleOf(await studio.curve(0)), middleOf(await studio.curve(2))];
     await studio.click(c0);
     await studio.click(middle);
     await studio.click(c2);
@@ -157,18 +152,22 @@ describe.skipIf(!chromiumPath)('tools', () => {
     await page.keyboard.press('s');
     const inside = await studio.pixel(middle);
     await page.mouse.move(inside.x, inside.y);
-    await page.waitForTimeout(300);
+    await studio.seen('preview');
     await studio.shot('split');
     await page.mouse.click(inside.x, inside.y);
     await studio.until((s) => s.curves.length > 6);
     await page.keyboard.press('x');
-    const target = await studio.pixel(middleOf(await curve(studio, (await studio.state()).curves.length - 1)));
+    // The new curve before the eye; another one goes round behind.
+    const before = (await studio.state()).curves.length;
+    const middles: number[][] = [];
+    for (let k = 0; k < before; k++) middles.push(middleOf(await studio.curve(k)));
+    const away = (p: number[]) => Math.hypot(...p.map((x, k) => x - middle[k]!));
+    const target = await studio.pixel(middles.sort((a, b) => away(a) - away(b))[0]!);
     await page.mouse.move(target.x, target.y);
-    await page.waitForTimeout(200);
+    await studio.seen('erase');
     await studio.shot('delete');
-    await page.keyboard.press('Control+z');
-    await page.keyboard.press('Control+z');
-    await studio.until((s) => s.done.length === 4);
+    await page.mouse.click(target.x, target.y);
+    await studio.until((s) => s.curves.length < before);
     await studio.idle();
     await studio.close();
   });
@@ -203,7 +202,7 @@ describe.skipIf(!chromiumPath)('tools', () => {
     await page.getByRole('tab', { name: 'View' }).click();
     await page.getByText('1 patch hidden.').waitFor();
     await page.getByRole('checkbox', { name: 'Cut the view open' }).check();
-    await page.waitForTimeout(200);
+    await studio.idle();
     await studio.shot('section');
     await page.getByRole('checkbox', { name: 'Cut the view open' }).uncheck();
     await page.getByRole('button', { name: 'Show all patches' }).click();
@@ -216,8 +215,6 @@ describe.skipIf(!chromiumPath)('tools', () => {
     await studio.shot('relief');
     await page.getByRole('radio', { name: 'All waves' }).click();
     await studio.until((s) => s.longest === null);
-    await page.keyboard.press('Control+z');
-    await studio.until((s) => s.done.length === 4);
     await studio.idle();
     await studio.close();
   });
@@ -248,9 +245,6 @@ describe.skipIf(!chromiumPath)('tools', () => {
     await studio.idle();
     await studio.shot('branches');
     await page.getByRole('button', { name: 'Go there' }).first().click();
-    // The way of now may be a part of one that went on.
-    const { done } = await studio.until((s) => s.done.length >= 4 && s.patches.length > 0);
-    if (done.length > 4) await edit(studio, { edit: 'undo', count: done.length - 4 });
     await studio.until((s) => s.done.length === 4 && s.patches.length === 2);
     await studio.idle();
     await studio.close();
@@ -278,9 +272,9 @@ describe.skipIf(!chromiumPath)('tools', () => {
   });
 
   it('look at points, leave some out with a lasso, and make a mesh', async () => {
-    const studio = await Studio.open(program.url);
+    writeFileSync(join(program.folder, 'stone.xyz'), scan(6000, 0.004));
+    const studio = await ball();
     const { page } = studio;
-    await studio.until((s) => s.layers.mesh !== undefined);
     await page.getByRole('button', { name: 'Put the project away' }).click();
     await studio.until((s) => s.project === null);
     await page.locator('input[type=file]').setInputFiles(join(program.folder, 'stone.xyz'));
@@ -317,7 +311,11 @@ describe.skipIf(!chromiumPath)('tools', () => {
   });
 
   it('carry a network over from another project by landmarks', async () => {
-    const studio = await Studio.open(program.url);
+    const other = await four();
+    await other.close();
+    await program.end();
+    writeFileSync(join(program.folder, 'stone.obj'), sphere(30));
+    const studio = await Studio.open(await program.start('stone.obj'));
     const { page } = studio;
     await studio.until((s) => s.layers.mesh !== undefined && s.project?.name === 'stone');
     await studio.idle();
@@ -351,11 +349,8 @@ describe.skipIf(!chromiumPath)('tools', () => {
   });
 
   it('take the demonstration part through the tour of the guide', async () => {
-    const studio = await Studio.open(program.url);
+    const studio = await Studio.open(await program.start());
     const { page } = studio;
-    await studio.until((s) => s.layers.mesh !== undefined);
-    await page.getByRole('button', { name: 'Put the project away' }).click();
-    await studio.until((s) => s.project === null);
     await page.getByRole('button', { name: /^Demonstration part/ }).click();
     await studio.until((s) => s.layers.mesh !== undefined);
     await studio.idle();
@@ -381,7 +376,6 @@ describe.skipIf(!chromiumPath)('tools', () => {
       await page.getByRole('radio', { name: shape, exact: true }).click();
       await page.getByRole('radio', { name: shading, exact: true }).click();
       await studio.idle();
-      await page.waitForTimeout(150);
       await studio.shot(`tour-${shape.toLowerCase().replace(' ', '-')}-${shading.toLowerCase()}`);
     }
     await page.getByRole('radio', { name: 'Surfaces', exact: true }).click();

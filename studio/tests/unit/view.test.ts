@@ -2,7 +2,7 @@
 import { Vector3 } from 'three';
 import { describe, expect, it } from 'vitest';
 import { count, digits, plural } from '../../src/model/format';
-import { pieces, share } from '../../src/view/lines';
+import { pieces, same, share, Thick } from '../../src/view/lines';
 import { Rig } from '../../src/view/rig';
 
 describe('the camera', () => {
@@ -71,6 +71,16 @@ describe('lines', () => {
   it('are cut into pieces per curve', () => {
     expect([...pieces(courses, [1])]).toEqual([5, 5, 5, 6, 5, 5]);
     expect(pieces(courses, [0, 1]).length).toBe(18);
+  });
+
+  it('that are shown already are told from new ones', () => {
+    const line = new Thick('#000000', 2);
+    expect(line.set(new Float32Array())).toBe(false);
+    expect(line.set(new Float32Array([0, 0, 0, 1, 0, 0]))).toBe(true);
+    expect(line.set(new Float32Array([0, 0, 0, 1, 0, 0]))).toBe(false);
+    expect(line.set(new Float32Array([0, 0, 0, 1, 0, 0]), new Float32Array(6))).toBe(true);
+    expect(line.set(new Float32Array())).toBe(true);
+    expect([same(undefined, undefined), same(undefined, new Float32Array())]).toEqual([true, false]);
   });
 
   it('know the share of their length at a place', () => {

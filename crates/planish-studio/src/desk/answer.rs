@@ -185,6 +185,7 @@ impl<'env> Table<'_, '_, 'env> {
             }
             Outcome::Edited(revision, edit, result) => (self.edited(revision, edit, *result, asked), None),
             Outcome::Fitted(result) => (self.fitted(result).map_or_else(Answer::Refused, |()| done()), None),
+            Outcome::Measured(result) => (self.measured(result).map_or_else(Answer::Refused, |()| done()), None),
             Outcome::Exported(Ok(ready)) => {
                 let Some((client, id)) = asked else { return (Answer::Given, None) };
                 let (url, name, bytes) = self.desk.exports.keep(ready);

@@ -11,7 +11,7 @@ use planish::model::{HistoryEntry, Step};
 use planish::observe::Observer;
 
 /// Ways that are kept at most; the oldest goes.
-const BRANCHES: usize = 20;
+const MOST_BRANCHES: usize = 20;
 
 fn path(steps: &[Step]) -> impl Iterator<Item = HistoryEntry> {
     steps.iter().map(|s| s.entry.clone())
@@ -44,7 +44,7 @@ impl Project {
         if !self.branches.iter().any(|b| common(b, &way) == way.len()) {
             self.branches.push(way);
         }
-        if self.branches.len() > BRANCHES {
+        if self.branches.len() > MOST_BRANCHES {
             self.branches.remove(0);
         }
     }

@@ -4,7 +4,7 @@
 use super::Table;
 use super::answer::{Answer, with};
 use super::beside::other;
-use super::jobs::Outcome;
+use super::jobs::{MEASURE, Outcome};
 use super::project::{Fit, NO_PROJECT, deviations};
 use crate::protocol::state::StageName;
 use crate::protocol::{Message, Why};
@@ -15,8 +15,8 @@ use planish::mesh::FacePoint;
 use planish::model::{Drawing, Model};
 use planish::network::Network;
 use planish::observe::{Observer, Silent};
-use planish::pipeline::{self, Earlier, PipelineObserver};
-use planish::surface::Resolution;
+use planish::pipeline::{self, Assessed, PipelineObserver, Quality};
+use planish::surface::{Resolution, measure_seams};
 use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -49,6 +49,7 @@ impl<'env> Table<'_, '_, 'env> {
         }
         let finished = self.project.as_ref().is_some_and(|p| p.is_finished());
         self.desk.jobs.stop_kind("fit");
+        self.desk.jobs.stop_kind(MEASURE);
         if finished && self.desk.live {
             // What cannot be fitted is told by the stage.
             let _ = self.fit();
@@ -147,23 +148,50 @@ impl<'env> Table<'_, '_, 'env> {
         // Grids of other parameters cannot be followed.
         let earlier = project.fit.as_ref().filter(|f| f.coarse == coarse).and_then(|f| f.earlier.clone());
         self.desk.jobs.stop_kind("fit");
+        self.desk.jobs.stop_kind(MEASURE);
+        let adjacency = self.ground.map(|g| &g.canvas.adjacency);
         Ok(self.desk.jobs.start(
             self.scope,
             ("fit", if coarse { "Coarse grids" } else { "Fitting surfaces" }),
             move |watch| {
                 let observer: &dyn PipelineObserver = watch;
                 model.mesh = mesh.as_ref().clone();
-                let made = pipeline::rework(&mut model, earlier.as_ref(), &params, observer);
+                let Some(adjacency) = adjacency else { return Outcome::Fitted(Err(NO_PROJECT.into())) };
+                let made = pipeline::remake(&mut model, adjacency, earlier.as_ref(), &params, observer);
                 model.mesh = Default::default();
-                Outcome::Fitted(made.map_err(|e| e.to_string()).map(|made| {
-                    let earlier = Earlier::of(&model);
-                    let pipeline::Assessed { quality, seams, warnings, .. } = made;
-                    let deviations = deviations(&model);
+                let seams = measure_seams(&model.network, &model.surfaces, watch as &dyn Observer);
+                Outcome::Fitted(made.map_err(|e| e.to_string()).and_then(|made| {
+                    let seams = seams.map_err(|e| e.to_string())?;
+                    let (earlier, deviations) = (made.earlier, deviations(&model));
+                    let (quality, warnings) = (Quality::new(), Vec::new());
                     let (model, short) = (Arc::new(model), None);
-                    Box::new(Fit { revision, model, earlier, quality, seams, warnings, deviations, coarse, short })
+                    Ok(Box::new(Fit { revision, model, earlier, quality, seams, warnings, deviations, coarse, short }))
                 }))
             },
         ))
+    }
+
+    /// Starts to measure what was fitted last, where it is of now and not measured yet. It is shown already.
+    pub(super) fn measure(&mut self) {
+        let Some(project) = self.project else { return };
+        let Some(fit) = project.fit.as_ref().filter(|f| f.revision == project.revision && f.quality.is_empty()) else {
+            return;
+        };
+        let (mesh, fitted) = (Arc::clone(&project.mesh), Arc::clone(&fit.model));
+        self.desk.jobs.stop_kind(MEASURE);
+        self.desk.jobs.start(self.scope, (MEASURE, "Measuring"), move |watch| {
+            let model = Model { mesh: mesh.as_ref().clone(), ..fitted.as_ref().clone() };
+            Outcome::Measured(pipeline::assess(&model, watch).map(Box::new).map_err(|e| e.to_string()))
+        });
+    }
+
+    /// Takes over figures of what was fitted last: measuring is stopped before anything else is fitted.
+    pub(super) fn measured(&mut self, result: Result<Box<Assessed>, String>) -> Result<(), Why> {
+        let Assessed { quality, seams, warnings, .. } = *result.map_err(Why::of)?;
+        if let Some(fit) = self.project.as_mut().and_then(|p| p.fit.as_mut()) {
+            (fit.quality, fit.seams, fit.warnings) = (quality, seams, warnings);
+        }
+        Ok(())
     }
 
     /// Takes over fitted surfaces.
@@ -175,6 +203,7 @@ impl<'env> Table<'_, '_, 'env> {
                 if let Some(project) = self.project {
                     project.fitted(*fit);
                 }
+                self.measure();
                 Ok(())
             }
             Err(why) => {

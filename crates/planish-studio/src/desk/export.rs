@@ -22,8 +22,14 @@ impl<'env> Table<'_, '_, 'env> {
             return self.refuse(client, id, Why::of(why));
         }
         let model = project.whole();
-        let (name, report) = (stem(&project.file), report(project));
+        let (name, mut report) = (stem(&project.file), report(project));
         let job = self.desk.jobs.start(self.scope, ("export", "Writing the file"), move |watch| {
+            if format == Format::Report && report.quality.is_empty() {
+                match pipeline::assess(&model, watch) {
+                    Ok(found) => (report.quality, report.warnings) = (found.quality, found.warnings),
+                    Err(why) => return Outcome::Exported(Err(why.to_string())),
+                }
+            }
             Outcome::Exported(write(&model, format, &name, &report, watch))
         });
         self.wait_for(client, id, job);

@@ -10,13 +10,16 @@ use planish::edit::{ApplyError, Edit, Made};
 use planish::mesh::TriMesh;
 use planish::model::Drawing;
 use planish::observe::Observer;
-use planish::pipeline::{PipelineObserver, PipelineParams, StageRecord};
+use planish::pipeline::{Assessed, PipelineObserver, PipelineParams, StageRecord};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex};
 use std::thread::Scope;
 use std::time::{Duration, Instant};
+
+/// Kind of the jobs that measure what was fitted.
+pub const MEASURE: &str = "measure";
 
 /// Pages hear of the progress of a job this often.
 const TELL_EVERY: Duration = Duration::from_millis(100);
@@ -37,6 +40,8 @@ pub enum Outcome {
     Edited(u64, Edit, Box<Result<(Drawing, Made), ApplyError>>),
     /// Surfaces were fitted.
     Fitted(Result<Box<Fit>, String>),
+    /// What was fitted last was measured.
+    Measured(Result<Box<Assessed>, String>),
     /// A file was made: the request, and where it is fetched.
     Exported(Result<super::exports::Ready, String>),
     /// It came to an end that nobody foresaw.
@@ -56,6 +61,8 @@ struct Running {
 pub struct Jobs {
     post: Sender<Letter>,
     pool: Arc<rayon::ThreadPool>,
+    /// For what nobody waits for: the next fit need not wait until it has stopped.
+    aside: Arc<rayon::ThreadPool>,
     running: Arc<Mutex<Vec<Running>>>,
     last: u32,
 }
@@ -64,9 +71,11 @@ impl Jobs {
     /// No jobs. One core stays for edits.
     pub fn new(post: Sender<Letter>) -> Result<Jobs, StudioError> {
         let threads = rayon::current_num_threads().saturating_sub(1).max(1);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = Arc::new(pool.map_err(|e| StudioError::System(e.to_string()))?);
-        Ok(Jobs { post, pool, running: Arc::default(), last: 0 })
+        let pool = || {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            pool.map(Arc::new).map_err(|e| StudioError::System(e.to_string()))
+        };
+        Ok(Jobs { post, pool: pool()?, aside: pool()?, running: Arc::default(), last: 0 })
     }
 
     /// Starts a job that borrows what lies on the desk.
@@ -111,7 +120,8 @@ impl Jobs {
             told: Mutex::new(Instant::now()),
         };
         self.lock().push(Running { kind, job, asked: None, stop });
-        let (post, pool) = (self.post.clone(), self.pool.clone());
+        let pool = if kind == MEASURE { &self.aside } else { &self.pool };
+        let (post, pool) = (self.post.clone(), pool.clone());
         let whole = move || {
             let made = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&watch))));
             let outcome = made.unwrap_or_else(|panic| {

@@ -137,6 +137,7 @@ impl Desk {
         // Jobs borrow the ground: all have ended when this returns.
         std::thread::scope(|scope| {
             let mut table = Table { desk: self, project, ground, scope };
+            table.measure();
             table.tell_state();
             let next = loop {
                 let Ok(letter) = table.desk.inbox.recv() else { break Content::End };

@@ -15,7 +15,7 @@ use planish::surface::{self, FitError, deviation_of};
 use std::sync::Arc;
 
 /// Texels along a side of a map that is sent, at most: as many as a panel has pixels.
-const TEXELS: usize = 257;
+const MOST_TEXELS: usize = 257;
 const NO_PATCH: &str = "there is no surface of this patch yet - hint: fit surfaces first";
 
 /// One patch fitted alone.
@@ -99,7 +99,7 @@ impl<'env> Table<'_, '_, 'env> {
         let Some(relief) = fit.and_then(|f| f.shown().get(patch as usize)) else {
             return self.refuse(client, id, Why::of(NO_PATCH));
         };
-        let shown = |count: usize| super::tessellate::even(count, TEXELS);
+        let shown = |count: usize| super::tessellate::even(count, MOST_TEXELS);
         let (us, vs) = (shown(relief.cols), shown(relief.rows));
         let at = |i: usize, j: usize| relief.vectors[j * relief.cols + i];
         let heights = vs.iter().flat_map(|&j| us.iter().map(move |&i| at(i, j).z as f32)).collect();

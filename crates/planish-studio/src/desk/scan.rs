@@ -17,7 +17,7 @@ use planish::pipeline::{self, ScanParams};
 use std::sync::Arc;
 
 /// Holes that are told at most.
-const HOLES: usize = 50;
+const MOST_HOLES: usize = 50;
 const NO_SCAN: &str = "there is no scan here - hint: drop one on the page";
 const HAS_CURVES: &str =
     "curves are drawn on the mesh that is there - hint: put the project away and open the scan again";
@@ -180,7 +180,7 @@ pub fn holes(mesh: &TriMesh, adjacency: &Adjacency) -> Vec<state::Hole> {
     };
     let mut found: Vec<state::Hole> = boundary_loops(adjacency).iter().map(hole).collect();
     found.sort_by(|a, b| b.around.total_cmp(&a.around));
-    found.truncate(HOLES);
+    found.truncate(MOST_HOLES);
     found
 }
 

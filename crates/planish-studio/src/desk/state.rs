@@ -14,7 +14,7 @@ use planish::pipeline::worst_seams;
 use std::path::Path;
 
 /// Seams that are told at most.
-const SEAMS: usize = 200;
+const MOST_SEAMS: usize = 200;
 
 impl Table<'_, '_, '_> {
     /// Everything but geometry.
@@ -223,5 +223,5 @@ fn seams(fit: &Fit) -> Vec<Seam> {
         gap: s.gap_max,
         sharp: s.kind != CurveKind::Smooth,
     };
-    worst_seams(&fit.seams).into_iter().take(SEAMS).map(seam).collect()
+    worst_seams(&fit.seams).into_iter().take(MOST_SEAMS).map(seam).collect()
 }

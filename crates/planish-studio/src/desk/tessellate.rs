@@ -16,17 +16,17 @@ const SHARP_DEG: f64 = 40.0;
 /// Triangles of the mesh that is shown while the view moves: twenty pictures a second where a processor draws them.
 const COARSE_TRIANGLES: usize = 80_000;
 /// Points of a scan that are shown at most.
-const POINTS: usize = 300_000;
+const MOST_POINTS: usize = 300_000;
 /// Nodes of all surfaces that are shown at most, and of one surface along a side.
-const NODES: usize = 200_000;
-const SIDE: [usize; 2] = [9, 65];
+const MOST_NODES: usize = 200_000;
+const NODES_PER_SIDE: [usize; 2] = [9, 65];
 /// Iso-curves of a grid in each direction, besides its sides.
-const ISOLINES: usize = 7;
+const ISOLINES_PER_DIRECTION: usize = 7;
 
 /// Points of a scan, as many as can be shown.
 /// * `known` - the same points with what is known of them
 pub fn points(cloud: &Cloud, known: Option<&Cloud>, center: DVec3) -> Arrays {
-    let step = cloud.points.len().div_ceil(POINTS).max(1);
+    let step = cloud.points.len().div_ceil(MOST_POINTS).max(1);
     let mut arrays = Arrays::default();
     let shown = cloud.points.iter().step_by(step);
     arrays.floats("position", 3, shown.flat_map(|p| relative(*p, center)));
@@ -138,7 +138,7 @@ fn lines(lines: impl Iterator<Item = Vec<DVec3>>, center: DVec3) -> Arrays {
 
 /// Nodes of a grid that are shown, along u and along v.
 fn nodes(grid: &Grid, patches: usize) -> [Vec<usize>; 2] {
-    let most = (NODES / patches.max(1)).isqrt().clamp(SIDE[0], SIDE[1]);
+    let most = (MOST_NODES / patches.max(1)).isqrt().clamp(NODES_PER_SIDE[0], NODES_PER_SIDE[1]);
     [grid.cols, grid.rows].map(|count| even(count, most))
 }
 
@@ -237,7 +237,7 @@ fn add_lattices(model: &Model, arrays: &mut Arrays) {
 pub fn isolines(model: &Model, center: DVec3) -> Arrays {
     let each = model.grids.iter().flat_map(|grid| {
         let [us, vs] = nodes(grid, model.grids.len());
-        let [along_u, along_v] = [grid.cols, grid.rows].map(|count| even(count, ISOLINES + 2));
+        let [along_u, along_v] = [grid.cols, grid.rows].map(|count| even(count, ISOLINES_PER_DIRECTION + 2));
         let at = |i: usize, j: usize| grid.points[j * grid.cols + i];
         let of_u = along_v.into_iter().map(|j| us.iter().map(|&i| at(i, j)).collect::<Vec<_>>());
         let of_v = along_u.into_iter().map(|i| vs.iter().map(|&j| at(i, j)).collect::<Vec<_>>());

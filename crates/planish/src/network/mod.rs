@@ -10,7 +10,7 @@ mod reimprint;
 
 pub use diagnose::{Diagnosis, Fault, Region, diagnose, glance};
 pub use imprint::{ImprintError, imprint};
-pub use reimprint::{changed_patches, reimprint};
+pub use reimprint::{changed_patches, reimprint, reimprint_over};
 
 use crate::mesh::{FacePoint, TriMesh};
 use serde::{Deserialize, Serialize};

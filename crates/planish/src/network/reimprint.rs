@@ -38,7 +38,24 @@ pub fn reimprint(
     which: &[usize],
     observer: &dyn Observer,
 ) -> Result<Vec<PatchMesh>, ImprintError> {
-    let faces = around(mesh, adjacency, before);
+    let covered: Vec<u32> = before.iter().flat_map(|p| &p.face_origin).copied().collect();
+    reimprint_over(mesh, adjacency, network, &covered, which, observer)
+}
+
+/// As [`reimprint`], for who knows of the patches as they were only the faces that they covered.
+///
+/// * `covered` - faces of `mesh` under these patches, in any order and as often as one likes
+/// # Errors
+/// As [`imprint`].
+pub fn reimprint_over(
+    mesh: &TriMesh,
+    adjacency: &Adjacency,
+    network: &Network,
+    covered: &[u32],
+    which: &[usize],
+    observer: &dyn Observer,
+) -> Result<Vec<PatchMesh>, ImprintError> {
+    let faces = around(mesh, adjacency, covered);
     let mut own = vec![NONE; mesh.triangles.len()];
     for (i, &f) in faces.iter().enumerate() {
         own[f as usize] = i as u32;
@@ -80,11 +97,11 @@ pub fn reimprint(
     Ok(made)
 }
 
-/// The faces of patches and those that share a vertex with them, rising.
-fn around(mesh: &TriMesh, adjacency: &Adjacency, patches: &[&PatchMesh]) -> Vec<u32> {
+/// Faces and those that share a vertex with them, rising.
+fn around(mesh: &TriMesh, adjacency: &Adjacency, covered: &[u32]) -> Vec<u32> {
     let mut seen = vec![false; mesh.triangles.len()];
     let mut met = vec![false; mesh.points.len()];
-    for &f in patches.iter().flat_map(|p| &p.face_origin) {
+    for &f in covered {
         for v in mesh.triangles[f as usize] {
             if !std::mem::replace(&mut met[v as usize], true) {
                 adjacency.fan(v).for_each(|h| seen[h as usize / 3] = true);
