@@ -4,7 +4,7 @@ use crate::tolerance::{Scale, Tolerance};
 use planish::model::{Model, Units};
 use planish::network::CurveKind;
 use planish::pipeline::{PipelineParams, Warning};
-use planish::surface::deviation_of;
+use planish::surface::{Continuity, deviation_of};
 use planish_io::report::{Report, count, number};
 
 /// Patches beyond this many times the number that was asked for, or below its inverse, are told.
@@ -48,6 +48,30 @@ pub fn tolerance(model: &Model, params: &PipelineParams, share: Option<f64>, sca
         number(rms[worst])
     );
     Some(Warning::new("tolerance_missed", text, format!("patch {worst}")))
+}
+
+/// Code of the warning of [`angle`].
+pub const ANGLE: &str = "angle_missed";
+
+/// Which limit kept the seams from a demanded tolerance of the angle, degrees.
+pub fn angle(report: &Report, params: &PipelineParams, demanded: Option<f64>) -> Option<Warning> {
+    let (wanted, found) = (demanded?, report.figure("seam.regular_angle_max_deg")?);
+    if found <= wanted {
+        return None;
+    }
+    let limit = match params.fit.continuity {
+        Continuity::C0 => "--continuity c0 leaves seams as they are: give g1".to_owned(),
+        _ => format!(
+            "--fit-loss {} is what the fit may lose to it: raise that, or give more control points with --tolerance or --control",
+            params.stitch.fit_loss
+        ),
+    };
+    let text = format!(
+        "Smooth seams miss the angle tolerance of {} degrees with {} beside corners of 25 to 150 degrees: {limit}.",
+        number(wanted),
+        number(found)
+    );
+    Some(Warning::new(ANGLE, text, ""))
 }
 
 /// Why there are far more or fewer patches than were asked for.

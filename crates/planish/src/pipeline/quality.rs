@@ -327,7 +327,12 @@ fn seam_figures(
     length(quality, "seam.gap_max", gap, diagonal);
     let widest = smooth.iter().map(|s| s.angle_max_deg).fold(0.0, f64::max);
     quality.insert("seam.angle_max_deg".into(), Figure::Number(widest));
+    let widest = smooth.iter().map(|s| s.regular_angle_max_deg).fold(0.0, f64::max);
+    quality.insert("seam.regular_angle_max_deg".into(), Figure::Number(widest));
+    let odd: usize = smooth.iter().map(|s| s.odd_ends.iter().filter(|odd| **odd).count()).sum();
+    quality.insert("seam.odd_ends".into(), Figure::Count(odd as u64));
     let inner = inner_angles(model);
+    quality.insert("seam.angle_p95_deg".into(), Figure::Number(angle_p95(model)));
     let inner_of = |s: &SeamQuality| inner.get(&s.curve).map_or(0.0, |found| found.0);
     let widest = smooth.iter().map(|s| inner_of(s)).fold(0.0, f64::max);
     quality.insert("seam.inner_angle_max_deg".into(), Figure::Number(widest));
@@ -350,7 +355,7 @@ fn seam_figures(
         let mut worst: Vec<&&SeamQuality> = smooth.iter().collect();
         worst.sort_by(|a, b| inner_of(b).total_cmp(&inner_of(a)).then(a.curve.cmp(&b.curve)));
         let worst: Vec<String> = worst.iter().take(3).map(|s| s.curve.to_string()).collect();
-        warnings.push(Warning::new("seam_angle", text, format!("curves {}", few(&worst))).with_step("--stiffness 100"));
+        warnings.push(Warning::new("seam_angle", text, format!("curves {}", few(&worst))).with_step("--fit-loss 0.5"));
     }
     Ok(seams)
 }
@@ -376,6 +381,24 @@ pub fn inner_angles(model: &Model) -> BTreeMap<u32, (f64, DVec3)> {
         }
     }
     found
+}
+
+/// The angle that 95 of 100 of the length of all smooth seams do not exceed, degrees; 0 without such seams.
+fn angle_p95(model: &Model) -> f64 {
+    let step = INNER_STEP * model.mesh.bounds().diagonal();
+    if !(step > 0.0) {
+        return 0.0;
+    }
+    let mut places = surface::seam_angles(&model.network, &model.surfaces, step);
+    places.retain(|p| model.network.curves[p.curve as usize].kind == CurveKind::Smooth && p.angle_deg.is_finite());
+    places.sort_by(|a, b| a.angle_deg.total_cmp(&b.angle_deg).then(a.curve.cmp(&b.curve)));
+    let whole: f64 = places.iter().map(|p| p.length).sum();
+    let mut below = 0.0;
+    let reached = places.iter().find(|p| {
+        below += p.length;
+        below >= 0.95 * whole
+    });
+    reached.map_or(0.0, |p| p.angle_deg)
 }
 
 /// A coordinate as a script has it: what is left out is far below what moves a curve.

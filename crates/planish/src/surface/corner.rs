@@ -1,18 +1,15 @@
-//! Tangent planes and curvature where smooth seams meet.
+//! Tangent planes where smooth seams meet.
 //!
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §8.1.3: the control points around a corner
 //! come into one plane, the mean of the tangent planes there.
 //!
-//! Departs from [K98]: feature and boundary curves part a corner into sectors with a plane each; and every sector also
-//! gets one second fundamental form, so that the normals along its seams start with a turn that agrees. Without
-//! that two seams ask different things of the twist control point between them, and the angle stays large near the
-//! corner whatever the resolution.
+//! Departs from [K98]: feature and boundary curves part a corner into sectors with a plane each.
 
 use super::Surface;
 use super::fold::MeanNormals;
 use super::sides::{is_smooth, place};
 use crate::network::Network;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 /// Largest angle between a patch's own normal and the mean of its sector, radians: beyond it (the tip of a sharp
 /// cone) there is no tangent plane, and the corner stays as it is.
@@ -21,50 +18,24 @@ const MOST_SECTOR_ANGLE: f64 = 1.3;
 const SPANNING_SINE: f64 = 0.5;
 /// How far a plane spanned by features may lean from the mean of the tangent planes, cosine.
 const LEAN_COSINE: f64 = 0.8;
-/// Largest turn of the normal within the first knot span, radians: more cannot be told from noise. Seams are not
-/// made to bend by it then, and the normals turn by this much.
-const MOST_SPAN_TURN: f64 = 1.0;
 /// Angles that a patch may have between its sides at a corner within smooth seams, radians: 20 to 160 degrees. At 0 and
 /// 180 it has no normal there, beyond them the normal points inwards.
 const WEDGE: std::ops::RangeInclusive<f64> = 0.35..=2.79;
-/// Weight of "no curvature" in the second fundamental form, against one for each seam: only decides for sectors
-/// too thin to say.
-const CALM: f64 = 1e-6;
-
-/// The tangent plane of a sector with its second fundamental form.
+/// The tangent plane of a sector.
 #[derive(Clone, Debug)]
 pub(crate) struct Plane {
     pub normal: DVec3,
-    axes: [DVec3; 2],
-    /// `L, M, N` in `axes`.
-    form: DVec3,
+    /// Directions in the plane that it may still tilt in: two where smooth seams lead all around, none where sharp
+    /// curves hold it.
+    pub tilts: Vec<DVec3>,
     /// Directions for the ends of curves whose own would leave a patch with an angle below zero or above 180 degrees.
     spread: Vec<((usize, usize), DVec3)>,
-    /// False where the seams bend too fast for their knots to be told how.
-    pub credible: bool,
 }
 
 impl Plane {
-    /// Normal curvature form of a direction: `II(d, d)`.
-    pub fn bend(&self, d: DVec3) -> f64 {
-        let (x, y) = (self.axes[0].dot(d), self.axes[1].dot(d));
-        self.form.dot(DVec3::new(x * x, 2.0 * x * y, y * y))
-    }
-
-    /// How the normal turns along `d`: minus the shape operator.
-    pub fn turn(&self, d: DVec3) -> DVec3 {
-        let (x, y) = (self.axes[0].dot(d), self.axes[1].dot(d));
-        -self.axes[0] * (self.form.x * x + self.form.y * y) - self.axes[1] * (self.form.y * x + self.form.z * y)
-    }
-
     /// The unit direction in which an end of a curve must leave, if its own does not do.
     pub fn direction(&self, curve: usize, end: usize) -> Option<DVec3> {
         self.spread.iter().find(|(e, _)| *e == (curve, end)).map(|(_, d)| *d)
-    }
-
-    /// The part of `d` in the plane.
-    pub fn flatten(&self, d: DVec3) -> DVec3 {
-        d - self.normal * self.normal.dot(d)
     }
 }
 
@@ -76,54 +47,75 @@ pub(crate) struct Planes {
 }
 
 impl Planes {
+    /// Number of planes.
+    pub fn len(&self) -> usize {
+        self.planes.len()
+    }
+
+    /// The plane of this number.
+    pub fn get(&self, number: usize) -> &Plane {
+        &self.planes[number]
+    }
+
+    /// Numbers of the planes at an end.
+    pub fn numbers(&self, curve: usize, end: usize) -> &[usize] {
+        &self.of_end[curve][end]
+    }
+
     /// Planes at an end (0 or 1) of a curve: at most one for a smooth curve, at most two for a feature.
     pub fn at(&self, curve: usize, end: usize) -> impl Iterator<Item = &Plane> {
         self.of_end[curve][end].iter().map(|&s| &self.planes[s])
     }
 }
 
-/// First derivative at an end of a curve, outgoing, and second derivative.
-pub(crate) fn end_derivatives(curve: &[DVec3], end: usize) -> (DVec3, DVec3) {
+/// The direction of a curve at one of its ends, outgoing; its length is that of the first leg of the control polygon.
+pub(crate) fn leg(curve: &[DVec3], end: usize) -> DVec3 {
     let n = curve.len();
-    let c = |k: usize| curve[if end == 0 { k } else { n - 1 - k }];
-    let (first, second) = end_weights(n);
-    (c(0) * first[0] + c(1) * first[1], c(0) * second[0] + c(1) * second[1] + c(2) * second[2])
-}
-
-/// Weights of the first control points in the first and second derivative at an end.
-pub(crate) fn end_weights(n: usize) -> ([f64; 2], [f64; 3]) {
-    let (_, [_, first, second]) = super::basis::basis_at(&super::basis::uniform_knots(n), 0.0);
-    ([first[0], first[1]], [second[0], second[1], second[2]])
+    if end == 0 { curve[1] - curve[0] } else { curve[n - 2] - curve[n - 1] }
 }
 
 /// One patch at one of its corners, seen outgoing.
 struct Wedge {
     /// `(curve, end)` of the two sides that meet.
     ends: [(usize, usize); 2],
-    u: DVec3,
-    v: DVec3,
-    twist: DVec3,
     /// Unit normal, zero where there is none, and the angle between the sides.
     normal: DVec3,
+    /// That of the grid around.
+    grid: DVec3,
     angle: f64,
 }
 
-/// Finds the sectors of all corners and their planes.
-pub(crate) fn planes(network: &Network, surfaces: &[Surface], means: &[MeanNormals], curves: &[Vec<DVec3>]) -> Planes {
-    let wedges: Vec<Wedge> =
-        (0..4 * surfaces.len()).map(|w| wedge(network, &surfaces[w / 4], &means[w / 4], w / 4, w % 4)).collect();
+/// The curve ends of a patch at one of its corners: of the side that starts there, of the one before.
+fn ends(network: &Network, patch: usize, k: usize) -> [(usize, usize); 2] {
+    let (next, before) = (network.patches[patch].sides[k], network.patches[patch].sides[(k + 3) % 4]);
+    [(next.curve as usize, usize::from(next.reversed)), (before.curve as usize, usize::from(!before.reversed))]
+}
+
+/// Patches around a corner, or between two sharp or boundary curves there, with smooth seams between them.
+pub(crate) struct Sector {
+    /// Corner `w % 4` of patch `w / 4`.
+    pub wedges: Vec<usize>,
+    /// Ends of the curves in and beside it, rising.
+    pub ends: Vec<(usize, usize)>,
+    /// True if smooth seams lead all around.
+    pub closed: bool,
+}
+
+/// All sectors with a smooth seam, by their first wedge.
+pub(crate) fn sectors(network: &Network) -> Vec<Sector> {
+    let count = 4 * network.patches.len();
     let mut around: Vec<[Vec<usize>; 2]> = vec![Default::default(); network.curves.len()];
-    for (w, wedge) in wedges.iter().enumerate() {
-        wedge.ends.iter().for_each(|&(c, e)| around[c][e].push(w));
+    for w in 0..count {
+        ends(network, w / 4, w % 4).iter().for_each(|&(c, e)| around[c][e].push(w));
     }
-    let mut root: Vec<usize> = (0..wedges.len()).collect();
+    let mut root: Vec<usize> = (0..count).collect();
     fn find(root: &[usize], mut w: usize) -> usize {
         while root[w] != w {
             w = root[w];
         }
         w
     }
-    let mut joined = vec![false; wedges.len()];
+    let mut joined = vec![false; count];
     for (_, ends) in network.curves.iter().zip(&around).filter(|(c, _)| is_smooth(c)) {
         for list in ends.iter().filter(|list| list.len() > 1) {
             for pair in list.windows(2) {
@@ -134,15 +126,26 @@ pub(crate) fn planes(network: &Network, surfaces: &[Surface], means: &[MeanNorma
             }
         }
     }
-    let mut members: Vec<Vec<usize>> = vec![Vec::new(); wedges.len()];
-    (0..wedges.len()).filter(|&w| joined[w]).for_each(|w| members[find(&root, w)].push(w));
-    let mut found = Planes { planes: Vec::new(), of_end: vec![Default::default(); network.curves.len()] };
-    for sector in members.iter().filter(|m| !m.is_empty()) {
-        let mut ends: Vec<(usize, usize)> = sector.iter().flat_map(|&w| wedges[w].ends).collect();
+    let mut members: Vec<Vec<usize>> = vec![Vec::new(); count];
+    (0..count).filter(|&w| joined[w]).for_each(|w| members[find(&root, w)].push(w));
+    let sector = |wedges: Vec<usize>| {
+        let mut ends: Vec<(usize, usize)> = wedges.iter().flat_map(|&w| ends(network, w / 4, w % 4)).collect();
         ends.sort_unstable();
         ends.dedup();
-        let sector: Vec<&Wedge> = sector.iter().map(|&w| &wedges[w]).collect();
-        if let Some(plane) = plane(network, &sector, &ends, curves) {
+        let closed = ends.iter().all(|&(c, e)| is_smooth(&network.curves[c]) && around[c][e].len() == 2);
+        Sector { wedges, ends, closed }
+    };
+    members.into_iter().filter(|m| !m.is_empty()).map(sector).collect()
+}
+
+/// Finds the sectors of all corners and their planes.
+pub(crate) fn planes(network: &Network, surfaces: &[Surface], means: &[MeanNormals], curves: &[Vec<DVec3>]) -> Planes {
+    let wedges: Vec<Wedge> =
+        (0..4 * surfaces.len()).map(|w| wedge(network, &surfaces[w / 4], &means[w / 4], w / 4, w % 4)).collect();
+    let mut found = Planes { planes: Vec::new(), of_end: vec![Default::default(); network.curves.len()] };
+    for Sector { wedges: members, ends, closed } in sectors(network) {
+        let sector: Vec<&Wedge> = members.iter().map(|&w| &wedges[w]).collect();
+        if let Some(plane) = plane(network, &sector, &ends, closed, curves) {
             for (c, e) in ends {
                 found.of_end[c][e].push(found.planes.len());
             }
@@ -153,19 +156,13 @@ pub(crate) fn planes(network: &Network, surfaces: &[Surface], means: &[MeanNorma
 }
 
 fn wedge(network: &Network, surface: &Surface, means: &MeanNormals, patch: usize, k: usize) -> Wedge {
-    let (next, before) = (network.patches[patch].sides[k], network.patches[patch].sides[(k + 3) % 4]);
     let (u, v) = place(k, false, 0.0);
     let jet = surface.jet(u, v);
     let (to_u, to_v) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
     Wedge {
-        ends: [
-            (next.curve as usize, usize::from(next.reversed)),
-            (before.curve as usize, usize::from(!before.reversed)),
-        ],
-        u: jet.u * to_u,
-        v: jet.v * to_v,
-        twist: jet.uv * to_u * to_v,
+        ends: ends(network, patch, k),
         normal: means.mend(jet.area_vector(), u, v),
+        grid: means.at(u, v),
         angle: jet.area_vector().length().atan2(to_u * to_v * jet.u.dot(jet.v)),
     }
 }
@@ -192,7 +189,7 @@ fn spread(sector: &[&Wedge], normal: DVec3, curves: &[Vec<DVec3>]) -> Vec<((usiz
         .iter()
         .map(|&w| {
             let (c, e) = sector[w].ends[0];
-            let d = end_derivatives(&curves[c], e).0;
+            let d = leg(&curves[c], e);
             normal.dot(x.cross(y)).signum() * d.dot(y).atan2(d.dot(x))
         })
         .collect();
@@ -223,12 +220,25 @@ fn spread(sector: &[&Wedge], normal: DVec3, curves: &[Vec<DVec3>]) -> Vec<((usiz
     ends
 }
 
-fn plane(network: &Network, sector: &[&Wedge], ends: &[(usize, usize)], curves: &[Vec<DVec3>]) -> Option<Plane> {
-    let mean = sector.iter().map(|w| w.normal * w.angle).sum::<DVec3>().try_normalize()?;
+fn plane(
+    network: &Network,
+    sector: &[&Wedge],
+    ends: &[(usize, usize)],
+    closed: bool,
+    curves: &[Vec<DVec3>],
+) -> Option<Plane> {
+    let within = |own: fn(&Wedge) -> DVec3, normal: DVec3| {
+        sector.iter().all(|w| own(w) == DVec3::ZERO || own(w).dot(normal) >= MOST_SECTOR_ANGLE.cos())
+    };
+    let mean_of = |own: fn(&Wedge) -> DVec3| sector.iter().map(|w| own(w) * w.angle).sum::<DVec3>().try_normalize();
+    // A fit may turn over in a corner; its grid then still tells how the surface stands there.
+    let mean = [(|w: &Wedge| w.normal) as fn(&Wedge) -> DVec3, |w: &Wedge| w.grid]
+        .into_iter()
+        .find_map(|own| mean_of(own).filter(|mean| within(own, *mean)))?;
     let tangents: Vec<DVec3> = ends
         .iter()
         .filter(|(c, _)| !is_smooth(&network.curves[*c]))
-        .map(|&(c, e)| end_derivatives(&curves[c], e).0.normalize_or_zero())
+        .map(|&(c, e)| leg(&curves[c], e).normalize_or_zero())
         .collect();
     let normal = match tangents[..] {
         [a, b] => {
@@ -243,38 +253,7 @@ fn plane(network: &Network, sector: &[&Wedge], ends: &[(usize, usize)], curves: 
         }
         _ => mean,
     };
-    if sector.iter().any(|w| w.normal != DVec3::ZERO && w.normal.dot(normal) < MOST_SECTOR_ANGLE.cos()) {
-        return None;
-    }
     let (x, y) = normal.any_orthonormal_pair();
-    let mut plane =
-        Plane { normal, axes: [x, y], form: DVec3::ZERO, spread: spread(sector, normal, curves), credible: true };
-    // Least squares for L, M, N from the seams' normal curvature and the patches' twist.
-    // The form's own norm, L² + 2 M² + N², does not depend on the axes.
-    let (mut matrix, mut rhs) = (DMat3::from_diagonal(DVec3::new(1.0, 2.0, 1.0) * CALM), DVec3::ZERO);
-    let mut row = |a: DVec3, b: DVec3, value: f64| {
-        let scale = a.length() * b.length();
-        if scale > 0.0 {
-            let (a, b) = ((a.dot(x), a.dot(y)), (b.dot(x), b.dot(y)));
-            let row = DVec3::new(a.0 * b.0, a.0 * b.1 + a.1 * b.0, a.1 * b.1) / scale;
-            matrix += DMat3::from_cols(row * row.x, row * row.y, row * row.z);
-            rhs += row * (value / scale);
-        }
-    };
-    for &(c, e) in ends {
-        let (first, second) = end_derivatives(&curves[c], e);
-        row(first, first, normal.dot(second));
-    }
-    for wedge in sector {
-        row(wedge.u, wedge.v, normal.dot(wedge.twist));
-    }
-    plane.form = matrix.inverse() * rhs;
-    // What a noisy or very coarse fit says of curvature may be a fold within its first span.
-    let steepest = ends
-        .iter()
-        .map(|&(c, e)| plane.turn(end_derivatives(&curves[c], e).0).length() / (curves[c].len() - 3) as f64)
-        .fold(0.0, f64::max);
-    plane.credible = steepest <= MOST_SPAN_TURN;
-    plane.form *= (MOST_SPAN_TURN / steepest).min(1.0);
-    plane.form.is_finite().then_some(plane)
+    let tilts = if closed { vec![x, y] } else { Vec::new() };
+    Some(Plane { normal, tilts, spread: spread(sector, normal, curves) })
 }

@@ -18,7 +18,7 @@ const NORMAL_SPANS: f64 = 1.0;
 /// on tight bends, but never by a right angle.
 const FOLD_COSINE: f64 = 0.0;
 /// Cosine below which a surface's normal is not believed when its seams are to follow it.
-const CREDIBLE: f64 = 0.5;
+pub(super) const CREDIBLE: f64 = 0.5;
 /// Relative length of `S_u x S_v` below which there is no normal: corners with an angle of 0 or 180 degrees.
 const FLAT: f64 = 1e-6;
 

@@ -7,6 +7,7 @@
 //! 6. exact mirror images where there is a plane of symmetry - `mirrored`      7. after small edits - `retouch`
 
 pub mod basis;
+mod bend;
 mod corner;
 mod error;
 mod evaluate;
@@ -17,6 +18,7 @@ mod network_fit;
 mod quality;
 mod resolution;
 mod retouch;
+mod ring;
 mod seam_curve;
 mod sides;
 mod stitch;
@@ -27,7 +29,7 @@ pub(crate) use evaluate::RowSampler;
 pub use fit::{FEWEST_CONTROL, fit};
 pub use fold::folds;
 pub use mirrored::mirror_surfaces;
-pub use network_fit::{FitParams, fit_network};
+pub use network_fit::{Continuity, FitParams, fit_network};
 pub use quality::{Deviation, SeamAngle, SeamQuality, deviation, deviation_of, measure_seams, seam_angles};
 pub use resolution::Resolution;
 pub use retouch::retouch;

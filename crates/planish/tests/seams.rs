@@ -1,0 +1,175 @@
+//! Smooth seams around corners of any number of patches, to the tolerance of the angle.
+
+mod patchworks;
+
+use glam::DVec3;
+use patchworks::*;
+use planish::Silent;
+use planish::network::CurveKind;
+use planish::surface::{self, Continuity, FitParams, Resolution, SeamQuality, StitchParams, Surface};
+
+fn params(control: usize, continuity: Continuity) -> FitParams {
+    let resolution = Resolution::Control([control, control]);
+    FitParams { resolution, cells_per_span: 1.0, smoothing: 0.0, continuity }
+}
+
+/// The surfaces as fitted, and with smooth seams.
+fn both(work: &Patchwork, fit: &FitParams, stitch: &StitchParams) -> [Vec<Surface>; 2] {
+    let before = surface::fit_network(&work.network, &work.grids, fit, &Silent).unwrap();
+    let after = surface::stitch(&work.network, &work.grids, &before, stitch, &Silent).unwrap();
+    [before, after]
+}
+
+fn seams(work: &Patchwork, surfaces: &[Surface]) -> Vec<SeamQuality> {
+    let mut seams = surface::measure_seams(&work.network, surfaces, &Silent).unwrap();
+    seams.retain(|s| s.kind == CurveKind::Smooth);
+    seams
+}
+
+/// RMS and largest angle over the length of all smooth seams, and the angle that 95 of 100 of it do not exceed, degrees.
+fn angles(work: &Patchwork, surfaces: &[Surface]) -> [f64; 3] {
+    let all = seams(work, surfaces);
+    let length: f64 = all.iter().map(|s| s.length).sum();
+    let rms = (all.iter().map(|s| s.length * s.angle_rms_deg.powi(2)).sum::<f64>() / length).sqrt();
+    let most = all.iter().map(|s| s.regular_angle_max_deg).fold(0.0, f64::max);
+    let mut places = surface::seam_angles(&work.network, surfaces, length / 5000.0);
+    places.retain(|p| work.network.curves[p.curve as usize].kind == CurveKind::Smooth);
+    places.sort_by(|a, b| a.angle_deg.total_cmp(&b.angle_deg));
+    let p95 = places[places.len() * 95 / 100].angle_deg;
+    [rms, most, p95]
+}
+
+/// An uneven ball from a double pyramid over a polygon, every triangle parted into three patches: corners of 3, 4 and
+/// `sides` patches, at uneven angles.
+fn ball(sides: usize, nodes: usize) -> Patchwork {
+    let rim = |k: usize| {
+        let a = std::f64::consts::TAU * (k % sides) as f64 / sides as f64;
+        DVec3::new((a + 0.1 * (2.0 * a).sin()).cos(), (a + 0.1 * (2.0 * a).sin()).sin(), 0.1 * (3.0 * a).cos())
+    };
+    let mut corners: Vec<DVec3> = vec![DVec3::Z, -DVec3::Z];
+    corners.extend((0..sides).map(rim));
+    let mut middles = std::collections::BTreeMap::new();
+    let mut quads: Vec<[usize; 4]> = Vec::new();
+    for k in 0..sides {
+        let (a, b) = (2 + k, 2 + (k + 1) % sides);
+        for [p, q, r] in [[0, a, b], [1, b, a]] {
+            let centre = corners.len();
+            corners.push((corners[p] + corners[q] + corners[r]) / 3.0);
+            let mut middle = |x: usize, y: usize| {
+                *middles.entry((x.min(y), x.max(y))).or_insert_with(|| {
+                    corners.push((corners[x] + corners[y]) / 2.0);
+                    corners.len() - 1
+                })
+            };
+            let [pq, qr, rp] = [middle(p, q), middle(q, r), middle(r, p)];
+            quads.extend([[p, pq, centre, rp], [q, qr, centre, pq], [r, rp, centre, qr]]);
+        }
+    }
+    let shape = |p: DVec3| {
+        let n = p.normalize();
+        n * (1.0 + 0.08 * (2.0 * n.x + 0.4).sin() * (2.0 * n.y).cos() + 0.05 * n.z * n.x)
+    };
+    let patches: Vec<[(u32, u32); 4]> = quads.iter().map(|q| q.map(|k| (k as u32, 0))).collect();
+    let network = network(corners.len(), &patches, |_, _| CurveKind::Smooth);
+    let mut grids: Vec<_> = quads
+        .iter()
+        .map(|q| {
+            let [a, b, c, d] = q.map(|k| corners[k].normalize());
+            grid(nodes, nodes, |u, v| shape(a.lerp(b, u).lerp(d.lerp(c, u), v)))
+        })
+        .collect();
+    share_boundaries(&network, &mut grids);
+    Patchwork { network, grids }
+}
+
+#[test]
+fn seams_of_uneven_balls_with_corners_of_3_to_8_patches_are_smooth_within_a_tenth_of_a_degree_for_a_tenth_of_the_fit() {
+    for sides in [5, 6, 8] {
+        let work = ball(sides, 33);
+        let [before, after] = both(&work, &params(9, Continuity::G1), &StitchParams::default());
+        let was = angles(&work, &before);
+        let [rms, most, p95] = angles(&work, &after);
+        assert!(rms <= 0.02 && most <= 0.1 && p95 <= 0.05, "{sides}: {was:?} to {rms} {most} {p95} degrees");
+        let (was, is) = (surface::deviation(&before, &work.grids).rms, surface::deviation(&after, &work.grids).rms);
+        assert!(is <= 1.1 * was, "{sides}: RMS {was:e} to {is:e}");
+    }
+}
+
+#[test]
+fn points_of_a_network_of_bicubic_surfaces_come_back_to_rounding() {
+    let cubic = |x: f64, y: f64| {
+        DVec3::new(x + 0.05 * y * y, y - 0.04 * x * x * y, 0.3 * x * x * x - 0.2 * x * y * y + 0.1 * y * y * y * x)
+    };
+    let work = sheet(3, 2, [false, false], [21, 17], |x, y| cubic(x / 2.0, y / 2.0));
+    for continuity in [Continuity::G1, Continuity::G1Double] {
+        let [_, after] = both(&work, &params(6, continuity), &StitchParams::default());
+        assert!(surface::deviation(&after, &work.grids).max < 1e-12);
+        let [_, most, _] = angles(&work, &after);
+        assert!(most < 1e-6, "{most} degrees");
+    }
+}
+
+#[test]
+fn a_smaller_tolerance_of_the_angle_is_met_where_the_fit_can_afford_it() {
+    let work = cube(41, CurveKind::Smooth, to_sphere);
+    for tolerance in [0.1, 0.05, 0.01] {
+        let stitch = StitchParams { angle_tolerance: tolerance, ..StitchParams::default() };
+        let [_, after] = both(&work, &params(18, Continuity::G1), &stitch);
+        let [_, most, _] = angles(&work, &after);
+        assert!(most <= tolerance, "{most} degrees for {tolerance}");
+    }
+}
+
+#[test]
+fn the_fit_loses_no_more_than_it_may_however_small_the_tolerance_of_the_angle() {
+    let work = cube(41, CurveKind::Smooth, blob);
+    let mut last = f64::INFINITY;
+    for fit_loss in [0.02, 0.1, 0.5] {
+        let stitch = StitchParams { angle_tolerance: 1e-3, fit_loss, ..StitchParams::default() };
+        let [before, after] = both(&work, &params(8, Continuity::G1), &stitch);
+        let (was, is) = (surface::deviation(&before, &work.grids).rms, surface::deviation(&after, &work.grids).rms);
+        // Corners come into their planes beforehand.
+        assert!(is <= (1.05 + fit_loss) * was, "RMS {was:e} to {is:e} where {fit_loss} may go");
+        let [rms, _, _] = angles(&work, &after);
+        assert!(rms < last, "{rms} degrees RMS after {last}");
+        last = rms;
+    }
+}
+
+#[test]
+fn double_knots_stand_in_chords_that_end_in_corners_of_other_than_four_patches() {
+    use surface::basis::Knots;
+    let kinds = |work: &Patchwork, continuity| -> Vec<[Option<Knots>; 2]> {
+        let [_, after] = both(work, &params(8, continuity), &StitchParams::default());
+        after.iter().map(|s| [Knots::of(&s.knots_u), Knots::of(&s.knots_v)]).collect()
+    };
+    let (cube, torus) = (cube(33, CurveKind::Smooth, blob), torus(17));
+    assert!(kinds(&cube, Continuity::G1Double).iter().flatten().all(|k| *k == Some(Knots::Double)));
+    assert!(kinds(&cube, Continuity::G1).iter().flatten().all(|k| *k == Some(Knots::Simple)));
+    assert!(kinds(&torus, Continuity::G1Double).iter().flatten().all(|k| *k == Some(Knots::Simple)));
+}
+
+#[test]
+fn with_double_knots_the_angle_around_corners_of_three_patches_falls_below_2_thousandths_of_a_degree() {
+    let work = cube(81, CurveKind::Smooth, to_sphere);
+    let stitch = StitchParams { angle_tolerance: 2e-3, ..StitchParams::default() };
+    let [before, after] = both(&work, &params(26, Continuity::G1Double), &stitch);
+    let [rms, most, _] = angles(&work, &after);
+    assert!(most <= 2e-3 && rms <= 1e-3, "{rms} {most} degrees");
+    let (was, is) = (surface::deviation(&before, &work.grids).rms, surface::deviation(&after, &work.grids).rms);
+    assert!(is <= 1.15 * was, "RMS {was:e} to {is:e}");
+}
+
+#[test]
+fn a_corner_of_more_than_180_degrees_has_no_normal_and_its_seam_is_no_fold() {
+    // A flat sheet whose middle curve leaves its lower end outwards by a little: one patch has more than 180 degrees there.
+    let work = sheet(2, 1, [false, false], [33, 33], |x, y| DVec3::new(x, y, 0.0));
+    let mut surfaces = surface::fit_network(&work.network, &work.grids, &params(8, Continuity::C0), &Silent).unwrap();
+    let beside = DVec3::new(1.02, -0.0005, 0.0);
+    surfaces[0].control[8 + 7] = beside;
+    surfaces[1].control[8] = beside;
+    let all = seams(&work, &surfaces);
+    let [seam] = &all[..] else { panic!("one seam, not {}", all.len()) };
+    assert_eq!(seam.odd_ends, [true, false]);
+    assert!(seam.angle_max_deg < 1e-6, "{seam:?}");
+}
