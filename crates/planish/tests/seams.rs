@@ -173,3 +173,70 @@ fn a_corner_of_more_than_180_degrees_has_no_normal_and_its_seam_is_no_fold() {
     assert_eq!(seam.odd_ends, [true, false]);
     assert!(seam.angle_max_deg < 1e-6, "{seam:?}");
 }
+
+/// Two sheets that meet along `x = 1`, rising from it by `slope(y)` on both sides.
+fn valley(slope: impl Fn(f64) -> f64) -> (Patchwork, Vec<Surface>) {
+    let work = sheet(2, 1, [false, false], [33, 33], |x, y| DVec3::new(x, y, (x - 1.0).abs() * slope(y)));
+    let surfaces = surface::fit_network(&work.network, &work.grids, &params(9, Continuity::C0), &Silent).unwrap();
+    (work, surfaces)
+}
+
+#[test]
+fn the_bound_on_the_angle_of_a_valley_of_constant_slope_is_its_angle_to_1e_6_degrees() {
+    for slope in [0.0, 1e-4, 0.3, 0.9] {
+        let (work, surfaces) = valley(|_| slope);
+        let seam = &seams(&work, &surfaces)[0];
+        let exact = 2.0 * f64::atan(slope).to_degrees();
+        let bound = seam.regular_angle_bound_deg.unwrap();
+        assert!((bound - exact).abs() <= 1e-6, "{bound} for {exact} degrees");
+    }
+}
+
+#[test]
+fn no_angle_between_samples_exceeds_the_bound_and_the_bound_is_within_a_fiftieth_of_the_largest() {
+    let (work, surfaces) = valley(|y| 1e-3 * (9.0 * y).sin() + 5e-4);
+    let seam = &seams(&work, &surfaces)[0];
+    let places = surface::seam_angles(&work.network, &surfaces, seam.length / 20_000.0);
+    let most = places.iter().filter(|p| p.curve == seam.curve).map(|p| p.angle_deg).fold(0.0, f64::max);
+    let bound = seam.regular_angle_bound_deg.unwrap();
+    assert!(most > 0.1 && seam.regular_angle_max_deg <= bound, "{seam:?}");
+    assert!(most <= bound && bound <= 1.021 * most, "{most} {bound} degrees");
+}
+
+#[test]
+fn a_gap_between_samples_is_bounded_by_the_steps_between_control_points() {
+    let (work, mut surfaces) = valley(|_| 0.1);
+    assert!(seams(&work, &surfaces)[0].gap_bound < 1e-15);
+    // The last control point of a row of the first sheet lies on the seam.
+    surfaces[0].control[4 * 9 + 8].z += 0.25;
+    let seam = &seams(&work, &surfaces)[0];
+    assert!(seam.gap_max > 0.1 && seam.gap_max <= seam.gap_bound && seam.gap_bound <= 0.25, "{seam:?}");
+}
+
+#[test]
+fn seams_of_every_direction_and_valence_keep_their_bound() {
+    for work in [ball(5, 17), torus(17), cube(17, CurveKind::Smooth, blob)] {
+        let [_, after] = both(&work, &params(8, Continuity::G1), &StitchParams::default());
+        for seam in seams(&work, &after) {
+            let bound = seam.regular_angle_bound_deg.unwrap();
+            assert!(seam.regular_angle_max_deg <= bound * (1.0 + 1e-9) + 1e-6, "{seam:?}");
+            assert!(bound <= 1.1 * seam.regular_angle_max_deg + 1e-3, "{seam:?}");
+            assert!(seam.gap_bound < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn no_control_point_of_a_seam_that_cannot_be_smooth_moves_farther_than_the_fit_misses() {
+    // A ridge of 60 degrees in one place of a seam that is said to be smooth, beside a form that the fit misses by little.
+    let ridge = |x: f64, y: f64| (1.0 - x).abs() * (1.0 - (4.0 * (y - 0.5)).powi(2)).max(0.0);
+    let form = |x: f64, y: f64| DVec3::new(x, y, 0.02 * (11.0 * x).sin() * (9.0 * y).cos() - 0.6 * ridge(x, y));
+    let work = sheet(2, 1, [false, false], [33, 33], form);
+    let [before, after] = both(&work, &params(11, Continuity::G1), &StitchParams::default());
+    let (was, is) = (surface::deviation(&before, &work.grids), surface::deviation(&after, &work.grids));
+    assert!(is.rms <= 1.1 * was.rms, "RMS {} to {}", was.rms, is.rms);
+    // What a place can afford is at most the mean of what the fit misses there and everywhere.
+    assert!(is.max <= was.max + 1.1 * ((was.max.powi(2) + was.rms.powi(2)) / 2.0).sqrt(), "{} to {}", was.max, is.max);
+    let [_, most, _] = angles(&work, &after);
+    assert!(most > 10.0, "{most} degrees");
+}

@@ -55,7 +55,7 @@ pub const ANGLE: &str = "angle_missed";
 
 /// Which limit kept the seams from a demanded tolerance of the angle, degrees.
 pub fn angle(report: &Report, params: &PipelineParams, demanded: Option<f64>) -> Option<Warning> {
-    let (wanted, found) = (demanded?, report.figure("seam.regular_angle_max_deg")?);
+    let (wanted, found) = (demanded?, report.figure("seam.regular_angle_bound_deg")?);
     if found <= wanted {
         return None;
     }

@@ -325,10 +325,13 @@ fn seam_figures(
     let squares: f64 = smooth.iter().map(|s| s.length * s.angle_rms_deg * s.angle_rms_deg).sum();
     quality.insert("seam.count".into(), Figure::Count(seams.len() as u64));
     length(quality, "seam.gap_max", gap, diagonal);
+    length(quality, "seam.gap_bound", seams.iter().map(|s| s.gap_bound).fold(0.0, f64::max), diagonal);
     let widest = smooth.iter().map(|s| s.angle_max_deg).fold(0.0, f64::max);
     quality.insert("seam.angle_max_deg".into(), Figure::Number(widest));
     let widest = smooth.iter().map(|s| s.regular_angle_max_deg).fold(0.0, f64::max);
     quality.insert("seam.regular_angle_max_deg".into(), Figure::Number(widest));
+    let bound = smooth.iter().filter_map(|s| s.regular_angle_bound_deg).fold(0.0, f64::max);
+    quality.insert("seam.regular_angle_bound_deg".into(), Figure::Number(bound));
     let odd: usize = smooth.iter().map(|s| s.odd_ends.iter().filter(|odd| **odd).count()).sum();
     quality.insert("seam.odd_ends".into(), Figure::Count(odd as u64));
     let inner = inner_angles(model);

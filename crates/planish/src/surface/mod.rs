@@ -8,6 +8,7 @@
 
 pub mod basis;
 mod bend;
+mod certificate;
 mod corner;
 mod error;
 mod evaluate;
@@ -15,6 +16,7 @@ mod fit;
 mod fold;
 mod mirrored;
 mod network_fit;
+mod places;
 mod quality;
 mod resolution;
 mod retouch;

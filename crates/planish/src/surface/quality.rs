@@ -4,6 +4,7 @@
 //! §8.1.1 (normals along a seam; here their angle in degrees).
 
 use super::basis::{BasisRows, uniform_parameters};
+use super::certificate::{Rim, angle_bound, gap_bound};
 use super::sides::place;
 use super::{RowSampler, Surface};
 use crate::geom::polyline;
@@ -58,7 +59,7 @@ fn summary(mut distances: Vec<f64>) -> Deviation {
     Deviation { max, rms, p95: *p95 }
 }
 
-fn distances(surface: &Surface, grid: &Grid) -> Vec<f64> {
+pub(super) fn distances(surface: &Surface, grid: &Grid) -> Vec<f64> {
     let along_u = [BasisRows::new(&surface.knots_u, &uniform_parameters(grid.cols), 0)];
     let sampler = RowSampler::new(surface, &along_u);
     let mut out = vec![0.0; grid.points.len()];
@@ -83,11 +84,16 @@ pub struct SeamQuality {
     pub kind: CurveKind,
     /// Largest distance between the two boundaries at equal parameters, world units.
     pub gap_max: f64,
+    /// What that distance nowhere exceeds, between samples neither.
+    pub gap_bound: f64,
     /// Largest angle between the two normals, ends included, degrees.
     pub angle_max_deg: f64,
     /// The same without the first knot span beside corners of less than 25 or more than 150 degrees, and without places
     /// where a surface has no normal.
     pub regular_angle_max_deg: f64,
+    /// What that angle nowhere exceeds, between samples neither; at most a fiftieth above the largest. `None` for a seam that is
+    /// meant to have an angle.
+    pub regular_angle_bound_deg: Option<f64>,
     /// Ends at which a patch has such a corner.
     pub odd_ends: [bool; 2],
     /// Root of the mean square of the angle over the length of the seam, degrees.
@@ -210,6 +216,18 @@ fn measure(network: &Network, surfaces: &[Surface], curve: usize, uses: [(u32, u
         !(odd_ends[0] && t < first_span || odd_ends[1] && 1.0 - t < first_span)
     };
     let regular_angle_max = (0..=last).filter(regular).filter_map(angle).fold(0.0, f64::max);
+    let rims = uses.map(|(p, k)| {
+        let side = network.patches[p as usize].sides[k as usize];
+        Rim::new(&surfaces[p as usize], k as usize, side.reversed)
+    });
+    let range = [if odd_ends[0] { first_span } else { 0.0 }, if odd_ends[1] { 1.0 - first_span } else { 1.0 }];
+    let kind = network.curves[curve].kind;
+    let bound = match (kind, range[0] < range[1]) {
+        (CurveKind::Smooth, true) => Some(angle_bound(&rims, range, regular_angle_max.to_radians()).to_degrees()),
+        // A seam of one span between two such corners.
+        (CurveKind::Smooth, false) => Some(0.0),
+        _ => None,
+    };
     let (mut length, mut known, mut squares, mut sum) = (0.0, 0.0, 0.0, 0.0);
     for middle in (1..last).step_by(2) {
         let chord = jets[middle - 1][0].point.distance(jets[middle + 1][0].point);
@@ -223,10 +241,12 @@ fn measure(network: &Network, surfaces: &[Surface], curve: usize, uses: [(u32, u
     let known = if known > 0.0 { known } else { 1.0 };
     SeamQuality {
         curve: curve as u32,
-        kind: network.curves[curve].kind,
+        kind,
         gap_max,
+        gap_bound: gap_bound(&rims),
         angle_max_deg: angle_max,
         regular_angle_max_deg: regular_angle_max,
+        regular_angle_bound_deg: bound,
         odd_ends,
         angle_rms_deg: (squares / known).sqrt(),
         angle_mean_deg: sum / known,

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! The angle is linearised (Gauss-Newton) and the weight of a seam is raised while it misses the tolerance and its
-//! patches can afford it. Control points next to a corner move as one plane. Departs from [K98], which moves every control
+//! patches can afford it. No control point moves by more than its place can afford ([`Places`]). Control points next to a corner move as one plane. Departs from [K98], which moves every control
 //! point of a seam onto the line between its neighbours: around corners of other than four patches that cannot be.
 
 use super::basis::{Knots, uniform_parameters};
@@ -19,10 +19,12 @@ use super::corner::{Plane, Planes, leg, planes};
 use super::fit::{Directions, project_net, solve_inside, surface_of};
 use super::fold::{MeanNormals, folds};
 use super::network_fit::{fill, patch_directions};
+use super::places::Places;
+use super::quality::distances;
 use super::ring::Condensed;
 use super::seam_curve::constrain;
 use super::sides::{along_curve, check, check_grids, diagonal, is_smooth, knots, node, side_len};
-use super::{FitError, Surface, deviation_of};
+use super::{FitError, Surface};
 use crate::grid::Grid;
 use crate::linalg::SparseCholesky;
 use crate::network::{CurveKind, Network, Patch};
@@ -42,6 +44,8 @@ const SPAN_SAMPLES: usize = 5;
 /// Rounds of the system: a Gauss-Newton step doubles the digits, so three settle it once weights stay.
 const FEWEST_ROUNDS: usize = 3;
 const ROUNDS: usize = 20;
+/// Rounds at the end, in which no weight of a seam is raised any more.
+const LAST_ROUNDS: usize = 8;
 /// Weights of a seam: at 1 the tolerance of the angle all along it costs what its patches can afford to lose. It begins where
 /// the angles of a fit (degrees where the tolerance is hundredths) cost no more than that, and ends where the angle is in
 /// effect a condition.
@@ -57,6 +61,11 @@ const HELPS: f64 = 0.95;
 const RMS_SHARE: f64 = 0.4;
 /// How often its share of the loss a single patch may lose while the whole has not lost its own.
 const LOCAL: f64 = 2.0;
+/// How often its share a single place may lose: at a share of a fifth it moves by about what the fit misses there anyhow.
+const PLACE: f64 = 4.0;
+/// What a place may lose however near the fit is there, of the diagonal: a hundredth of what a fit misses by default. Corners of
+/// other than four patches ask single control points for more than the rest, and of a fit that near nobody sees it.
+const NEGLIGIBLE: f64 = 1e-5;
 /// What the weights around a folded patch are lowered by, and how often.
 const EASE: f64 = 0.1;
 const EASINGS: usize = 4;
@@ -373,6 +382,7 @@ struct System<'a> {
     nets: Vec<Vec<DVec3>>,
     /// For each patch the squared move that it can afford, times its nodes.
     afford: Vec<f64>,
+    places: Vec<Places>,
     share: f64,
     /// For each unknown one over the square of the move that is as long as the way to the next row of control points.
     holds: Vec<f64>,
@@ -386,27 +396,51 @@ impl<'a> System<'a> {
             (shape, Arc::new(Condensed::new(along_u, along_v)))
         };
         let condensed: BTreeMap<_, Arc<Condensed>> = shapes.into_iter().map(one).collect();
-        let condensed = (0..filled.len()).map(|p| condensed[&shape(work, p)].clone()).collect();
+        let condensed: Vec<Arc<Condensed>> = (0..filled.len()).map(|p| condensed[&shape(work, p)].clone()).collect();
         let (unknowns, motions) = motions(work, filled, curves);
         let nets = filled.iter().map(|f| f.surface.control.clone()).collect();
         let nodes = |p: usize| work.grids[p].points.len() as f64;
-        let squares: Vec<f64> = (work.surfaces.par_iter().zip(work.grids))
-            .map(|(s, g)| deviation_of(s, g).rms.powi(2) * g.points.len() as f64)
+        let at_nodes: Vec<Vec<f64>> = (work.surfaces.par_iter().zip(work.grids))
+            .map(|(s, g)| distances(s, g).into_iter().map(|d| d * d).collect())
             .collect();
+        let squares: Vec<f64> = at_nodes.iter().map(|squares| squares.iter().sum()).collect();
         let count: f64 = (0..filled.len()).map(nodes).sum();
         let mean = squares.iter().sum::<f64>() / count + (EXACT * diagonal(work.grids)).powi(2);
         let afford = (0..filled.len()).map(|p| (squares[p] + mean * nodes(p)) / 2.0).collect();
         let share = (1.0 + params.fit_loss).powi(2) - 1.0;
+        let negligible = (NEGLIGIBLE * diagonal(work.grids)).powi(2);
+        let places = |p: usize| {
+            let cols = work.grids[p].cols;
+            let allowed = |around: f64| PLACE * share * (around + mean) / 2.0 + negligible;
+            Places::new(&work.surfaces[p], &at_nodes[p], cols, &condensed[p], allowed)
+        };
+        let places = (0..filled.len()).into_par_iter().map(places).collect();
         let holds = holds(filled, unknowns, &motions);
         let wishes = wishes(work, curves, params);
-        System { work, filled, condensed, unknowns, motions, wishes, nets, afford, share, holds }
+        System { work, filled, condensed, unknowns, motions, wishes, nets, afford, places, share, holds }
+    }
+
+    /// Moves of the outer control points of a patch.
+    fn moves(&self, p: usize) -> Vec<DVec3> {
+        let from = &self.filled[p].surface.control;
+        self.condensed[p].outer.iter().map(|&c| self.nets[p][c] - from[c]).collect()
+    }
+
+    /// True if no place has lost more than it may.
+    fn places_keep(&self) -> bool {
+        (0..self.nets.len()).into_par_iter().all(|p| self.places[p].keep(&self.moves(p)))
+    }
+
+    /// Changes the weights of all places by what they lost.
+    fn weigh(&mut self) {
+        let moves: Vec<Vec<DVec3>> = (0..self.nets.len()).into_par_iter().map(|p| self.moves(p)).collect();
+        self.places.par_iter_mut().zip(&moves).for_each(|(places, moves)| places.weigh(moves));
     }
 
     /// Squared move of a patch over what it can afford.
     fn cost(&self, p: usize) -> f64 {
         let condensed = &self.condensed[p];
-        let from = &self.filled[p].surface.control;
-        let moves: Vec<DVec3> = condensed.outer.iter().map(|&c| self.nets[p][c] - from[c]).collect();
+        let moves = self.moves(p);
         let row = |r: usize| moves[r].dot(condensed.row(r).iter().zip(&moves).map(|(k, m)| *m * *k).sum());
         (0..moves.len()).map(row).sum::<f64>() / self.afford[p]
     }
@@ -454,16 +488,21 @@ impl<'a> System<'a> {
             if !raised && round + 1 >= FEWEST_ROUNDS {
                 break;
             }
+            self.weigh();
         }
-        // The last raise may have cost more than there was.
-        for _ in 0..ROUNDS {
-            if self.spent() <= self.share {
+        // The last raises may have cost more than there was, in the whole or in some places.
+        for round in 0..ROUNDS {
+            let spent = self.spent() > self.share;
+            if !spent && (round >= LAST_ROUNDS || self.places_keep()) {
                 break;
             }
             observer.check()?;
-            for wish in &mut self.wishes {
-                wish.weight /= RAISE.sqrt();
+            if spent {
+                for wish in &mut self.wishes {
+                    wish.weight /= RAISE.sqrt();
+                }
             }
+            self.weigh();
             self.step(observer)?;
         }
         Ok(())
@@ -497,7 +536,6 @@ impl<'a> System<'a> {
     /// The part of the normal equations that one patch adds.
     fn fit_terms(&self, p: usize) -> Terms {
         let (condensed, motions) = (&self.condensed[p], &self.motions[p]);
-        let from = &self.filled[p].surface.control;
         let all = condensed.outer.iter().flat_map(|&c| terms(&motions[c])).map(|(k, _)| k);
         let mut sums = Sums::new(all.collect());
         let ranked: Vec<Vec<(usize, DVec3)>> = condensed
@@ -505,14 +543,16 @@ impl<'a> System<'a> {
             .iter()
             .map(|&c| terms(&motions[c]).map(|(k, way)| (sums.rank(k), way / self.afford[p].sqrt())).collect())
             .collect();
-        let moves: Vec<DVec3> =
-            condensed.outer.iter().map(|&c| (self.nets[p][c] - from[c]) / self.afford[p].sqrt()).collect();
+        let moves: Vec<DVec3> = self.moves(p).into_iter().map(|m| m / self.afford[p].sqrt()).collect();
+        let mut row = Vec::new();
         for (r, own) in ranked.iter().enumerate().filter(|(_, own)| !own.is_empty()) {
-            let row = condensed.row(r);
-            let force: DVec3 = moves.iter().zip(row).map(|(m, k)| *m * *k).sum();
+            row.clear();
+            row.extend_from_slice(condensed.row(r));
+            row[r] *= self.places[p].weights[r];
+            let force: DVec3 = moves.iter().zip(&row).map(|(m, k)| *m * *k).sum();
             for &(a, way) in own {
                 sums.rhs[a] -= way.dot(force);
-                for (others, k) in ranked.iter().zip(row) {
+                for (others, k) in ranked.iter().zip(&row) {
                     for &(b, other) in others.iter().filter(|(b, _)| *b <= a) {
                         sums.add(a, b, k * way.dot(other));
                     }
@@ -563,6 +603,7 @@ impl<'a> System<'a> {
         for wish in &mut self.wishes {
             (wish.weight, wish.last) = (FIRST_WEIGHT.min(wish.ceiling), f64::INFINITY);
         }
+        self.places.iter_mut().for_each(Places::reset);
         self.nets = self.filled.iter().map(|f| f.surface.control.clone()).collect();
     }
 
