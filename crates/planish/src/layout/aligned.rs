@@ -167,10 +167,9 @@ impl AlignError {
 /// Numbers of squares that are tried, in those of the coarsest network: as few as the form needs.
 const GROWTH: [f64; 8] = [1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0, 11.3];
 
-/// More squares than this are not tried where nobody asked for them, unless lines and cones alone need nearly as many: up to
-/// [`GROWTH_ANYHOW`] times the coarsest number are.
+/// More squares than this are not tried where nobody asked for them: where lines and cones alone need more, the partition
+/// does with fewer.
 const MOST_UNASKED: f64 = 300.0;
-const GROWTH_ANYHOW: f64 = 2.0;
 
 /// Numbers that are tried in place of one that was asked for and that the form does not allow.
 const NEAR_ASKED: [f64; 4] = [1.0, 1.1, 0.9, 1.2];
@@ -269,8 +268,11 @@ impl Aligned {
                 Err(e) => return Ok((None, Some(e.into()))),
             };
             let least = whole.squares as f64;
+            if least > MOST_UNASKED && !params.coarsest {
+                return Ok((None, Some(AlignError::Count { found: whole.squares })));
+            }
             coarsest = Some(whole);
-            let most = if params.coarsest { least } else { MOST_UNASKED.max(GROWTH_ANYHOW * least) };
+            let most = if params.coarsest { least } else { MOST_UNASKED };
             GROWTH.map(|growth| growth * least).into_iter().filter(|n| *n <= most).map(|n| n as usize).collect()
         };
         for (i, &squares) in tried.iter().enumerate() {
