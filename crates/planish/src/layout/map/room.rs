@@ -9,7 +9,8 @@ use crate::network::field::CrossField;
 use crate::network::field::cones::Matching;
 use std::collections::{HashMap, VecDeque};
 
-/// Rings around the way of a cone in which the field is made smooth again.
+/// Rings around the way of a cone in which the field is made smooth again: some times the way, which is one or two edges. A
+/// choice, not measured.
 const SMOOTHED_RINGS: usize = 5;
 
 /// Sweeps of making it smooth: each face takes the mean of its neighbours, and what was turned by a quarter is spread over

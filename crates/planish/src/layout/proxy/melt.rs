@@ -34,7 +34,8 @@ const FLAT_COSINE: f64 = 0.9;
 /// Greatest turn of a line at a vertex, radians: a circle keeps eleven.
 const LINE_TURN: f64 = 0.61;
 
-/// Teeth of lines that are no higher than this, in wanted edges, go: rims of scans are jagged.
+/// Teeth of lines that are no higher than this, in wanted edges, go: rims of scans are jagged. Chosen on scans at .25 % noise,
+/// where a tenth left teeth of the noise's height.
 const LINE_DETAIL: f64 = 0.25;
 
 /// Greatest number of neighbours.
