@@ -2,6 +2,7 @@
 //!
 //! `docs/methods/layout.md`, step 3.
 
+use super::conformal;
 use super::room::Room;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::field::CrossField;
@@ -24,6 +25,8 @@ pub(in crate::layout) struct Charts {
     pub sectors: Vec<(Sector, i32)>,
     /// Cones of the field that stand beside a line or another cone ([`Room`]).
     pub tight: Vec<u32>,
+    /// For each face how much a map along the field stretches it ([`conformal`]).
+    pub scale: Vec<f64>,
 }
 
 impl Charts {
@@ -40,6 +43,7 @@ impl Charts {
             room.move_off(&tight, field, &mut matching, &mut index, &mut theta);
         }
         let Matching { turns, drift } = matching;
+        let scale = conformal::scales(mesh, adjacency, lines, &drift);
         let mut jump: Vec<u8> = turns.iter().map(|t| (4 - t) % 4).collect();
         let width = |s: &Sector| {
             let drift: f64 = s.spokes[1..].iter().map(|&h| drift[adjacency.opposite[h as usize] as usize]).sum();
@@ -56,7 +60,7 @@ impl Charts {
         }
         let axis = theta.iter().zip(&turned).map(|(theta, &m)| theta + f64::from(m) * FRAC_PI_2).collect();
         let cut = prune(mesh, adjacency, &jump, &index, &tree);
-        Charts { axis, jump, cut, index, sectors, tight }
+        Charts { axis, jump, cut, index, sectors, tight, scale }
     }
 
     /// Vertices where a map has to have a corner of a patch: cones, and places where lines end, meet or turn.

@@ -12,8 +12,26 @@ use rayon::prelude::*;
 /// Weight of the change of area beside the change of angles in [`Maps::barrier`] (the authors' choice is a half or less).
 const AREA_WEIGHT: f64 = 0.3;
 
-/// Weight of what follows the field closely: the rest is bent a hundred times as easily.
-const CLOSELY: f64 = 100.0;
+/// Weight of the field's directions in [`Maps::barrier`]: enough to keep isolines along it where nothing is folded.
+const HOLD: f64 = 0.5;
+
+/// A variable that has to stay positive, as barriers see it.
+struct Guarded {
+    /// Nearly the variable where it is positive, finite and positive where it is not; comes nearer with less softness.
+    chi: f64,
+    /// Change of `chi` with the variable.
+    slope: f64,
+}
+
+impl Guarded {
+    /// Garanzha et al. 2021, eq. 3; `None` where no softness is left for a variable that is not positive.
+    fn new(x: f64, softness: f64) -> Option<Guarded> {
+        let root = (softness * softness + x * x).sqrt();
+        // Without cancellation where the variable is negative.
+        let chi = if x > 0.0 { (x + root) / 2.0 } else { softness * softness / (2.0 * (root - x)) };
+        (chi > 0.0).then(|| Guarded { chi, slope: chi / root })
+    }
+}
 
 /// The faces of a mesh as they are mapped.
 pub(super) struct Maps<'a> {
@@ -23,11 +41,14 @@ pub(super) struct Maps<'a> {
     gradient: Vec<[DVec2; 3]>,
     /// Areas as parts of the whole.
     share: Vec<f64>,
+    /// Whether the barrier keeps every face within a quarter turn of its field, too.
+    within_quarter: bool,
 }
 
 impl<'a> Maps<'a> {
     /// * `scale` - units of the map for a world unit
-    pub fn new(mesh: &TriMesh, charts: &Charts, seams: &'a Seams, scale: f64) -> Maps<'a> {
+    /// * `within_quarter` - whether the barrier keeps every face within a quarter turn of its field, too
+    pub fn new(mesh: &TriMesh, charts: &Charts, seams: &'a Seams, scale: f64, within_quarter: bool) -> Maps<'a> {
         let faces = mesh.triangles.len();
         let area: Vec<f64> = (0..faces).map(|f| mesh.area(f)).collect();
         let whole: f64 = area.iter().sum();
@@ -40,7 +61,8 @@ impl<'a> Maps<'a> {
             [c - b, a - c, b - a].map(|edge| back.rotate(edge.perp()) / double)
         };
         let gradient = (0..faces).map(gradient).collect();
-        Maps { seams, gradient, share: area.iter().map(|a| a.max(least) / whole).collect() }
+        let share = area.iter().map(|a| a.max(least) / whole).collect();
+        Maps { seams, gradient, share, within_quarter }
     }
 
     /// Jacobian of face `f`, columns along and across its field, from the corners of all faces.
@@ -83,29 +105,19 @@ impl<'a> Maps<'a> {
         SparseCholesky::factor(self.seams.free(), &entries.concat()).ok()
     }
 
-    /// The free unknowns of the map that follows the field best: the gradients of u and v are its two directions.
-    pub fn follow(&self, laplacian: &SparseCholesky) -> Vec<f64> {
-        self.following(&self.share, laplacian)
-    }
-
-    /// The least of `sum weight |J - I|^2`, from its system.
-    fn following(&self, weight: &[f64], system: &SparseCholesky) -> Vec<f64> {
+    /// The free unknowns of the map that follows the field best if each face is stretched by its scale. What a face misses
+    /// counts as a part of its scale. `None` if the equations have no one answer.
+    pub fn follow(&self, scale: &[f64]) -> Option<Vec<f64>> {
+        let weight: Vec<f64> = self.share.iter().zip(scale).map(|(share, s)| share / (s * s)).collect();
         let none = self.seams.coordinates(&vec![0.0; self.seams.free()]);
         let mut gradient = vec![0.0; none.len()];
         for f in 0..self.gradient.len() {
-            let miss = weight[f] * (DMat2::IDENTITY - self.jacobian(f, &none));
-            self.add(f, miss, &mut gradient);
+            let miss = DMat2::from_diagonal(DVec2::splat(scale[f])) - self.jacobian(f, &none);
+            self.add(f, weight[f] * miss, &mut gradient);
         }
         let mut free = self.seams.pull_back(&gradient);
-        system.solve(&mut free);
-        free
-    }
-
-    /// As [`Maps::follow`], but follows the field much closer on the faces that are `held`. `None` if the equations have no one
-    /// answer.
-    pub fn follow_closely(&self, held: &[bool]) -> Option<Vec<f64>> {
-        let weight: Vec<f64> = self.share.iter().zip(held).map(|(s, h)| if *h { CLOSELY * s } else { *s }).collect();
-        Some(self.following(&weight, &self.system(&weight)?))
+        self.system(&weight)?.solve(&mut free);
+        Some(free)
     }
 
     /// The free unknowns of the smoothest shift of the map that has these coordinates where all that is free is zero.
@@ -139,27 +151,15 @@ impl<'a> Maps<'a> {
     ///
     /// Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov, *Foldover-free Maps in 50 Lines of Code*, 2021, eq. 2 to 4:
     /// with `chi(det)` in place of the determinant the energy is finite on flipped faces, too, and comes nearer to the true one
-    /// as `softness` goes to 0. `hold` is the weight of the field's directions.
-    pub fn barrier(&self, x: &[f64], softness: f64, hold: f64) -> (f64, Vec<f64>) {
-        let each = |f: usize| {
-            let j = self.jacobian(f, x);
-            let det = j.determinant();
-            let root = (softness * softness + det * det).sqrt();
-            // Without cancellation where the determinant is negative.
-            let chi = if det > 0.0 { (det + root) / 2.0 } else { softness * softness / (2.0 * (root - det)) };
-            if chi <= 0.0 {
-                return (f64::INFINITY, DMat2::ZERO);
-            }
-            let chi_by_det = chi / root;
-            let squares = j.x_axis.length_squared() + j.y_axis.length_squared();
-            let shape = (squares + AREA_WEIGHT * (det * det + 1.0)) / (2.0 * chi);
-            let by_det = AREA_WEIGHT * det / chi - shape / chi * chi_by_det;
-            let cofactor = DMat2::from_cols(DVec2::new(j.y_axis.y, -j.y_axis.x), DVec2::new(-j.x_axis.y, j.x_axis.x));
-            let off = j - DMat2::IDENTITY;
-            let miss = off.x_axis.length_squared() + off.y_axis.length_squared();
-            let by_jacobian = j * (1.0 / chi) + cofactor * by_det + off * (2.0 * hold);
-            (self.share[f] * (shape + hold * miss), self.share[f] * by_jacobian)
-        };
+    /// as `softness` goes to 0.
+    ///
+    /// Upright faces alone may still wind around a vertex twice, or run back along a line. Where they do, some are turned
+    /// half around against the field; while the trace of every Jacobian is positive none is. So the trace has a barrier of
+    /// the same form, least at the identity, if the map is to stay within a quarter turn.
+    pub fn barrier(&self, x: &[f64], softness: f64) -> (f64, Vec<f64>) {
+        let each = |f: usize| self.face_barrier(&self.jacobian(f, x), softness);
+        let infinite = (f64::INFINITY, DMat2::ZERO);
+        let each = |f: usize| each(f).map_or(infinite, |(e, by)| (self.share[f] * e, self.share[f] * by));
         let parts: Vec<(f64, DMat2)> = (0..self.gradient.len()).into_par_iter().with_min_len(512).map(each).collect();
         let mut gradient = vec![0.0; x.len()];
         let mut energy = 0.0;
@@ -170,13 +170,36 @@ impl<'a> Maps<'a> {
         (energy, self.seams.pull_back(&gradient))
     }
 
-    /// Least determinant of all Jacobians.
-    pub fn least_determinant(&self, x: &[f64]) -> f64 {
-        (0..self.gradient.len())
-            .into_par_iter()
-            .with_min_len(512)
-            .map(|f| self.jacobian(f, x).determinant())
-            .reduce(|| f64::INFINITY, f64::min)
+    /// The energy of a face by its area, and its gradient by the Jacobian; `None` if it is infinite.
+    fn face_barrier(&self, j: &DMat2, softness: f64) -> Option<(f64, DMat2)> {
+        let det = j.determinant();
+        let Guarded { chi, slope } = Guarded::new(det, softness)?;
+        let squares = j.x_axis.length_squared() + j.y_axis.length_squared();
+        let shape = (squares + AREA_WEIGHT * (det * det + 1.0)) / (2.0 * chi);
+        let by_det = AREA_WEIGHT * det / chi - shape / chi * slope;
+        let cofactor = DMat2::from_cols(DVec2::new(j.y_axis.y, -j.y_axis.x), DVec2::new(-j.x_axis.y, j.x_axis.x));
+        let off = *j - DMat2::IDENTITY;
+        let miss = off.x_axis.length_squared() + off.y_axis.length_squared();
+        let mut energy = shape + HOLD * miss;
+        let mut by_jacobian = *j * (1.0 / chi) + cofactor * by_det + off * (2.0 * HOLD);
+        if self.within_quarter {
+            let half = half_trace(j);
+            let Guarded { chi, slope } = Guarded::new(half, softness)?;
+            let turning = (half * half + 1.0) / (2.0 * chi);
+            energy += turning;
+            by_jacobian += DMat2::from_diagonal(DVec2::splat((half - turning * slope) / (2.0 * chi)));
+        }
+        Some((energy, by_jacobian))
+    }
+
+    /// Least of what the barrier guards: determinants of all Jacobians, and half their traces.
+    pub fn least_guarded(&self, x: &[f64]) -> f64 {
+        let least = |f: usize| {
+            let j = self.jacobian(f, x);
+            let turn = if self.within_quarter { half_trace(&j) } else { f64::INFINITY };
+            j.determinant().min(turn)
+        };
+        (0..self.gradient.len()).into_par_iter().with_min_len(512).map(least).reduce(|| f64::INFINITY, f64::min)
     }
 
     /// Mean over the surface of the angle between the isolines of the map and the field, degrees.
@@ -190,4 +213,8 @@ impl<'a> Maps<'a> {
         };
         (0..self.gradient.len()).map(each).sum()
     }
+}
+
+fn half_trace(j: &DMat2) -> f64 {
+    (j.x_axis.x + j.y_axis.y) / 2.0
 }

@@ -28,25 +28,24 @@ const HALVINGS: usize = 30;
 /// A step that gains less than this part of the energy ends the round.
 const SETTLED: f64 = 1e-5;
 
-/// Moves the free unknowns until no face is flipped; true if that is reached.
+/// Moves the free unknowns until all that the barrier guards is positive; true if that is reached.
 ///
-/// `softness` is that of the first round, where faces are flipped; without any the barrier is hard from the start. The more,
-/// the further faces may go, but then some go around a vertex twice.
+/// `softness` is that of the first round, where something is not; without any the barrier is hard from the start.
 pub(super) fn untangle(
     maps: &Maps,
     laplacian: &SparseCholesky,
     free: &mut Vec<f64>,
-    (softness, hold): (f64, f64),
+    softness: f64,
     observer: &dyn Observer,
 ) -> Result<bool, Cancelled> {
     let mut x = maps.seams.coordinates(free);
-    let mut least = maps.least_determinant(&x);
+    let mut least = maps.least_guarded(&x);
     let mut softness = if least > 0.0 { 0.0 } else { softness };
     for _ in 0..UNTANGLING_ROUNDS {
-        let before = maps.barrier(&x, softness, hold).0;
-        let after = descend(maps, laplacian, free, softness, hold, observer)?;
+        let before = maps.barrier(&x, softness).0;
+        let after = descend(maps, laplacian, free, softness, observer)?;
         x = maps.seams.coordinates(free);
-        least = maps.least_determinant(&x);
+        least = maps.least_guarded(&x);
         if least > 0.0 {
             if softness == 0.0 && after > (1.0 - EVEN) * before {
                 return Ok(true);
@@ -67,10 +66,9 @@ pub(super) fn settle(
     maps: &Maps,
     laplacian: &SparseCholesky,
     free: &mut Vec<f64>,
-    hold: f64,
     observer: &dyn Observer,
 ) -> Result<(), Cancelled> {
-    descend(maps, laplacian, free, 0.0, hold, observer).map(drop)
+    descend(maps, laplacian, free, 0.0, observer).map(drop)
 }
 
 /// One round; returns the energy at its end.
@@ -79,10 +77,9 @@ fn descend(
     laplacian: &SparseCholesky,
     free: &mut Vec<f64>,
     softness: f64,
-    hold: f64,
     observer: &dyn Observer,
 ) -> Result<f64, Cancelled> {
-    let evaluate = |free: &[f64]| maps.barrier(&maps.seams.coordinates(free), softness, hold);
+    let evaluate = |free: &[f64]| maps.barrier(&maps.seams.coordinates(free), softness);
     let (mut energy, mut gradient) = evaluate(free);
     let mut pairs: Vec<(Vec<f64>, Vec<f64>, f64)> = Vec::new();
     for _ in 0..STEPS {
