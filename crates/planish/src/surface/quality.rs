@@ -196,8 +196,7 @@ fn measure(
 ) -> SeamQuality {
     let (first, k) = (&surfaces[uses[0].0 as usize], uses[0].1);
     let spans = if k % 2 == 0 { first.cols } else { first.rows } - 3;
-    let samples = SEAM_SAMPLES.max(SPAN_SAMPLES * spans + 1);
-    let jets: Vec<[super::Jet; 2]> = uniform_parameters(2 * samples - 1)
+    let jets: Vec<[super::Jet; 2]> = uniform_parameters(2 * SEAM_SAMPLES.max(SPAN_SAMPLES * spans + 1) - 1)
         .into_iter()
         .map(|t| {
             uses.map(|(p, k)| {
