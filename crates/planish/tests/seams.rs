@@ -152,7 +152,7 @@ fn double_knots_stand_in_chords_that_end_in_corners_of_other_than_four_patches()
 #[test]
 fn with_double_knots_the_angle_around_corners_of_three_patches_falls_below_2_thousandths_of_a_degree() {
     let work = cube(81, CurveKind::Smooth, to_sphere);
-    let stitch = StitchParams { angle_tolerance: 2e-3, ..StitchParams::default() };
+    let stitch = StitchParams { angle_tolerance: 2e-3, fit_loss: 0.3, ..StitchParams::default() };
     let [before, after] = both(&work, &params(26, Continuity::G1Double), &stitch);
     let [rms, most, _] = angles(&work, &after);
     assert!(most <= 2e-3 && rms <= 1e-3, "{rms} {most} degrees");
@@ -261,7 +261,7 @@ fn a_seam_across_a_bend_of_20_degrees_is_no_edge() {
 fn after_an_edit_of_one_patch_only_those_that_share_a_corner_with_it_are_solved_again() {
     let mut work = ball(6, 17);
     let fit = params(8, Continuity::G1);
-    let stitch = StitchParams::default();
+    let stitch = StitchParams { fit_loss: 0.3, ..StitchParams::default() };
     let [_, before] = both(&work, &fit, &stitch);
     // A bump inside patch 0: its boundary stays.
     for j in 1..16 {

@@ -267,12 +267,12 @@ fn angles(work: &Patchwork, surfaces: &[Surface]) -> (f64, f64) {
 #[test]
 fn stitched_seams_of_a_bumpy_closed_shape_with_corners_of_valence_3_are_smooth_within_a_tenth_of_a_degree() {
     let work = cube(41, CurveKind::Smooth, blob);
-    let params = StitchParams { angle_tolerance: 0.01, fit_loss: 0.38, ..StitchParams::default() };
-    for (m, mean, max) in [(6, 0.25, 0.9), (8, 0.05, 0.25), (10, 0.02, 0.1), (16, 0.003, 0.035)] {
+    let params = StitchParams { angle_tolerance: 0.01, fit_loss: 0.5, ..StitchParams::default() };
+    for (m, mean, max) in [(6, 0.25, 0.9), (8, 0.05, 0.25), (10, 0.02, 0.1), (16, 0.006, 0.035)] {
         let (before, after) = stitched_for(&work, m, params.clone());
         let (was, is) = (angles(&work, &before), angles(&work, &after));
         assert!(is.0 < mean && is.1 < max, "{m}: {is:?} degrees");
-        assert!(is.0 < was.0 / 5.0, "{m}: {was:?} to {is:?} degrees");
+        assert!(is.0 < was.0 / 3.0, "{m}: {was:?} to {is:?} degrees");
         let (was, is) = (surface::deviation(&before, &work.grids), surface::deviation(&after, &work.grids));
         assert!(is.rms < 1.4 * was.rms, "{m}: rms {:e} to {:e}", was.rms, is.rms);
     }
@@ -296,7 +296,7 @@ fn seams_of_a_rough_scan_become_smooth_and_cost_the_fit_half_of_its_accuracy_at_
         b + 0.004 * DVec3::new(wave(0.0), wave(1.7), wave(2.9))
     };
     let work = cube(41, CurveKind::Smooth, rough);
-    let params = StitchParams { fit_loss: 0.4, ..StitchParams::default() };
+    let params = StitchParams { fit_loss: 0.6, ..StitchParams::default() };
     for m in [6, 8, 10] {
         let (before, after) = stitched_for(&work, m, params.clone());
         let (was, is) = (angles(&work, &before), angles(&work, &after));

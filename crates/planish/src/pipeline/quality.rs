@@ -377,7 +377,7 @@ fn edge_figures(
     let whole: f64 = seams.iter().filter(|s| s.kind == CurveKind::Smooth).map(|s| s.length).sum();
     let share: f64 = edges.iter().map(|e| length_of(e.curve) * (e.range[1] - e.range[0])).sum();
     quality.insert("seam.edges".into(), Figure::Count(edges.len() as u64));
-    quality.insert("seam.edges_share".into(), Figure::Number(if whole > 0.0 { share / whole } else { 0.0 }));
+    quality.insert("seam.edges_share".into(), Figure::Number(if share > 0.0 { share / whole } else { 0.0 }));
     let worst_first = |a: &&EdgeInSeam, b: &&EdgeInSeam| b.angle_deg.total_cmp(&a.angle_deg);
     let mut sorted: Vec<&EdgeInSeam> = edges.iter().collect();
     sorted.sort_by(worst_first);

@@ -60,15 +60,20 @@ fn summary(mut distances: Vec<f64>) -> Deviation {
 }
 
 pub(super) fn distances(surface: &Surface, grid: &Grid) -> Vec<f64> {
+    offsets(surface, grid).into_iter().map(DVec3::length).collect()
+}
+
+/// The ways from the nodes of a grid to the surface at their parameters.
+pub(super) fn offsets(surface: &Surface, grid: &Grid) -> Vec<DVec3> {
     let along_u = [BasisRows::new(&surface.knots_u, &uniform_parameters(grid.cols), 0)];
     let sampler = RowSampler::new(surface, &along_u);
-    let mut out = vec![0.0; grid.points.len()];
+    let mut out = vec![DVec3::ZERO; grid.points.len()];
     let cols = grid.cols.max(1);
     out.par_chunks_mut(cols).zip(grid.points.par_chunks(cols)).zip(uniform_parameters(grid.rows)).for_each(
         |((out, nodes), v)| {
             let narrow = sampler.narrow(v, 0);
             for (i, (d, p)) in out.iter_mut().zip(nodes).enumerate() {
-                *d = sampler.node(&narrow, i, 0).distance(*p);
+                *d = sampler.node(&narrow, i, 0) - *p;
             }
         },
     );

@@ -5,7 +5,7 @@
 //! gives the angle in the data. A smooth surface has to turn by it within a knot span `h` on either side: by an arc that
 //! leaves the edge by `angle h / 4`, half of it outside and half inside.
 
-use super::work::Misses;
+use super::miss::Misses;
 use crate::grid::Grid;
 use crate::network::{CurveKind, Network};
 use crate::surface::Surface;

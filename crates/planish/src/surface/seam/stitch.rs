@@ -14,6 +14,7 @@
 //! plane. Departs from [K98], which moves every control point of a seam onto the line between its neighbours: around corners of
 //! other than four patches that cannot be.
 
+use super::miss::farthest;
 use super::system::System;
 use super::work::Work;
 use crate::grid::Grid;
@@ -25,7 +26,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How often the weights around folded patches are lowered.
+/// How often the weights around patches that fold, or lie too far off somewhere, are lowered.
 const EASINGS: usize = 4;
 /// Passes in which patches that turned over get their curves back: neighbours may turn over in turn.
 const REVERTS: usize = 3;
@@ -40,7 +41,7 @@ pub struct StitchParams {
     /// Largest angle by which a sharp seam's sides may turn from the normals of their own grids, degrees.
     #[schemars(extend("exclusiveMinimum" = 0.0, "unit" = "degrees"))]
     pub sharp_tolerance: f64,
-    /// Share by which the RMS distance of the fit may grow for the seams' sake.
+    /// Share by which the RMS and the largest distance of the fit may grow for the seams' sake.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub fit_loss: f64,
     /// Read from models of earlier versions, and not used.
@@ -159,11 +160,21 @@ fn solved(
         filled = work.filled(&curves, observer)?;
     }
     observer.progress(0.2);
+    // No place may be farther off than the farthest of the fit and, on top, the same share of it as moves have of all misses; but
+    // for what the planes at corners cost.
+    let share = ((1.0 + params.fit_loss).powi(2) - 1.0).sqrt();
+    let farthest_allowed: Vec<f64> = (0..filled.len())
+        .into_par_iter()
+        .map(|p| farthest(&filled[p].surface, &grids[p]).max((1.0 + share) * work.misses.most))
+        .collect();
     let mut system = System::new(&work, &filled, &curves, params);
     for easing in 0..=EASINGS {
         system.settle(observer)?;
         let made: Vec<Surface> = (0..filled.len()).into_par_iter().map(|p| system.surface(p)).collect();
-        let worse: Vec<usize> = work.free().filter(|&p| folds(&made[p], &grids[p]) > before[p]).collect();
+        let is_worse = |p: &usize| {
+            folds(&made[*p], &grids[*p]) > before[*p] || farthest(&made[*p], &grids[*p]) > farthest_allowed[*p]
+        };
+        let worse: Vec<usize> = work.free().filter(is_worse).collect();
         observer.progress(0.2 + 0.8 * (easing + 1) as f64 / (EASINGS + 1) as f64);
         if worse.is_empty() || easing == EASINGS {
             observer.progress(1.0);

@@ -4,6 +4,7 @@ use super::bend::Side;
 use super::corner::{Plane, Planes, planes};
 use super::curve::constrain;
 use super::meet::Meets;
+use super::miss::Misses;
 use crate::grid::Grid;
 use crate::network::{CurveKind, Network, Patch};
 use crate::observe::{Cancelled, Observer};
@@ -11,8 +12,7 @@ use crate::surface::basis::Knots;
 use crate::surface::fit::{Direction, Directions, FEWEST_CONTROL, Layout, project_net, surface_of};
 use crate::surface::fold::MeanNormals;
 use crate::surface::network_fit::{fill, patch_directions};
-use crate::surface::quality::distances;
-use crate::surface::sides::{along_curve, check, check_grids, diagonal, is_smooth, knots, node, side_len};
+use crate::surface::sides::{along_curve, check, check_grids, is_smooth, knots, node, side_len};
 use crate::surface::{FitError, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -20,9 +20,6 @@ use rayon::prelude::*;
 /// Share of the way of a feature's curve that the rows of control points beside it go along, itself first: the slopes across it
 /// stay.
 const FOLLOW: [f64; 3] = [1.0, 1.0, 0.5];
-
-/// The loss is measured against a fit that misses by this share of the diagonal at least: rounding.
-const EXACT: f64 = 1e-9;
 
 /// The network at work: what all steps ask.
 pub(crate) struct Work<'a> {
@@ -45,37 +42,6 @@ pub(crate) struct Work<'a> {
     /// Surfaces that stay, and which; those of [`Work::surfaces`] are for the others.
     pub before: &'a [Surface],
     pub held: Vec<bool>,
-}
-
-/// What a fit misses.
-pub(crate) struct Misses {
-    /// For each patch the sum of the squared distances of its nodes, and their number.
-    squares: Vec<(f64, f64)>,
-    /// The mean over all nodes.
-    mean: f64,
-}
-
-impl Misses {
-    fn new(surfaces: &[Surface], grids: &[Grid]) -> Misses {
-        let one = |(s, g): (&Surface, &Grid)| -> (f64, f64) {
-            (distances(s, g).into_iter().map(|d| d * d).sum(), g.points.len() as f64)
-        };
-        let squares: Vec<(f64, f64)> = surfaces.par_iter().zip(grids).map(one).collect();
-        let (sum, count) = squares.iter().fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d));
-        let mean = sum / count + (EXACT * diagonal(grids)).powi(2);
-        Misses { squares, mean }
-    }
-
-    /// The squared move per node that a patch can afford: half by what it misses itself, half by what all miss.
-    pub fn afford(&self, patch: usize) -> f64 {
-        let (sum, count) = self.squares[patch];
-        (sum / count + self.mean) / 2.0
-    }
-
-    /// The same for all its nodes.
-    pub fn afford_all(&self, patch: usize) -> f64 {
-        self.afford(patch) * self.squares[patch].1
-    }
 }
 
 /// A patch fitted inside its moved curves, and the projection of its grid that all its nets share.
