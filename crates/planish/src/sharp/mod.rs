@@ -6,15 +6,25 @@
 //! `docs/decisions/0016-sharp-line-alternatives.md`.
 
 mod bent;
+mod borders;
 mod broken_lines;
+mod census;
+mod charts;
 mod fair_lines;
 mod flanks;
+mod labels;
 mod lines;
 mod merging;
 mod rounded;
+mod slivers;
 
 pub(crate) use bent::split_bent;
+pub use borders::find_lines;
 pub use broken_lines::mend_lines;
 pub(crate) use broken_lines::{bridge_gaps, cut_spikes};
+pub use census::{
+    Census, FOLDED_BACK_DEG, LinesFound, SLIVER, TRUE_EDGE_DEG, TURN_DEG, census, folded_back, lines_found,
+};
 pub use fair_lines::fair_lines;
 pub use flanks::ScanScale;
+pub use slivers::tidy_lines;
