@@ -31,7 +31,9 @@ pub fn find_lines(
         return Ok(0);
     }
     let mut lines = Lines::new(mesh, &FeatureTags::from_edges(mesh.points.len(), []));
-    let bends = charts::bends(&lines);
+    // Where extraction saw two sheets in a cell they bend by the angle that it asks for, however the faces lie.
+    let mut bends = charts::bends(&lines);
+    bends.iter_mut().zip(tags.on(mesh)).filter(|x| x.1).for_each(|(bend, _)| *bend = bend.max(sharp_rad));
     let labels = Labels::new(&lines, &bends, scale, sharp_rad, observer)?;
     // What is beside a border does not reach over another one that is bent.
     let is_border = |h: usize| {
