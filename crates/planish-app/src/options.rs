@@ -81,6 +81,11 @@ impl<P: StageParams> StageOptions<P> {
         self.given.get(name)?.as_u64()
     }
 
+    /// The number given for the field `name`, if the user gave one.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.given.get(name)?.as_f64()
+    }
+
     /// The tolerance that the user gave, if it is the field `name` that takes one.
     pub fn given_tolerance(&self, name: &str) -> Option<Tolerance> {
         self.given(name, "tolerance")?.as_str()?.parse().ok()

@@ -5,7 +5,6 @@ use planish::DVec3;
 use planish::geom::Bvh;
 use planish::mesh::TriMesh;
 use planish::model::{Drawing, Model};
-use planish::network::CurveKind;
 use planish::pipeline;
 use planish::register::Shape;
 use planish::relief;
@@ -224,7 +223,7 @@ pub fn drawing(mesh: &TriMesh, drawing: &Drawing, view: &View) -> Result<Vec<u8>
         lines.push(Line { points: places.iter().map(|p| p.position(mesh)).collect(), color, width });
     };
     for curve in &network.curves {
-        let color = if curve.kind == CurveKind::Smooth { SMOOTH_COLOR } else { FEATURE_COLOR };
+        let color = if curve.kind.is_smooth() { SMOOTH_COLOR } else { FEATURE_COLOR };
         add(&curve.points, color, 2.4);
     }
     for feature in &drawing.sketch.features {
@@ -364,7 +363,7 @@ fn curves(model: &Model) -> Vec<Line> {
 fn outlines(model: &Model) -> Vec<Line> {
     let line = |curve: &planish::network::Curve| {
         let points = curve.points.iter().map(|p| p.position(&model.mesh)).collect();
-        let (color, width) = if curve.kind == CurveKind::Smooth { (SEAM_COLOR, 1.6) } else { (FEATURE_COLOR, 2.2) };
+        let (color, width) = if curve.kind.is_smooth() { (SEAM_COLOR, 1.6) } else { (FEATURE_COLOR, 2.2) };
         Line { points, color, width }
     };
     model.network.curves.iter().map(line).collect()

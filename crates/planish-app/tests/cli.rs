@@ -416,7 +416,7 @@ fn a_script_makes_one_edge_of_a_box_smooth_and_model_network_and_seams_keep_to_i
         let report: serde_json::Value = serde_json::from_slice(&fs::read(path.join("r.json")).unwrap()).unwrap();
         let output = planish(&["export", "box.planish", "-o", "n.json"], path);
         assert_eq!(status(&output), 0, "{}", stderr(&output));
-        let smooth = fs::read_to_string(path.join("n.json")).unwrap().matches("\"kind\":\"smooth\"").count();
+        let smooth = fs::read_to_string(path.join("n.json")).unwrap().matches("\"kind\":\"rounded\"").count();
         let seams = report["seams"].as_array().unwrap();
         let angles = |feature: bool| -> Vec<f64> {
             let own = seams.iter().filter(|s| s["feature"] == feature);

@@ -55,6 +55,22 @@ fn ball_of_6_patches_is_one_solid_with_12_shared_edges_and_8_vertices() {
 }
 
 #[test]
+fn double_knots_are_written_once_with_multiplicity_2_on_surfaces_and_edges() {
+    let (network, mut surfaces) = ball(6, DVec3::ZERO);
+    // Clamped knots with two spans; the same control points, so the shape bends a little, and seams with it.
+    let knots = vec![0.0, 0.0, 0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 1.0, 1.0];
+    for surface in &mut surfaces {
+        assert_eq!((surface.cols, surface.rows), (6, 6));
+        (surface.knots_u, surface.knots_v) = (knots.clone(), knots.clone());
+    }
+    let (_, text) = write(&(network, surfaces)).unwrap();
+    assert_eq!(text.matches("(4,2,4),(4,2,4),(0.,0.5,1.),(0.,0.5,1.)").count(), 6);
+    // On surfaces once for u and once for v, on each of the 12 edges once.
+    assert_eq!(count(&text, "B_SPLINE_CURVE_WITH_KNOTS"), 12);
+    assert_eq!(text.matches(",(4,2,4),(0.,0.5,1.),.UNSPECIFIED.)").count(), 12);
+}
+
+#[test]
 fn open_sheet_is_an_open_shell_and_a_mixed_model_has_both_kinds() {
     let (summary, text) = write(&sheet()).unwrap();
     assert_eq!((summary.solids, summary.shells, summary.edges), (0, 1, 7));

@@ -78,11 +78,12 @@ impl PyNetwork {
         array::rows(py, self.network.curves.iter().map(|c| c.corners).collect())
     }
 
-    /// What each curve follows: "smooth" surface, a sharp "feature", or the "boundary".
+    /// What each curve follows: "smooth" surface, a sharp "feature", a "rounded" one made smooth, or the "boundary".
     #[getter]
     fn curve_kinds(&self) -> Vec<&'static str> {
         let word = |kind| match kind {
             CurveKind::Smooth => "smooth",
+            CurveKind::Rounded => "rounded",
             CurveKind::Feature => "feature",
             CurveKind::Boundary => "boundary",
         };

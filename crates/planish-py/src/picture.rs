@@ -34,7 +34,7 @@ impl View {
 pub fn lines(mesh: &TriMesh, network: &Network) -> Vec<Line> {
     let line = |c: &planish::network::Curve| Line {
         points: SurfaceCurve::open(c.points.clone()).positions(mesh),
-        color: if c.kind == CurveKind::Smooth { SEAM } else { SHARP },
+        color: if c.kind.is_smooth() { SEAM } else { SHARP },
         width: LINE_WIDTH,
     };
     network.curves.iter().map(line).collect()

@@ -381,7 +381,7 @@ fn follows(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
     let sizes = grid::choose_sizes(&before, &old, &params);
     let (mut patches, mut old_grids) = (Vec::new(), Vec::new());
     let step = (before.curves.len() / 12).max(1);
-    for c in (0..before.curves.len()).step_by(step).filter(|&c| before.curves[c].kind == CurveKind::Smooth) {
+    for c in (0..before.curves.len()).step_by(step).filter(|&c| before.curves[c].kind.is_smooth()) {
         let mut editor = Editor::new(mesh, &adjacency, before.clone());
         let at: Vec<DVec3> = before.curves[c].points.iter().map(|p| p.position(mesh)).collect();
         let length: f64 = at.windows(2).map(|w| w[0].distance(w[1])).sum();

@@ -34,7 +34,12 @@ fn main() {
         DVec3::new(r * a.cos(), r * a.sin(), 0.7 * b.sin())
     };
     let work = sheet(10, 10, [true, true], [65, 65], shape);
-    let params = FitParams { resolution: Resolution::Control([8, 8]), cells_per_span: 1.0, smoothing: 0.0 };
+    let params = FitParams {
+        resolution: Resolution::Control([8, 8]),
+        cells_per_span: 1.0,
+        smoothing: 0.0,
+        ..FitParams::default()
+    };
     let surfaces = surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap();
     let reliefs: Vec<Relief> = work.grids.iter().zip(&surfaces).map(|(g, s)| relief::bake(g, s).unwrap()).collect();
     let displaced = Displaced { network: &work.network, surfaces: &surfaces, reliefs: &reliefs };

@@ -52,7 +52,12 @@ fn main() {
     };
     let work = sheet(18, 12, [true, true], [69, 69], shape);
     for m in [10, 20] {
-        let params = FitParams { resolution: Resolution::Control([m, m]), cells_per_span: 1.0, smoothing: 0.0 };
+        let params = FitParams {
+            resolution: Resolution::Control([m, m]),
+            cells_per_span: 1.0,
+            smoothing: 0.0,
+            ..FitParams::default()
+        };
         let fit = || surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap();
         let all = time(5, fit);
         println!("surface/network/216x69x69_to_{m}    {all:8.2} ms  {:5.2} x stream", all / stream);
@@ -62,7 +67,12 @@ fn main() {
         });
         println!("surface/stitch/216x69x69_to_{m}     {sewn:8.2} ms  {:5.2} x stream", sewn / stream);
     }
-    let params = FitParams { resolution: Resolution::Tolerance(1e-5), cells_per_span: 1.0, smoothing: 0.0 };
+    let params = FitParams {
+        resolution: Resolution::Tolerance(1e-5),
+        cells_per_span: 1.0,
+        smoothing: 0.0,
+        ..FitParams::default()
+    };
     let blob = cube(401, CurveKind::Smooth, blob);
     let all = time(3, || surface::fit_network(&blob.network, &blob.grids, &params, &Silent).unwrap());
     println!("surface/tolerance/6x401x401       {all:8.2} ms  {:5.2} x stream", all / stream);

@@ -44,7 +44,7 @@ use crate::observe::Cancelled;
 use crate::pipeline::record::Clock;
 use crate::pipeline::scan::run_figures;
 use crate::relief::{self, ReliefError};
-use crate::surface::{self, FitError, FitParams, SeamQuality, StitchParams};
+use crate::surface::{self, Continuity, FitError, FitParams, SeamQuality, StitchParams};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -475,7 +475,10 @@ fn surfaces_through(
     symmetric(true, &mut fitted);
     let mut smooth = clock.stage(
         "seams",
-        |o| surface::stitch(network, grids, &fitted, &params.stitch, o),
+        |o| match params.fit.continuity {
+            Continuity::C0 => Ok(fitted.clone()),
+            Continuity::G1 | Continuity::G1Double => surface::stitch(network, grids, &fitted, &params.stitch, o),
+        },
         |_| [("curves", network.curves.len())],
     )?;
     symmetric(false, &mut smooth);

@@ -11,7 +11,12 @@ use planish::relief::{self, Displaced, Relief};
 use planish::surface::{self, FitParams, Resolution, Surface};
 
 fn surfaces(work: &Patchwork, control: usize) -> Vec<Surface> {
-    let params = FitParams { resolution: Resolution::Control([control, control]), cells_per_span: 1.0, smoothing: 0.0 };
+    let params = FitParams {
+        resolution: Resolution::Control([control, control]),
+        cells_per_span: 1.0,
+        smoothing: 0.0,
+        ..FitParams::default()
+    };
     surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap()
 }
 

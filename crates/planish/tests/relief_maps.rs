@@ -12,7 +12,12 @@ use planish::relief::{self, Agreement, Displaced, Relief};
 use planish::surface::{self, FitParams, Resolution, Surface};
 
 fn fitted(work: &Patchwork, control: usize) -> (Vec<Surface>, Vec<Relief>) {
-    let params = FitParams { resolution: Resolution::Control([control, control]), cells_per_span: 1.0, smoothing: 0.0 };
+    let params = FitParams {
+        resolution: Resolution::Control([control, control]),
+        cells_per_span: 1.0,
+        smoothing: 0.0,
+        ..FitParams::default()
+    };
     let surfaces = surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap();
     let reliefs = work.grids.iter().zip(&surfaces).map(|(g, s)| relief::bake(g, s).unwrap()).collect();
     (surfaces, reliefs)

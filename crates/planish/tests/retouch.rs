@@ -324,7 +324,7 @@ fn patches_and_curves_across_the_plane_of_symmetry_become_their_own_images() {
     let sides: Vec<usize> = (0..6).filter(|p| !own.contains(p)).collect();
     let (a, b) = (&model.surfaces[sides[0]].control, &model.surfaces[sides[1]].control);
     assert!(a.iter().all(|c| b.iter().any(|d| plane.mirror(*c) == *d)));
-    assert!(model.network.curves.iter().all(|c| c.kind == CurveKind::Smooth));
+    assert!(model.network.curves.iter().all(|c| c.kind.is_smooth()));
     // A curve that crosses the plane three times is refused with its number.
     let mut wavy = drawing.clone();
     let points = "[[0.3,0.9,0.2],[-0.3,0.9,0.0],[0.3,0.9,-0.2],[-0.3,0.9,-0.4]]";

@@ -151,6 +151,11 @@ impl AllStages {
     pub fn demanded_tolerance(&self) -> Option<Tolerance> {
         self.fit.given_tolerance("resolution")
     }
+
+    /// The tolerance of the angle along smooth seams in degrees, if the user demanded one.
+    pub fn demanded_angle(&self) -> Option<f64> {
+        self.stitch.number("angle_tolerance")
+    }
 }
 
 impl StageParams for ContourParams {
@@ -225,6 +230,8 @@ mod tests {
     fn parameters_of_a_project_are_checked_as_those_of_a_command_are() {
         let usual = serde_json::to_string(&PipelineParams::default()).unwrap();
         assert!(AllStages::stored(&usual).is_ok());
+        // As models of earlier versions have it.
+        assert!(AllStages::stored(r#"{"stitch":{"stiffness":30.0}}"#).is_ok());
         for (json, words) in [
             (r#"{"grid":{"miss":0.0}}"#, "invalid value '0.0' for '--miss': a number from 0.000001 to 1 is needed"),
             (r#"{"grid":{"min_side":1000,"max_side":10}}"#, "at least 1000 and at most 10 points"),

@@ -39,6 +39,7 @@ pub fn demo(session: &Session, args: &Demo) -> Result<Status, Failure> {
         params: RunParams { scan: scan_params, ..RunParams::default() },
         units: session.units(),
         demanded: None,
+        demanded_angle: None,
         wanted_patches: None,
         output: &args.output,
         up: Up::Z,

@@ -74,6 +74,7 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
         report.stages.extend(made.stages);
         report.quality = made.quality;
         report.warnings.extend(made.warnings);
+        report.warnings.extend(missed::angle(&model, &made.seams, &params, args.stages.demanded_angle()));
         report.seams = seam_rows(&model, &made.seams);
         model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
     } else if !args.stages.none_given() {

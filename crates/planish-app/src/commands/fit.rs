@@ -49,6 +49,7 @@ fn anew(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
         params: args.stages.run_params(ScanParams::default(), session.common.seed, units),
         units,
         demanded: args.stages.demanded_tolerance(),
+        demanded_angle: args.stages.demanded_angle(),
         wanted_patches: args.stages.wanted_patches(),
         output: &args.output,
         up: Up::default(),
@@ -94,6 +95,7 @@ fn refit(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
     report.warnings = found.warnings;
     let share = args.stages.demanded_tolerance().map(|tolerance| tolerance.share(scale));
     report.warnings.extend(missed::tolerance(&model, &params, share, scale));
+    report.warnings.extend(missed::angle(&model, &found.seams, &params, args.stages.demanded_angle()));
     report.seams = seam_rows(&model, &found.seams);
     model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
     let command = if gridded { "refit" } else { "fit" };

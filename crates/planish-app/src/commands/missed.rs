@@ -3,8 +3,8 @@
 use crate::tolerance::{Scale, Tolerance};
 use planish::model::{Model, Units};
 use planish::network::CurveKind;
-use planish::pipeline::{PipelineParams, Warning};
-use planish::surface::deviation_of;
+use planish::pipeline::{self, PipelineParams, Warning};
+use planish::surface::{Continuity, SeamQuality, deviation_of};
 use planish_io::report::{Report, count, number};
 
 /// Patches beyond this many times the number that was asked for, or below its inverse, are told.
@@ -48,6 +48,48 @@ pub fn tolerance(model: &Model, params: &PipelineParams, share: Option<f64>, sca
         number(rms[worst])
     );
     Some(Warning::new("tolerance_missed", text, format!("patch {worst}")))
+}
+
+/// Code of the warning of [`angle`].
+pub const ANGLE: &str = "angle_missed";
+
+/// Seams that a warning names with their places.
+const NAMED: usize = 8;
+
+/// Which seams miss a demanded tolerance of the angle (degrees), where each bends by most, and the limit that kept them from it.
+pub fn angle(model: &Model, seams: &[SeamQuality], params: &PipelineParams, demanded: Option<f64>) -> Option<Warning> {
+    let wanted = demanded?;
+    let mut over: Vec<(u32, f64)> =
+        seams.iter().filter_map(|s| Some((s.curve, s.regular_angle_bound_deg?))).filter(|s| s.1 > wanted).collect();
+    over.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let found = over.first()?.1;
+    let limit = match params.fit.continuity {
+        Continuity::C0 => "--continuity c0 leaves seams as they are: give g1".to_owned(),
+        _ => format!(
+            "--fit-loss {} is what the fit may lose to it: raise that, or give more control points with --tolerance or --control",
+            params.stitch.fit_loss
+        ),
+    };
+    let smooth = seams.iter().filter(|s| s.regular_angle_bound_deg.is_some()).count();
+    let text = format!(
+        "{} of {} smooth seams miss the angle tolerance of {} degrees with up to {} beside corners of 25 to 150 degrees: {limit}.",
+        count(over.len() as u64),
+        count(smooth as u64),
+        number(wanted),
+        number(found)
+    );
+    let inner = pipeline::inner_angles(model);
+    let place = |(curve, angle): &(u32, f64)| {
+        let at = inner
+            .get(curve)
+            .map_or(String::new(), |(_, p)| format!(" at ({}, {}, {})", number(p.x), number(p.y), number(p.z)));
+        format!("curve {curve}{at} with {}", number(*angle))
+    };
+    let mut places: Vec<String> = over.iter().take(NAMED).map(place).collect();
+    if over.len() > NAMED {
+        places.push(format!("{} more", over.len() - NAMED));
+    }
+    Some(Warning::new(ANGLE, text, places.join("; ")))
 }
 
 /// Why there are far more or fewer patches than were asked for.

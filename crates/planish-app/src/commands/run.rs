@@ -30,6 +30,7 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
         params,
         units,
         demanded: args.stages.demanded_tolerance(),
+        demanded_angle: args.stages.demanded_angle(),
         wanted_patches: args.stages.wanted_patches(),
         output: &args.output,
         up: args.up.into(),
@@ -81,6 +82,8 @@ pub struct Job<'a> {
     pub units: Units,
     /// Tolerance that the user demanded.
     pub demanded: Option<Tolerance>,
+    /// Tolerance of the angle along smooth seams that the user demanded, degrees.
+    pub demanded_angle: Option<f64>,
     /// Number of patches that the user asked for.
     pub wanted_patches: Option<u64>,
     /// Where the products go.
@@ -195,6 +198,7 @@ pub fn fitted(session: &Session, job: &Job, from: From, before: Vec<StageRecord>
     let scale = Scale { diagonal: report.input.diagonal, units };
     let share = job.demanded.map(|tolerance| tolerance.share(scale));
     report.warnings.extend(missed::tolerance(&model, &run.params, share, scale));
+    report.warnings.extend(missed::angle(&model, &seams, &run.params, job.demanded_angle));
     report.warnings.extend(missed::patches(&model, job.wanted_patches));
     (model.units, model.shift) = (units, shift);
     model.params = serde_json::to_string(&run.params).map_err(Failure::fault)?;
@@ -202,8 +206,11 @@ pub fn fitted(session: &Session, job: &Job, from: From, before: Vec<StageRecord>
     Ok(Made { report, model, scan: run.scan })
 }
 
-/// Done, or the demanded tolerance (a share of the diagonal) is missed.
+/// Done, or a demanded tolerance is missed: that of the distance (a share of the diagonal), or that of the angle.
 pub fn verdict(report: &Report, demanded: Option<f64>) -> Status {
+    if report.warnings.iter().any(|w| w.code == missed::ANGLE) {
+        return Status::Missed;
+    }
     match (demanded, report.figure("surface.patch_rms_max_rel")) {
         (Some(wanted), Some(reached)) if reached > wanted => Status::Missed,
         _ => Status::Done,

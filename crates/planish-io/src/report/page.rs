@@ -51,7 +51,7 @@ const TRUTH_FIGURES: [(&str, &str, Reading); 12] = [
 ];
 
 /// Figures of quality in words: key, meaning, and how the value is read.
-const FIGURES: [(&str, &str, Reading); 27] = [
+const FIGURES: [(&str, &str, Reading); 34] = [
     ("mesh.triangles", "Triangles of the mesh after repair", Reading::Plain),
     ("mesh.watertight", "The mesh is closed", Reading::Plain),
     ("mesh.manifold", "The mesh is manifold", Reading::Plain),
@@ -72,10 +72,21 @@ const FIGURES: [(&str, &str, Reading); 27] = [
     ("displaced.max", "Displaced surface to input, largest", Reading::Length),
     ("seam.count", "Seams between two patches", Reading::Plain),
     ("seam.gap_max", "Largest gap along a seam", Reading::Length),
+    ("seam.gap_bound", "What no gap exceeds, between samples neither", Reading::Length),
     ("seam.folded", "Smooth seams that are folded over", Reading::Plain),
     ("seam.inner_angle_max_deg", "Largest angle across a smooth seam, its ends left out", Reading::Degrees),
     ("seam.angle_max_deg", "The same with ends, which may have no normal of their own", Reading::Degrees),
+    (
+        "seam.regular_angle_max_deg",
+        "The same without the first knot span beside corners of less than 25 or more than 150 degrees",
+        Reading::Degrees,
+    ),
+    ("seam.regular_angle_bound_deg", "What that angle nowhere exceeds, between samples neither", Reading::Degrees),
+    ("seam.odd_ends", "Ends of smooth seams in such corners", Reading::Plain),
     ("seam.angle_rms_deg", "Angle across smooth seams, root mean square", Reading::Degrees),
+    ("seam.angle_p95_deg", "Angle that 95 of 100 of the length of smooth seams do not exceed", Reading::Degrees),
+    ("seam.edges", "Pieces of smooth seams at which the grids meet at an edge: they keep its angle", Reading::Plain),
+    ("seam.edges_share", "Share of the length of smooth seams in such pieces", Reading::Fraction),
     ("relief.texels", "Texels of all displacement maps", Reading::Plain),
     ("relief.max", "Largest displacement", Reading::Length),
     (

@@ -78,9 +78,12 @@ class _Fit(TypedDict, total=False):
     tolerance: float | None  # largest RMS over a patch, share of the diagonal
     cells_per_span: float | None  # grid cells for each knot span at least
     fit_smoothing: float | None  # weight of smoothness
+    continuity: Literal["c0", "g1", "g1_double"] | None  # how surfaces meet along smooth seams [g1]
 
 class _Stitch(TypedDict, total=False):
-    stiffness: float | None  # how far surfaces may move to meet smoothly
+    angle_tolerance: float | None  # largest angle along smooth seams, degrees [0.05]
+    sharp_tolerance: float | None  # largest turn of the sides of sharp seams from their grids, degrees [1]
+    fit_loss: float | None  # share by which the RMS distance may grow for that [0.1]
 
 class _Paint(TypedDict, total=False):
     mode: Literal["straight", "geodesic", "magnetic"] | None  # how the way between two picks is found

@@ -82,6 +82,7 @@ pub fn state_of(drawing: &Drawing, undo: usize, redo: usize) -> u64 {
             CurveKind::Smooth => 0,
             CurveKind::Feature => 1,
             CurveKind::Boundary => 2,
+            CurveKind::Rounded => 3,
         });
         curve.points.iter().for_each(|p| hash.place(p));
     }

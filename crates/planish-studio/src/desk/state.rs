@@ -171,7 +171,7 @@ fn parted_note(patches: usize, faults: usize) -> String {
 fn curve(mesh: &TriMesh, curve: &network::Curve) -> Curve {
     let at: Vec<DVec3> = curve.points.iter().map(|p| p.position(mesh)).collect();
     let kind = match curve.kind {
-        CurveKind::Smooth => Kind::Smooth,
+        CurveKind::Smooth | CurveKind::Rounded => Kind::Smooth,
         CurveKind::Feature => Kind::Feature,
         CurveKind::Boundary => Kind::Boundary,
     };
@@ -221,7 +221,7 @@ fn seams(fit: &Fit) -> Vec<Seam> {
         curve: s.curve,
         angle_deg: s.angle_max_deg,
         gap: s.gap_max,
-        sharp: s.kind != CurveKind::Smooth,
+        sharp: !s.kind.is_smooth(),
     };
     worst_seams(&fit.seams).into_iter().take(MOST_SEAMS).map(seam).collect()
 }

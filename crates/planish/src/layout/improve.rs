@@ -10,7 +10,6 @@ use super::partition::polygon;
 use super::recut::{Bench, Change, outline};
 use super::{LayoutError, slide};
 use crate::mesh::disjoint::disjoint;
-use crate::network::CurveKind;
 use crate::observe::Observer;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -145,7 +144,7 @@ type Known = BTreeMap<Vec<u32>, Option<Gain>>;
 fn unions(complex: &Complex) -> Vec<Change> {
     let pairs = complex.live_arcs().filter(|&a| {
         let arc = complex.arc(2 * a);
-        arc.kind == CurveKind::Smooth && arc.cells[0] != arc.cells[1]
+        arc.kind.is_smooth() && arc.cells[0] != arc.cells[1]
     });
     let pairs =
         pairs.map(|a| Change { cells: complex.arc(2 * a).cells.to_vec(), removed: vec![a], ..Change::default() });
@@ -183,7 +182,7 @@ fn choose(
 /// The change that places the node of `star` anew and redraws its arcs; `None` for a fixed node.
 pub(super) fn star_change(complex: &Complex, star: &[u32]) -> Option<Change> {
     let node = complex.from(*star.first()?);
-    if star.iter().any(|&h| complex.arc(h).kind != CurveKind::Smooth) {
+    if star.iter().any(|&h| !complex.arc(h).kind.is_smooth()) {
         return None;
     }
     let mut cells: Vec<u32> = star.iter().map(|&h| complex.cell(h)).collect();
@@ -213,7 +212,7 @@ pub(super) fn star_change(complex: &Complex, star: &[u32]) -> Option<Change> {
 /// The change that redraws arc `a`.
 fn arc_change(complex: &Complex, a: u32) -> Option<Change> {
     let arc = complex.arc(2 * a);
-    if arc.kind != CurveKind::Smooth || arc.cells[0] == arc.cells[1] {
+    if !arc.kind.is_smooth() || arc.cells[0] == arc.cells[1] {
         return None;
     }
     let mut change = Change { cells: arc.cells.to_vec(), removed: vec![a], ..Change::default() };

@@ -6,7 +6,6 @@ use super::recut::{Bench, Change, outline};
 use crate::geom::polyline;
 use crate::mesh::disjoint::disjoint;
 use crate::mesh::{NONE, TriMesh};
-use crate::network::CurveKind;
 use crate::network::imprint::Place;
 use rayon::prelude::*;
 
@@ -55,7 +54,7 @@ fn plan(mesh: &TriMesh, complex: &Complex, star: &[u32]) -> Option<Slide> {
     if complex.nodes[node as usize].stays {
         return None;
     }
-    let fixed: Vec<usize> = (0..star.len()).filter(|&i| complex.arc(star[i]).kind != CurveKind::Smooth).collect();
+    let fixed: Vec<usize> = (0..star.len()).filter(|&i| !complex.arc(star[i]).kind.is_smooth()).collect();
     let [x, y] = fixed[..] else { return None };
     if complex.arc(star[x]).kind != complex.arc(star[y]).kind || star[x] / 2 == star[y] / 2 {
         return None;
@@ -79,7 +78,7 @@ fn plan(mesh: &TriMesh, complex: &Complex, star: &[u32]) -> Option<Slide> {
     let total = along[along.len() - 1];
     // Across from the other ends of the smooth arcs.
     let (mut sum, mut count) = (0.0, 0.0);
-    for &h in star.iter().filter(|&&h| complex.arc(h).kind == CurveKind::Smooth) {
+    for &h in star.iter().filter(|&&h| complex.arc(h).kind.is_smooth()) {
         let far = mesh.points[complex.nodes[complex.to(h) as usize].vertex as usize];
         let near = (0..line.len())
             .min_by(|&i, &j| {

@@ -6,7 +6,6 @@
 
 use super::complex::{Arc, Complex};
 use crate::mesh::NONE;
-use crate::network::CurveKind;
 use crate::network::imprint::Place;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -49,7 +48,7 @@ fn rows(complex: &Complex) -> Vec<Row> {
     let mut seen: BTreeSet<u32> = BTreeSet::new();
     let mut rows = Vec::new();
     for a in complex.live_arcs() {
-        if seen.contains(&a) || complex.arc(2 * a).kind != CurveKind::Smooth {
+        if seen.contains(&a) || !complex.arc(2 * a).kind.is_smooth() {
             continue;
         }
         let row = row_of(complex, &stars, a);
@@ -115,7 +114,7 @@ fn row_of(complex: &Complex, stars: &[Vec<u32>], a: u32) -> Option<Row> {
     let arcs: Vec<u32> = row.halves.iter().map(|h| h / 2).chain(row.across.iter().flatten().map(|h| h / 2)).collect();
     let cells: Vec<u32> = row.halves.iter().flat_map(|&h| [complex.cell(h), complex.cell(h ^ 1)]).collect();
     let apart = |list: Vec<u32>| list.iter().collect::<BTreeSet<_>>().len() == list.len();
-    let smooth = row.halves.iter().all(|&h| complex.arc(h).kind == CurveKind::Smooth);
+    let smooth = row.halves.iter().all(|&h| complex.arc(h).kind.is_smooth());
     // A strip as wide as its way around would get sides from a node to itself.
     let ends = row.across.iter().all(|&[left, right]| complex.to(left) != complex.to(right));
     (smooth && ends && apart(arcs) && apart(cells)).then_some(row)

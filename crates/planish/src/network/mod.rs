@@ -37,12 +37,21 @@ pub struct Corner {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CurveKind {
-    /// Runs over smooth surface, or is wanted smooth; the seam along it is to be smooth.
+    /// Runs over smooth surface: the seam along it is to be smooth as far as the fit can afford it.
     Smooth,
     /// Follows a sharp edge, or is wanted sharp; the seam along it is C0 on purpose.
     Feature,
     /// Follows the boundary of the mesh; it has one patch only.
     Boundary,
+    /// Is wanted smooth by a person: an edge under it is rounded, whatever that costs the fit.
+    Rounded,
+}
+
+impl CurveKind {
+    /// True if the patches on both sides are to have one tangent plane along the curve.
+    pub fn is_smooth(self) -> bool {
+        matches!(self, CurveKind::Smooth | CurveKind::Rounded)
+    }
 }
 
 /// A boundary curve between two corners.

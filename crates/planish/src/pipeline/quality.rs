@@ -12,7 +12,7 @@ use crate::network::{CurveKind, Network, PatchMesh};
 use crate::observe::{Cancelled, Observer, Part};
 use crate::relief::{self, PatchedMesh};
 use crate::surface::basis::uniform_parameters;
-use crate::surface::{self, SeamQuality, Surface};
+use crate::surface::{self, EdgeInSeam, SeamQuality, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -158,7 +158,7 @@ fn compare(input: &TriMesh, result: &TriMesh, observer: &dyn Observer) -> Result
 pub fn worst_seams(seams: &[SeamQuality]) -> Vec<&SeamQuality> {
     let mut order: Vec<&SeamQuality> = seams.iter().collect();
     order.sort_by(|a, b| {
-        let sharp = |s: &SeamQuality| s.kind != CurveKind::Smooth;
+        let sharp = |s: &SeamQuality| !s.kind.is_smooth();
         sharp(a).cmp(&sharp(b)).then(b.angle_max_deg.total_cmp(&a.angle_max_deg)).then(a.curve.cmp(&b.curve))
     });
     order
@@ -318,16 +318,26 @@ fn seam_figures(
     warnings: &mut Vec<Warning>,
     observer: &dyn Observer,
 ) -> Result<Vec<SeamQuality>, Cancelled> {
-    let seams = surface::measure_seams(&model.network, &model.surfaces, observer)?;
+    let edges = surface::edges_in_seams(&model.network, &model.grids, &model.surfaces);
+    let seams = surface::measure_seams_apart(&model.network, &model.surfaces, &edges, observer)?;
+    edge_figures(model, &edges, &seams, quality, warnings);
     let gap = seams.iter().map(|s| s.gap_max).fold(0.0, f64::max);
-    let smooth: Vec<&SeamQuality> = seams.iter().filter(|s| s.kind == CurveKind::Smooth).collect();
+    let smooth: Vec<&SeamQuality> = seams.iter().filter(|s| s.kind.is_smooth()).collect();
     let total: f64 = smooth.iter().map(|s| s.length).sum();
     let squares: f64 = smooth.iter().map(|s| s.length * s.angle_rms_deg * s.angle_rms_deg).sum();
     quality.insert("seam.count".into(), Figure::Count(seams.len() as u64));
     length(quality, "seam.gap_max", gap, diagonal);
+    length(quality, "seam.gap_bound", seams.iter().map(|s| s.gap_bound).fold(0.0, f64::max), diagonal);
     let widest = smooth.iter().map(|s| s.angle_max_deg).fold(0.0, f64::max);
     quality.insert("seam.angle_max_deg".into(), Figure::Number(widest));
+    let widest = smooth.iter().map(|s| s.regular_angle_max_deg).fold(0.0, f64::max);
+    quality.insert("seam.regular_angle_max_deg".into(), Figure::Number(widest));
+    let bound = smooth.iter().filter_map(|s| s.regular_angle_bound_deg).fold(0.0, f64::max);
+    quality.insert("seam.regular_angle_bound_deg".into(), Figure::Number(bound));
+    let odd: usize = smooth.iter().map(|s| s.odd_ends.iter().filter(|odd| **odd).count()).sum();
+    quality.insert("seam.odd_ends".into(), Figure::Count(odd as u64));
     let inner = inner_angles(model);
+    quality.insert("seam.angle_p95_deg".into(), Figure::Number(angle_p95(model)));
     let inner_of = |s: &SeamQuality| inner.get(&s.curve).map_or(0.0, |found| found.0);
     let widest = smooth.iter().map(|s| inner_of(s)).fold(0.0, f64::max);
     quality.insert("seam.inner_angle_max_deg".into(), Figure::Number(widest));
@@ -350,9 +360,43 @@ fn seam_figures(
         let mut worst: Vec<&&SeamQuality> = smooth.iter().collect();
         worst.sort_by(|a, b| inner_of(b).total_cmp(&inner_of(a)).then(a.curve.cmp(&b.curve)));
         let worst: Vec<String> = worst.iter().take(3).map(|s| s.curve.to_string()).collect();
-        warnings.push(Warning::new("seam_angle", text, format!("curves {}", few(&worst))).with_step("--stiffness 100"));
+        warnings.push(Warning::new("seam_angle", text, format!("curves {}", few(&worst))).with_step("--fit-loss 0.5"));
     }
     Ok(seams)
+}
+
+/// Pieces of smooth seams that are not smooth in the grids: their number, their share of the length, where they are.
+fn edge_figures(
+    model: &Model,
+    edges: &[EdgeInSeam],
+    seams: &[SeamQuality],
+    quality: &mut Quality,
+    warnings: &mut Vec<Warning>,
+) {
+    let length_of = |curve: u32| seams.iter().find(|s| s.curve == curve).map_or(0.0, |s| s.length);
+    let whole: f64 = seams.iter().filter(|s| s.kind.is_smooth()).map(|s| s.length).sum();
+    let share: f64 = edges.iter().map(|e| length_of(e.curve) * (e.range[1] - e.range[0])).sum();
+    quality.insert("seam.edges".into(), Figure::Count(edges.len() as u64));
+    quality.insert("seam.edges_share".into(), Figure::Number(if share > 0.0 { share / whole } else { 0.0 }));
+    let worst_first = |a: &&EdgeInSeam, b: &&EdgeInSeam| b.angle_deg.total_cmp(&a.angle_deg);
+    let mut sorted: Vec<&EdgeInSeam> = edges.iter().collect();
+    sorted.sort_by(worst_first);
+    let Some(worst) = sorted.first() else { return };
+    let text = format!(
+        "{} pieces of seams are not smooth: the grids meet at more than {} degrees, {:.0} at most. They keep that angle.",
+        edges.len(),
+        surface::EDGE_ANGLE_DEG,
+        worst.angle_deg
+    );
+    let place = |e: &&EdgeInSeam| {
+        let points = &model.network.curves[e.curve as usize].points;
+        let middle = (e.range[0] + e.range[1]) / 2.0;
+        let at = points.get((middle * points.len().saturating_sub(1) as f64) as usize).map(|p| p.position(&model.mesh));
+        let at = at.map_or(String::new(), |p| format!(" at {}", in_script(p)));
+        format!("curve {}{at} by {:.0} degrees", e.curve, e.angle_deg)
+    };
+    let places: Vec<String> = sorted.iter().map(place).collect();
+    warnings.push(Warning::new("seam_edges", text, few(&places)));
 }
 
 /// Smooth seams whose normals turn by more than this have surfaces that turn back over each other.
@@ -376,6 +420,24 @@ pub fn inner_angles(model: &Model) -> BTreeMap<u32, (f64, DVec3)> {
         }
     }
     found
+}
+
+/// The angle that 95 of 100 of the length of all smooth seams do not exceed, degrees; 0 without such seams.
+fn angle_p95(model: &Model) -> f64 {
+    let step = INNER_STEP * model.mesh.bounds().diagonal();
+    if !(step > 0.0) {
+        return 0.0;
+    }
+    let mut places = surface::seam_angles(&model.network, &model.surfaces, step);
+    places.retain(|p| model.network.curves[p.curve as usize].kind.is_smooth() && p.angle_deg.is_finite());
+    places.sort_by(|a, b| a.angle_deg.total_cmp(&b.angle_deg).then(a.curve.cmp(&b.curve)));
+    let whole: f64 = places.iter().map(|p| p.length).sum();
+    let mut below = 0.0;
+    let reached = places.iter().find(|p| {
+        below += p.length;
+        below >= 0.95 * whole
+    });
+    reached.map_or(0.0, |p| p.angle_deg)
 }
 
 /// A coordinate as a script has it: what is left out is far below what moves a curve.

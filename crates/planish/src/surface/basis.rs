@@ -13,6 +13,62 @@ pub fn is_uniform(knots: &[f64]) -> bool {
     knots.len() >= 8 && uniform_knots(knots.len() - 4).iter().zip(knots).all(|(a, b)| (a - b).abs() < 1e-9)
 }
 
+/// How often each inner knot of a direction stands. All stand at equal steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Knots {
+    /// Once: two derivatives are continuous.
+    Simple,
+    /// Twice: the tangent plane is continuous, curvature need not be. What a bicubic surface needs along a seam that ends
+    /// in a corner where not four patches meet.
+    Double,
+}
+
+impl Knots {
+    /// The knots of `control >= 4` control points, which are even in number where knots are double: `control + 4` numbers
+    /// from 0 to 1.
+    pub fn list(self, control: usize) -> Vec<f64> {
+        match self {
+            Knots::Simple => uniform_knots(control),
+            Knots::Double => {
+                let spans = self.spans(control);
+                (0..control + 4).map(|i| ((i / 2).saturating_sub(1) as f64 / spans as f64).min(1.0)).collect()
+            }
+        }
+    }
+
+    /// Knot spans of a direction with so many control points.
+    pub fn spans(self, control: usize) -> usize {
+        match self {
+            Knots::Simple => control - 3,
+            Knots::Double => (control - 2) / 2,
+        }
+    }
+
+    /// Which of the two these knots are, to rounding; `None` if neither.
+    pub fn of(knots: &[f64]) -> Option<Knots> {
+        let is = |kind: Knots| kind.list(knots.len() - 4).iter().zip(knots).all(|(a, b)| (a - b).abs() < 1e-9);
+        if is_uniform(knots) {
+            return Some(Knots::Simple);
+        }
+        (knots.len() >= 8 && knots.len().is_multiple_of(2) && is(Knots::Double)).then_some(Knots::Double)
+    }
+
+    /// The nearest number of control points that such knots can have, one more rather than one less unless that is above
+    /// `most`.
+    pub fn possible(self, control: usize, most: usize) -> usize {
+        match self {
+            Knots::Double if control % 2 == 1 => {
+                if control < most {
+                    control + 1
+                } else {
+                    control - 1
+                }
+            }
+            _ => control,
+        }
+    }
+}
+
 /// `count` parameters from 0 to 1 at equal steps: where the nodes of a grid lie.
 pub fn uniform_parameters(count: usize) -> Vec<f64> {
     let last = count.saturating_sub(1).max(1) as f64;

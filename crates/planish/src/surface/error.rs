@@ -103,6 +103,12 @@ pub enum FitError {
         /// The patch.
         patch: usize,
     },
+    /// The system of the seams is singular to rounding.
+    #[error("the system of {unknowns} unknowns along the seams is singular; fit with fewer control points")]
+    Unsolvable {
+        /// Unknowns.
+        unknowns: usize,
+    },
     /// The observer asked to stop.
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),

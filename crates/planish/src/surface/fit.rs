@@ -9,7 +9,7 @@
 //! P-splines (Eilers, Marx 1996, *Flexible Smoothing with B-splines and Penalties*), which [K98] §4.2.1 argues against.
 //! [`super::FitParams::smoothing`] says why it is there.
 
-use super::basis::{BasisRows, uniform_knots, uniform_parameters};
+use super::basis::{BasisRows, Knots, uniform_parameters};
 use super::{FitError, Surface};
 use crate::linalg::{Banded, BandedCholesky};
 use glam::DVec3;
@@ -37,7 +37,8 @@ pub fn fit(points: &[DVec3], rows: usize, cols: usize, control: [usize; 2]) -> R
     if points.len() != rows * cols {
         return Err(FitError::Shape { patch: 0, rows, cols, points: points.len() });
     }
-    let (along_v, along_u) = (Direction::new(rows, control[0], 0.0)?, Direction::new(cols, control[1], 0.0)?);
+    let (along_v, along_u) =
+        (Direction::new(rows, control[0], Knots::Simple, 0.0)?, Direction::new(cols, control[1], Knots::Simple, 0.0)?);
     let projection = project(points, &along_u, &along_v);
     let mut net = vec![DVec3::ZERO; control[0] * control[1]];
     solve_inside(&mut net, &projection, &along_u, &along_v, 0);
@@ -48,6 +49,7 @@ pub fn fit(points: &[DVec3], rows: usize, cols: usize, control: [usize; 2]) -> R
 #[derive(Clone, Debug)]
 pub(crate) struct Direction {
     pub knots: Vec<f64>,
+    pub kind: Knots,
     pub basis: BasisRows,
     /// Normal matrix `B^T B`.
     gram: Banded,
@@ -59,14 +61,14 @@ impl Direction {
     /// * `smoothing` - weight of the bends of the control polygon against the distances of the nodes that fall on one
     ///   control point: 0 for plain least squares; large values leave straight lines, and of a surface with given
     ///   boundary the bilinear blend of that boundary
-    pub fn new(count: usize, control: usize, smoothing: f64) -> Result<Direction, FitError> {
+    pub fn new(count: usize, control: usize, kind: Knots, smoothing: f64) -> Result<Direction, FitError> {
         if control < FEWEST_CONTROL {
             return Err(FitError::TooFewControl { control });
         }
         if count < control {
             return Err(FitError::TooFewPoints { points: count, control });
         }
-        let knots = uniform_knots(control);
+        let knots = kind.list(control);
         let basis = BasisRows::new(&knots, &uniform_parameters(count), 0);
         let mut gram = Banded::zero(control, 3);
         for (&first, w) in basis.first.iter().zip(&basis.weights) {
@@ -82,11 +84,26 @@ impl Direction {
                 .ok_or(FitError::Singular { points: count, control })
         };
         let factors = [factor(0)?, factor(1)?, factor(2)?];
-        Ok(Direction { knots, basis, gram, factors })
+        Ok(Direction { knots, kind, basis, gram, factors })
     }
 
     pub fn control(&self) -> usize {
         self.gram.len()
+    }
+
+    /// The same with a weight of bends.
+    pub fn smoothed(&self, smoothing: f64) -> Result<Direction, FitError> {
+        Direction::new(self.basis.len(), self.control(), self.kind, smoothing)
+    }
+
+    /// Entry of the normal matrix.
+    pub fn gram(&self, i: usize, j: usize) -> f64 {
+        self.gram.get(i, j)
+    }
+
+    /// The columns in which row `i` of the normal matrix may be non-zero.
+    pub fn near(&self, i: usize) -> std::ops::Range<usize> {
+        self.gram.columns(i)
     }
 
     pub fn factor(&self, inset: usize) -> &BandedCholesky {
@@ -138,23 +155,26 @@ fn add_bends(gram: &mut Banded, knots: &[f64], weight: f64) {
     }
 }
 
-/// The directions of a whole network, factored once per pair of node count and control count.
-pub(crate) struct Directions(BTreeMap<(usize, usize), Direction>);
+/// Nodes, control points and knots of a direction.
+pub(crate) type Layout = (usize, usize, Knots);
+
+/// The directions of a whole network, factored once per layout.
+pub(crate) struct Directions(BTreeMap<Layout, Direction>);
 
 impl Directions {
-    pub fn new(pairs: impl Iterator<Item = (usize, usize)>) -> Result<Directions, FitError> {
+    pub fn new(layouts: impl Iterator<Item = Layout>) -> Result<Directions, FitError> {
         let mut map = BTreeMap::new();
-        for pair in pairs {
-            if let std::collections::btree_map::Entry::Vacant(slot) = map.entry(pair) {
-                slot.insert(Direction::new(pair.0, pair.1, 0.0)?);
+        for layout in layouts {
+            if let std::collections::btree_map::Entry::Vacant(slot) = map.entry(layout) {
+                slot.insert(Direction::new(layout.0, layout.1, layout.2, 0.0)?);
             }
         }
         Ok(Directions(map))
     }
 
-    /// The direction of `count` nodes and `control` control points, one of the pairs given to `new`.
-    pub fn get(&self, count: usize, control: usize) -> &Direction {
-        &self.0[&(count, control)]
+    /// The direction of one of the layouts given to `new`.
+    pub fn get(&self, layout: Layout) -> &Direction {
+        &self.0[&layout]
     }
 }
 

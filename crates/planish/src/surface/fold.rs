@@ -18,7 +18,7 @@ const NORMAL_SPANS: f64 = 1.0;
 /// on tight bends, but never by a right angle.
 const FOLD_COSINE: f64 = 0.0;
 /// Cosine below which a surface's normal is not believed when its seams are to follow it.
-const CREDIBLE: f64 = 0.5;
+pub(super) const CREDIBLE: f64 = 0.5;
 /// Relative length of `S_u x S_v` below which there is no normal: corners with an angle of 0 or 180 degrees.
 const FLAT: f64 = 1e-6;
 
@@ -88,6 +88,42 @@ impl MeanNormals {
         if mean != DVec3::ZERO && normal.dot(mean) < CREDIBLE { mean } else { normal }
     }
 
+    /// Unit normal with which the grid comes to the place `(u, v)` of side `side`: the mean normals of two strips beside
+    /// it, each half a knot span deep and two long, continued to the side as a line.
+    pub fn beside(&self, side: usize, u: f64, v: f64) -> DVec3 {
+        let (count, t) = if side.is_multiple_of(2) { (self.cols, u) } else { (self.rows, v) };
+        let depth = if side.is_multiple_of(2) { self.rows } else { self.cols };
+        let [along, across] = if side.is_multiple_of(2) { self.reach } else { [self.reach[1], self.reach[0]] };
+        let k = (t * (count - 1) as f64).round() as usize;
+        let (a, b) = (k.saturating_sub(along), (k + along).min(count - 1));
+        let half = across.div_ceil(2).min(depth.saturating_sub(1)).max(1);
+        let strip = |from: usize, to: usize| {
+            let (from, to) = (from.min(depth - 1), to.min(depth - 1));
+            let (from, to) = if side == 1 || side == 2 { (depth - 1 - to, depth - 1 - from) } else { (from, to) };
+            match side.is_multiple_of(2) {
+                true => self.sum([a, b], [from, to]),
+                false => self.sum([from, to], [a, b]),
+            }
+            .normalize_or_zero()
+        };
+        let (near, far) = (strip(0, half), strip(half, 2 * half));
+        let continued = if far == DVec3::ZERO { near } else { near * 1.5 - far * 0.5 };
+        continued.normalize_or(near)
+    }
+
+    /// Nodes that lie within a knot span across side `side`.
+    pub fn reach(&self, side: usize) -> usize {
+        let (reach, count) =
+            if side.is_multiple_of(2) { (self.reach[1], self.rows) } else { (self.reach[0], self.cols) };
+        reach.min(count - 1)
+    }
+
+    /// Sum of the area vectors of the cells within a range of nodes along `u` and one along `v`.
+    fn sum(&self, [a, b]: [usize; 2], [c, d]: [usize; 2]) -> DVec3 {
+        let at = |i: usize, j: usize| self.sums[j * self.cols + i];
+        at(b, d) - at(a, d) - at(b, c) + at(a, c)
+    }
+
     /// Unit normal of the cells within a knot span of the place `(u, v)`; zero where they cancel out.
     pub fn at(&self, u: f64, v: f64) -> DVec3 {
         let range = |t: f64, count: usize, reach: usize| {
@@ -95,7 +131,6 @@ impl MeanNormals {
             (k.saturating_sub(reach), (k + reach).min(count - 1))
         };
         let ((a, b), (c, d)) = (range(u, self.cols, self.reach[0]), range(v, self.rows, self.reach[1]));
-        let at = |i: usize, j: usize| self.sums[j * self.cols + i];
-        (at(b, d) - at(a, d) - at(b, c) + at(a, c)).normalize_or_zero()
+        self.sum([a, b], [c, d]).normalize_or_zero()
     }
 }

@@ -11,7 +11,7 @@
 //! See `docs/methods/surfaces.md`, "Planes of symmetry".
 
 use super::Surface;
-use super::basis::{is_uniform, uniform_knots};
+use super::basis::Knots;
 use super::sides::{node, side_len};
 use crate::curve::symmetry::Plane;
 use crate::geom::polyline;
@@ -187,8 +187,10 @@ fn image(mate: &Surface, matched: &Matched, network: &Network, plane: &Plane, q:
     let [turn_u, turn_v] = turned(s);
     let knots = |of: &[f64], turned: bool| -> Vec<f64> {
         match turned {
-            true if is_uniform(of) => uniform_knots(of.len() - 4),
-            true => of.iter().rev().map(|x| 1.0 - x).collect(),
+            // Those at equal steps are their own images; rounding is not.
+            true => {
+                Knots::of(of).map_or_else(|| of.iter().rev().map(|x| 1.0 - x).collect(), |kind| kind.list(of.len() - 4))
+            }
             false => of.to_vec(),
         }
     };

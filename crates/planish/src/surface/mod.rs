@@ -3,11 +3,10 @@
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, ch. 4, 6 and 8.
 //! 1. basis and evaluation - `basis`, `evaluate`      2. one grid - `fit`, eq. 4.4
 //! 3. a network without gaps and folds - `network_fit`, `resolution`, `fold`
-//! 4. smooth seams - `corner`, `seam_curve`, `stitch`, §8.1      5. how good it is - `quality`, eq. 6.1
+//! 4. smooth seams - `seam`, §8.1      5. how good it is - `quality`, eq. 6.1
 //! 6. exact mirror images where there is a plane of symmetry - `mirrored`      7. after small edits - `retouch`
 
 pub mod basis;
-mod corner;
 mod error;
 mod evaluate;
 mod fit;
@@ -17,9 +16,8 @@ mod network_fit;
 mod quality;
 mod resolution;
 mod retouch;
-mod seam_curve;
+mod seam;
 mod sides;
-mod stitch;
 
 pub use error::FitError;
 pub use evaluate::Jet;
@@ -27,12 +25,14 @@ pub(crate) use evaluate::RowSampler;
 pub use fit::{FEWEST_CONTROL, fit};
 pub use fold::folds;
 pub use mirrored::mirror_surfaces;
-pub use network_fit::{FitParams, fit_network};
-pub use quality::{Deviation, SeamAngle, SeamQuality, deviation, deviation_of, measure_seams, seam_angles};
+pub use network_fit::{Continuity, FitParams, fit_network};
+pub use quality::{
+    Deviation, SeamAngle, SeamQuality, deviation, deviation_of, measure_seams, measure_seams_apart, seam_angles,
+};
 pub use resolution::Resolution;
 pub use retouch::retouch;
+pub use seam::{EDGE_ANGLE_DEG, EdgeInSeam, StitchParams, edges_in_seams, stitch, stitch_near};
 pub(crate) use sides::{check, node};
-pub use stitch::{StitchParams, stitch};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

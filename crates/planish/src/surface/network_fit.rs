@@ -6,6 +6,7 @@
 //! the network is fitted once, from corner to corner, and both patches fit their inside for it. So seams are
 //! exact, and no patch pays for its neighbour.
 
+use super::basis::Knots;
 use super::fit::{Direction, Directions, FEWEST_CONTROL, project, solve_inside, surface_of};
 use super::fold::folds;
 use super::resolution::{self, Resolution};
@@ -42,12 +43,34 @@ pub struct FitParams {
     /// span weigh keeps control points still that few points decide, and the noise of a scan out of them.
     #[schemars(range(min = 0.0, max = 1e4))]
     pub smoothing: f64,
+    /// How surfaces meet along smooth seams.
+    pub continuity: Continuity,
+}
+
+/// How surfaces meet along smooth seams.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Continuity {
+    /// Without gaps; the angle is what the fit of each patch makes of it.
+    C0,
+    /// With one tangent plane along each seam, to the tolerance of the angle.
+    #[default]
+    G1,
+    /// As `g1`, with double knots in chords that end in a corner where not four patches meet: there the angle can go to nothing
+    /// with more control points, which with simple knots it cannot, but with as many control points both the angle and the
+    /// distance are larger.
+    G1Double,
 }
 
 impl Default for FitParams {
     /// A tolerance of 1/1000 of the diagonal and four cells per span: the smooth shape; the relief has the rest.
     fn default() -> FitParams {
-        FitParams { resolution: Resolution::Tolerance(1e-3), cells_per_span: 4.0, smoothing: 0.01 }
+        FitParams {
+            resolution: Resolution::Tolerance(1e-3),
+            cells_per_span: 4.0,
+            smoothing: 0.01,
+            continuity: Continuity::G1,
+        }
     }
 }
 
@@ -76,10 +99,15 @@ pub fn fit_network(
     let size = diagonal(grids);
     let spans = |n: usize| (n.saturating_sub(1) as f64 / cells) as usize;
     let most: Vec<usize> = nodes.iter().map(|&n| (spans(n) + 3).clamp(FEWEST_CONTROL, n.max(FEWEST_CONTROL))).collect();
-    let mut counts = resolution::counts(network, grids, &most, &params.resolution, size)?;
+    let kinds = match params.continuity {
+        Continuity::C0 | Continuity::G1 => vec![Knots::Simple; network.curves.len()],
+        Continuity::G1Double => resolution::knots(network),
+    };
+    let possible = |counts: Vec<usize>| resolution::possible(counts, &kinds, &nodes);
+    let mut counts = possible(resolution::counts(network, grids, &most, &params.resolution, size)?);
     let mut smoothing = vec![params.smoothing; grids.len()];
     let fit = |counts: &[usize], smoothing: &[f64]| {
-        fit_counts(network, grids, &nodes, counts, (params.smoothing, smoothing), observer)
+        fit_counts(network, grids, (&nodes, &kinds), counts, (params.smoothing, smoothing), observer)
     };
     let mut surfaces = fit(&counts, &smoothing)?;
     if let &Resolution::Tolerance(fraction) = &params.resolution {
@@ -92,7 +120,7 @@ pub fn fit_network(
                     raised[c] = resolution::finer(counts[c]);
                 }
             }
-            let raised = resolution::level(network, raised, Some(&most));
+            let raised = possible(resolution::level(network, raised, Some(&most)));
             if raised == counts {
                 break;
             }
@@ -126,12 +154,12 @@ pub fn fit_network(
 fn fit_counts(
     network: &Network,
     grids: &[Grid],
-    nodes: &[usize],
+    (nodes, kinds): (&[usize], &[Knots]),
     counts: &[usize],
     (curve_smoothing, smoothing): (f64, &[f64]),
     observer: &dyn Observer,
 ) -> Result<Vec<Surface>, FitError> {
-    let used = nodes.iter().zip(counts).filter(|(n, _)| **n > 0).map(|(&n, &c)| (n, c));
+    let used = (0..nodes.len()).filter(|&c| nodes[c] > 0).map(|c| (nodes[c], counts[c], kinds[c]));
     let directions = Directions::new(used)?;
     let uses = network.uses();
     let curves: Vec<Result<Vec<DVec3>, FitError>> = curve_nodes(network, &uses, grids)
@@ -140,8 +168,8 @@ fn fit_counts(
         .map(|(c, nodes)| {
             Ok(match nodes.len() {
                 0 => Vec::new(),
-                n if curve_smoothing == 0.0 => fit_curve(&nodes, directions.get(n, counts[c])),
-                n => fit_curve(&nodes, &Direction::new(n, counts[c], curve_smoothing)?),
+                n if curve_smoothing == 0.0 => fit_curve(&nodes, directions.get((n, counts[c], kinds[c]))),
+                n => fit_curve(&nodes, &directions.get((n, counts[c], kinds[c])).smoothed(curve_smoothing)?),
             })
         })
         .collect();
@@ -154,11 +182,10 @@ fn fit_counts(
         .zip(smoothing)
         .map(|((patch, grid), &smoothing)| {
             observer.check()?;
-            let [along_u, along_v] = patch_directions(patch, grid, &directions, counts);
+            let [along_u, along_v] = patch_directions(patch, grid, &directions, counts, kinds);
             let projection = project(&grid.points, along_u, along_v);
-            let smooth = |d: &Direction| Direction::new(d.basis.len(), d.control(), smoothing);
             let net = if smoothing > 0.0 {
-                fill(patch, &curves, &projection, &smooth(along_u)?, &smooth(along_v)?)
+                fill(patch, &curves, &projection, &along_u.smoothed(smoothing)?, &along_v.smoothed(smoothing)?)
             } else {
                 fill(patch, &curves, &projection, along_u, along_v)
             };
@@ -175,11 +202,13 @@ pub(crate) fn patch_directions<'a>(
     grid: &Grid,
     directions: &'a Directions,
     counts: &[usize],
+    kinds: &[Knots],
 ) -> [&'a Direction; 2] {
-    [
-        directions.get(grid.cols, counts[patch.sides[0].curve as usize]),
-        directions.get(grid.rows, counts[patch.sides[1].curve as usize]),
-    ]
+    let along = |side: usize, nodes: usize| {
+        let c = patch.sides[side].curve as usize;
+        directions.get((nodes, counts[c], kinds[c]))
+    };
+    [along(0, grid.cols), along(1, grid.rows)]
 }
 
 /// A curve through the first and the last node, as near as it can to the others.

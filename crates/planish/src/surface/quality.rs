@@ -4,8 +4,9 @@
 //! §8.1.1 (normals along a seam; here their angle in degrees).
 
 use super::basis::{BasisRows, uniform_parameters};
+use super::seam::certificate::{Rim, angle_bound, gap_bound};
 use super::sides::place;
-use super::{RowSampler, Surface};
+use super::{EdgeInSeam, RowSampler, Surface};
 use crate::geom::polyline;
 use crate::grid::Grid;
 use crate::network::{CurveKind, Network};
@@ -18,6 +19,11 @@ use serde::{Deserialize, Serialize};
 const SEAM_SAMPLES: usize = 33;
 /// Samples per knot span of a longer one: a cubic's error between knots has at most three extremes.
 const SPAN_SAMPLES: usize = 4;
+/// Angles of a patch between its sides at a corner with which a seam can be expected to be smooth, degrees.
+const REGULAR_DEG: std::ops::RangeInclusive<f64> = 25.0..=150.0;
+/// How far inside a patch the normal is that one in its corner is held against, of the patch: a corner with a reflex angle
+/// points inwards, and does so nowhere else.
+const INSIDE: f64 = 0.02;
 /// Relative length of `S_u x S_v` below which a surface has no normal there.
 const FLAT: f64 = 1e-9;
 
@@ -53,16 +59,21 @@ fn summary(mut distances: Vec<f64>) -> Deviation {
     Deviation { max, rms, p95: *p95 }
 }
 
-fn distances(surface: &Surface, grid: &Grid) -> Vec<f64> {
+pub(super) fn distances(surface: &Surface, grid: &Grid) -> Vec<f64> {
+    offsets(surface, grid).into_iter().map(DVec3::length).collect()
+}
+
+/// The ways from the nodes of a grid to the surface at their parameters.
+pub(super) fn offsets(surface: &Surface, grid: &Grid) -> Vec<DVec3> {
     let along_u = [BasisRows::new(&surface.knots_u, &uniform_parameters(grid.cols), 0)];
     let sampler = RowSampler::new(surface, &along_u);
-    let mut out = vec![0.0; grid.points.len()];
+    let mut out = vec![DVec3::ZERO; grid.points.len()];
     let cols = grid.cols.max(1);
     out.par_chunks_mut(cols).zip(grid.points.par_chunks(cols)).zip(uniform_parameters(grid.rows)).for_each(
         |((out, nodes), v)| {
             let narrow = sampler.narrow(v, 0);
             for (i, (d, p)) in out.iter_mut().zip(nodes).enumerate() {
-                *d = sampler.node(&narrow, i, 0).distance(*p);
+                *d = sampler.node(&narrow, i, 0) - *p;
             }
         },
     );
@@ -78,8 +89,18 @@ pub struct SeamQuality {
     pub kind: CurveKind,
     /// Largest distance between the two boundaries at equal parameters, world units.
     pub gap_max: f64,
+    /// What that distance nowhere exceeds, between samples neither.
+    pub gap_bound: f64,
     /// Largest angle between the two normals, ends included, degrees.
     pub angle_max_deg: f64,
+    /// The same without the first knot span beside corners of less than 25 or more than 150 degrees, and without places
+    /// where a surface has no normal or the grids meet at an edge.
+    pub regular_angle_max_deg: f64,
+    /// What that angle nowhere exceeds, between samples neither; at most a fiftieth above the largest. `None` for a seam that is
+    /// meant to have an angle.
+    pub regular_angle_bound_deg: Option<f64>,
+    /// Ends at which a patch has such a corner.
+    pub odd_ends: [bool; 2],
     /// Root of the mean square of the angle over the length of the seam, degrees.
     pub angle_rms_deg: f64,
     /// Mean angle over the length of the seam, degrees.
@@ -91,11 +112,22 @@ pub struct SeamQuality {
 /// Measures every curve that has a patch on both sides, in the order of the curves, in 32 pieces or more: means by the
 /// midpoint rule, largest values at the ends of the pieces, too.
 ///
-/// Surfaces must be those of the network's patches. Samples where a surface has no normal (a corner with an
-/// angle of 0 or 180 degrees) count for the gap only.
+/// Surfaces must be those of the network's patches. Samples where a surface has no normal (a corner with an angle of 0, of
+/// 180 degrees, or of more, where `S_u x S_v` points inwards) count for the gap only.
 pub fn measure_seams(
     network: &Network,
     surfaces: &[Surface],
+    observer: &dyn Observer,
+) -> Result<Vec<SeamQuality>, Cancelled> {
+    measure_seams_apart(network, surfaces, &[], observer)
+}
+
+/// As [`measure_seams`], with regular angles and their bound away from `edges`, at which a seam is not to be smooth
+/// ([`super::edges_in_seams`]).
+pub fn measure_seams_apart(
+    network: &Network,
+    surfaces: &[Surface],
+    edges: &[EdgeInSeam],
     observer: &dyn Observer,
 ) -> Result<Vec<SeamQuality>, Cancelled> {
     let uses = network.uses();
@@ -104,7 +136,8 @@ pub fn measure_seams(
         .filter(|&c| uses[c].len() == 2 && uses[c].iter().all(|&(p, _)| (p as usize) < surfaces.len()))
         .map(|c| {
             observer.check()?;
-            Ok(measure(network, surfaces, c, [uses[c][0], uses[c][1]]))
+            let edges: Vec<[f64; 2]> = edges.iter().filter(|e| e.curve as usize == c).map(|e| e.range).collect();
+            Ok(measure(network, surfaces, c, [uses[c][0], uses[c][1]], &edges))
         })
         .collect()
 }
@@ -159,11 +192,16 @@ pub fn seam_angles(network: &Network, surfaces: &[Surface], step: f64) -> Vec<Se
 /// Places on one seam at most.
 const MOST_ANGLES: f64 = 1e5;
 
-fn measure(network: &Network, surfaces: &[Surface], curve: usize, uses: [(u32, u8); 2]) -> SeamQuality {
+fn measure(
+    network: &Network,
+    surfaces: &[Surface],
+    curve: usize,
+    uses: [(u32, u8); 2],
+    edges: &[[f64; 2]],
+) -> SeamQuality {
     let (first, k) = (&surfaces[uses[0].0 as usize], uses[0].1);
     let spans = if k % 2 == 0 { first.cols } else { first.rows } - 3;
-    let samples = SEAM_SAMPLES.max(SPAN_SAMPLES * spans + 1);
-    let jets: Vec<[super::Jet; 2]> = uniform_parameters(2 * samples - 1)
+    let jets: Vec<[super::Jet; 2]> = uniform_parameters(2 * SEAM_SAMPLES.max(SPAN_SAMPLES * spans + 1) - 1)
         .into_iter()
         .map(|t| {
             uses.map(|(p, k)| {
@@ -174,17 +212,46 @@ fn measure(network: &Network, surfaces: &[Surface], curve: usize, uses: [(u32, u
         })
         .collect();
     let gap_max = jets.iter().map(|[a, b]| a.point.distance(b.point)).fold(0.0, f64::max);
-    let angle = |[a, b]: &[super::Jet; 2]| {
+    let corners = [0.0, 1.0].map(|t| {
+        uses.map(|(p, k)| {
+            let side = network.patches[p as usize].sides[k as usize];
+            let (u, v) = place(k as usize, side.reversed, t);
+            corner(&surfaces[p as usize], u, v)
+        })
+    });
+    let odd_ends = corners.map(|sides| sides.iter().any(|c| c.is_none_or(|deg| !REGULAR_DEG.contains(&deg))));
+    let last = jets.len() - 1;
+    let angle = |at: usize| {
+        let [a, b] = &jets[at];
+        let end = if at == 0 { Some(0) } else { (at == last).then_some(1) };
+        if end.is_some_and(|end| corners[end].iter().any(Option::is_none)) {
+            return None;
+        }
         let has_normal = |j: &super::Jet| j.area_vector().length() > FLAT * j.u.length() * j.v.length();
         let (na, nb) = (a.area_vector().normalize_or_zero(), b.area_vector().normalize_or_zero());
         (has_normal(a) && has_normal(b)).then(|| na.cross(nb).length().atan2(na.dot(nb)).to_degrees())
     };
-    let angle_max = jets.iter().filter_map(angle).fold(0.0, f64::max);
+    let angle_max = (0..=last).filter_map(angle).fold(0.0, f64::max);
+    let first_span = 1.0 / spans as f64;
+    let [from, to] = odd_ends.map(|odd| if odd { first_span } else { 0.0 });
+    let ranges = without([from, 1.0 - to], edges);
+    let regular = |at: &usize| {
+        let t = *at as f64 / last as f64;
+        ranges.iter().any(|[from, to]| (*from..=*to).contains(&t))
+    };
+    let regular_angle_max = (0..=last).filter(regular).filter_map(angle).fold(0.0, f64::max);
+    let rims = uses.map(|(p, k)| {
+        let side = network.patches[p as usize].sides[k as usize];
+        Rim::new(&surfaces[p as usize], k as usize, side.reversed)
+    });
+    let kind = network.curves[curve].kind;
+    let on = |range: &[f64; 2]| angle_bound(&rims, *range, regular_angle_max.to_radians()).to_degrees();
+    let bound = kind.is_smooth().then(|| ranges.iter().map(on).fold(0.0, f64::max));
     let (mut length, mut known, mut squares, mut sum) = (0.0, 0.0, 0.0, 0.0);
-    for piece in jets.windows(3).step_by(2) {
-        let chord = piece[0][0].point.distance(piece[2][0].point);
+    for middle in (1..last).step_by(2) {
+        let chord = jets[middle - 1][0].point.distance(jets[middle + 1][0].point);
         length += chord;
-        if let Some(angle) = angle(&piece[1]) {
+        if let Some(angle) = angle(middle) {
             known += chord;
             squares += chord * angle * angle;
             sum += chord * angle;
@@ -193,11 +260,37 @@ fn measure(network: &Network, surfaces: &[Surface], curve: usize, uses: [(u32, u
     let known = if known > 0.0 { known } else { 1.0 };
     SeamQuality {
         curve: curve as u32,
-        kind: network.curves[curve].kind,
+        kind,
         gap_max,
+        gap_bound: gap_bound(&rims),
         angle_max_deg: angle_max,
+        regular_angle_max_deg: regular_angle_max,
+        regular_angle_bound_deg: bound,
+        odd_ends,
         angle_rms_deg: (squares / known).sqrt(),
         angle_mean_deg: sum / known,
         length,
     }
+}
+
+/// A range without pieces that rise and do not overlap.
+fn without([from, to]: [f64; 2], pieces: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut left = Vec::new();
+    let mut at = from;
+    for [a, b] in pieces {
+        left.push([at, a.min(to)]);
+        at = at.max(*b);
+    }
+    left.push([at, to]);
+    left.retain(|[a, b]| a < b);
+    left
+}
+
+/// Angle of a surface between its sides in its corner `(u, v)`, degrees; `None` where it is reflex or none.
+fn corner(surface: &Surface, u: f64, v: f64) -> Option<f64> {
+    let (to_u, to_v) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
+    let (jet, inside) = (surface.jet(u, v), surface.jet(u + to_u * INSIDE, v + to_v * INSIDE));
+    let area = jet.area_vector();
+    let is_corner = area.length() > FLAT * jet.u.length() * jet.v.length() && area.dot(inside.area_vector()) > 0.0;
+    is_corner.then(|| area.length().atan2(to_u * to_v * jet.u.dot(jet.v)).to_degrees())
 }

@@ -6,7 +6,10 @@
 //! directions are orthogonal projections their squares add up to the square of the whole.
 
 use super::FitError;
+use super::basis::Knots;
 use super::fit::{Direction, FEWEST_CONTROL, project_rows};
+use super::seam::corner::sectors;
+use super::sides::is_smooth;
 use crate::grid::Grid;
 use crate::network::Network;
 use glam::DVec3;
@@ -91,6 +94,29 @@ pub(crate) fn level(network: &Network, mut counts: Vec<usize>, most: Option<&[us
     chords.iter().map(|&chord| counts[chord as usize]).collect()
 }
 
+/// Knots along every curve: double in the chords of smooth seams that end in an irregular corner, that is in a sector
+/// without sharp curves of other than four patches, or between two of these of other than two.
+///
+/// There the parameter directions across the seam are no continuation of each other, and with simple knots the seam could
+/// only be one cubic from end to end (`docs/methods/surfaces.md`, "Smooth seams").
+pub(crate) fn knots(network: &Network) -> Vec<Knots> {
+    let chords = network.chords();
+    let mut double = vec![false; network.curves.len()];
+    for sector in sectors(network, &|c, _| is_smooth(&network.curves[c])) {
+        if sector.wedges.len() != if sector.closed { 4 } else { 2 } {
+            for &(curve, _) in sector.ends.iter().filter(|(c, _)| is_smooth(&network.curves[*c])) {
+                double[chords[curve] as usize] = true;
+            }
+        }
+    }
+    chords.iter().map(|&chord| if double[chord as usize] { Knots::Double } else { Knots::Simple }).collect()
+}
+
+/// The counts nearest to these that the knots can have, at most one control point for every node.
+pub(crate) fn possible(counts: Vec<usize>, kinds: &[Knots], nodes: &[usize]) -> Vec<usize> {
+    counts.into_iter().zip(kinds).zip(nodes).map(|((count, kind), &nodes)| kind.possible(count, nodes)).collect()
+}
+
 /// The next count to try after `count` did not do.
 pub(crate) fn finer(count: usize) -> usize {
     LADDER.iter().copied().find(|&l| l > count).unwrap_or(count + count.div_ceil(4))
@@ -104,7 +130,7 @@ fn fewest(grid: &Grid, along_u: bool, rms: f64) -> Result<usize, FitError> {
     let total: f64 = centred.iter().map(|p| p.length_squared()).sum();
     let allowed = rms * rms * (count * lines) as f64;
     for control in LADDER.into_iter().take_while(|&l| l < count) {
-        let direction = Direction::new(count, control, 0.0)?;
+        let direction = Direction::new(count, control, Knots::Simple, 0.0)?;
         // |P|² - |projection|²: what the fit of every line leaves.
         let mut explained = 0.0;
         if along_u {

@@ -4,11 +4,11 @@
 //! its control points, bit for bit, and the model stays without gaps. Seams are smoothed by [`super::stitch`] when the
 //! edit is done.
 
-use super::fit::{Direction, Directions, project, surface_of};
+use super::fit::{Directions, project, surface_of};
 use super::fold::folds;
 use super::network_fit::{FitParams, SMOOTHING, fill, fit_curve, patch_directions};
-use super::sides::{along_curve, check, side_len};
-use super::{FitError, Surface, basis::is_uniform};
+use super::sides::{along_curve, check, knots, side_len};
+use super::{FitError, Surface};
 use crate::grid::Grid;
 use crate::network::Network;
 use crate::observe::Observer;
@@ -38,13 +38,10 @@ pub fn retouch(
     let is_new = |c: u32| curves.contains(&c);
     let which: Vec<usize> =
         (0..surfaces.len()).filter(|&p| network.patches[p].sides.iter().any(|s| is_new(s.curve))).collect();
-    let uneven = |&&p: &&usize| !is_uniform(&surfaces[p].knots_u) || !is_uniform(&surfaces[p].knots_v);
-    if let Some(&patch) = which.iter().find(uneven) {
-        return Err(FitError::Knots { patch });
-    }
+    let kinds = knots(network, surfaces, &which)?;
     let directions = Directions::new(which.iter().flat_map(|&p| &network.patches[p].sides).map(|s| {
         let c = s.curve as usize;
-        (nodes[c], counts[c])
+        (nodes[c], counts[c], kinds[c])
     }))?;
     let mut boundary: Vec<Vec<DVec3>> = vec![Vec::new(); network.curves.len()];
     for &p in &which {
@@ -56,9 +53,10 @@ pub fn retouch(
             boundary[c] = if is_new(side.curve) {
                 let (points, rows, cols) = (&grids[p].points, grids[p].rows, grids[p].cols);
                 let points = along_curve(points, rows, cols, k, side.reversed, 0);
+                let direction = directions.get((nodes[c], counts[c], kinds[c]));
                 match params.smoothing {
-                    0.0 => fit_curve(&points, directions.get(nodes[c], counts[c])),
-                    weight => fit_curve(&points, &Direction::new(nodes[c], counts[c], weight)?),
+                    0.0 => fit_curve(&points, direction),
+                    weight => fit_curve(&points, &direction.smoothed(weight)?),
                 }
             } else {
                 let s = &surfaces[p];
@@ -71,11 +69,10 @@ pub fn retouch(
         .par_iter()
         .map(|&p| {
             let (patch, grid) = (&network.patches[p], &grids[p]);
-            let [along_u, along_v] = patch_directions(patch, grid, &directions, &counts);
+            let [along_u, along_v] = patch_directions(patch, grid, &directions, &counts, &kinds);
             let projection = project(&grid.points, along_u, along_v);
             let made = |weight: f64| -> Result<Surface, FitError> {
-                let smooth = |d: &Direction| Direction::new(d.basis.len(), d.control(), weight);
-                let (u, v) = (smooth(along_u)?, smooth(along_v)?);
+                let (u, v) = (along_u.smoothed(weight)?, along_v.smoothed(weight)?);
                 Ok(surface_of(fill(patch, &boundary, &projection, &u, &v), along_u, along_v))
             };
             let mut best = made(params.smoothing)?;

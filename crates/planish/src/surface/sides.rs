@@ -2,7 +2,8 @@
 //!
 //! Layout of the control net as in [K98] fig. 8.2.
 
-use super::FitError;
+use super::basis::Knots;
+use super::{FitError, Surface};
 use crate::geom::{Aabb, tolerance};
 use crate::grid::Grid;
 use crate::network::{Curve, Network};
@@ -80,6 +81,21 @@ pub(crate) fn check(
     Ok(counts)
 }
 
+/// Knots along every curve as the surfaces `which` have them; simple for curves beside none of these.
+pub(crate) fn knots(network: &Network, surfaces: &[Surface], which: &[usize]) -> Result<Vec<Knots>, FitError> {
+    let mut kinds = vec![None; network.curves.len()];
+    for &patch in which {
+        let along = [&surfaces[patch].knots_u, &surfaces[patch].knots_v].map(|knots| Knots::of(knots));
+        for (k, side) in network.patches[patch].sides.iter().enumerate() {
+            let kind = along[k % 2].ok_or(FitError::Knots { patch })?;
+            if *kinds[side.curve as usize].get_or_insert(kind) != kind {
+                return Err(FitError::Knots { patch });
+            }
+        }
+    }
+    Ok(kinds.into_iter().map(|kind| kind.unwrap_or(Knots::Simple)).collect())
+}
+
 /// Checks grids as [`check`] does, and that their points are finite and meet along the curves.
 pub(crate) fn check_grids(network: &Network, grids: &[Grid]) -> Result<Vec<usize>, FitError> {
     let shapes: Vec<_> = grids.iter().map(|g| (g.rows, g.cols, g.points.len())).collect();
@@ -129,5 +145,5 @@ pub(crate) fn place(side: usize, reversed: bool, t: f64) -> (f64, f64) {
 
 /// True if the curve is to have the same tangent plane on both sides.
 pub(crate) fn is_smooth(curve: &Curve) -> bool {
-    curve.kind == crate::network::CurveKind::Smooth
+    curve.kind.is_smooth()
 }

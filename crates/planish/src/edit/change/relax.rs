@@ -7,7 +7,6 @@ use crate::edit::check::{self, Range, within};
 use crate::edit::network::{EditError, Holds, Stretch};
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, CurveName, CurveNumber, Forces, Pull, RelaxedCurve};
-use crate::network::CurveKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -81,7 +80,7 @@ fn relax_all(work: &mut Work, holds: &Holds, params: &SnakeParams) -> Result<(),
             observer.progress(c as f64 / count as f64);
             let curve = &e.network.curves[c];
             let in_plane = |plane: Plane| curve.points.iter().all(|p| plane.height(p.position(mesh)).abs() < near);
-            if curve.kind != CurveKind::Smooth || plane.is_some_and(in_plane) {
+            if !curve.kind.is_smooth() || plane.is_some_and(in_plane) {
                 continue;
             }
             let (before, corner) = (curve.points.clone(), curve.corners[0]);

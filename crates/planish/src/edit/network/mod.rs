@@ -315,8 +315,8 @@ impl<'m> Editor<'m> {
         }
         first.points.extend_from_slice(&second.points[1..]);
         first.corners[1] = second.corners[1];
-        if second.kind == CurveKind::Smooth {
-            first.kind = CurveKind::Smooth;
+        if second.kind.is_smooth() && first.kind != CurveKind::Rounded {
+            first.kind = second.kind;
         }
         let kept = (a / 2).min(b / 2);
         self.network.curves[kept as usize] = first;
@@ -376,7 +376,7 @@ impl<'m> Editor<'m> {
     pub(crate) fn movable(&self, curve: u32) -> Result<&Curve, EditError> {
         let found = self.curve(curve)?;
         match found.kind {
-            CurveKind::Smooth => Ok(found),
+            CurveKind::Smooth | CurveKind::Rounded => Ok(found),
             CurveKind::Feature => Err(EditError::Bound { curve, line: "a sharp edge" }),
             CurveKind::Boundary => Err(EditError::Bound { curve, line: "the boundary of the mesh" }),
         }

@@ -5,7 +5,6 @@
 use super::{EditError, Editor};
 use crate::curve::{CurveError, Relaxed, ScalarField, Section, Snake, SnakeParams, SurfaceCurve, between};
 use crate::mesh::FacePoint;
-use crate::network::CurveKind;
 use crate::observe::Observer;
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -73,7 +72,7 @@ impl<'m> Editor<'m> {
         let to = slid.as_ref().map_or(to, |s| s.place);
         let mut curves: Vec<u32> = self.ends_at(corner).iter().map(|e| e / 2).collect();
         curves.dedup();
-        curves.retain(|&c| self.network.curves[c as usize].kind == CurveKind::Smooth);
+        curves.retain(|&c| self.network.curves[c as usize].kind.is_smooth());
         let mut moved = Vec::with_capacity(curves.len());
         for &c in &curves {
             let curve = self.movable(c)?;

@@ -8,8 +8,8 @@
 use super::{EditError, Editor, feet};
 use crate::curve::between;
 use crate::mesh::FacePoint;
+use crate::network::Curve;
 use crate::network::imprint::{self, Place};
-use crate::network::{Curve, CurveKind};
 use glam::DVec3;
 
 /// Nearer to a point of the line than this share of the piece is at it.
@@ -30,8 +30,7 @@ impl Editor<'_> {
     pub(crate) fn slide(&self, corner: u32, to: DVec3) -> Result<Option<Slid>, EditError> {
         let curves = &self.network.curves;
         let of = |end: u32| &curves[end as usize / 2];
-        let bound: Vec<u32> =
-            self.ends_at(corner).into_iter().filter(|&end| of(end).kind != CurveKind::Smooth).collect();
+        let bound: Vec<u32> = self.ends_at(corner).into_iter().filter(|&end| !of(end).kind.is_smooth()).collect();
         let [a, b] = match bound[..] {
             [] => return Ok(None),
             [a, b] if of(a).kind == of(b).kind => [a, b],

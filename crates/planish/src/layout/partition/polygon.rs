@@ -14,7 +14,6 @@ use crate::layout::complex::Complex;
 use crate::layout::recut::Change;
 use crate::layout::shape::flat_cost;
 use crate::mesh::{Adjacency, NONE, TriMesh, previous};
-use crate::network::CurveKind;
 use crate::network::imprint::{Place, half_edge};
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -63,7 +62,7 @@ pub(in crate::layout) fn make_even(mesh: &TriMesh, complex: &mut Complex) -> boo
             if complex.arcs[a as usize].is_none() || !splittable(complex, a) {
                 return f64::INFINITY;
             }
-            let fixed = complex.arc(2 * a).kind != CurveKind::Smooth;
+            let fixed = !complex.arc(2 * a).kind.is_smooth();
             (SPLIT_COST + mean / length(complex, a)) * if fixed { 1.5 } else { 1.0 }
         })
         .collect();
@@ -168,7 +167,7 @@ impl Sectors {
             if star.is_empty() {
                 continue;
             }
-            let fixed = |h: u32| complex.arc(h).kind != CurveKind::Smooth;
+            let fixed = |h: u32| !complex.arc(h).kind.is_smooth();
             let begin = star.iter().position(|&h| fixed(h));
             let s = star.len();
             match begin {
@@ -240,7 +239,7 @@ fn sector_angle(
 /// For each vertex where fixed arcs end the vertices next to it along them.
 fn fixed_neighbours(complex: &Complex) -> BTreeMap<u32, Vec<u32>> {
     let mut found: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for arc in complex.arcs.iter().flatten().filter(|a| a.kind != CurveKind::Smooth) {
+    for arc in complex.arcs.iter().flatten().filter(|a| !a.kind.is_smooth()) {
         let n = arc.chain.len();
         for (end, beside) in [(arc.chain[0], arc.chain[1]), (arc.chain[n - 1], arc.chain[n - 2])] {
             if let (Place::Vertex(v), Place::Vertex(w)) = (end, beside) {

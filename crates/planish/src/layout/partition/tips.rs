@@ -10,7 +10,6 @@ use crate::layout::fill::{Gain, Scale};
 use crate::layout::recut::{Bench, Change};
 use crate::mesh::NONE;
 use crate::mesh::disjoint::disjoint;
-use crate::network::CurveKind;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -146,7 +145,7 @@ fn best(bench: &Bench, scale: &Scale, tip: u32) -> Option<Gain> {
             crate::layout::improve::star_change(complex, &complex.star(node)).filter(|change| change.pin.is_none());
         unions.extend(star);
         let arc = complex.arc(h);
-        if arc.kind == CurveKind::Smooth && arc.cells[0] != arc.cells[1] {
+        if arc.kind.is_smooth() && arc.cells[0] != arc.cells[1] {
             unions.push(Change { cells: arc.cells.to_vec(), removed: vec![h / 2], ..Change::default() });
         }
     }

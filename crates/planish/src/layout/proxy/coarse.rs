@@ -9,7 +9,6 @@ use super::strands::{Star, Strands};
 use crate::geom::predicates::orient2d;
 use crate::layout::complex::Complex;
 use crate::mesh::{Adjacency, NONE, TriMesh};
-use crate::network::CurveKind;
 use crate::network::imprint::Place;
 use crate::observe::Observer;
 use glam::DVec3;
@@ -149,7 +148,7 @@ fn fixed(mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex) -> Vec<bool> 
     complex.nodes.iter().for_each(|n| fixed[n.vertex as usize] = true);
     for a in complex.live_arcs() {
         let arc = complex.arc(2 * a);
-        if arc.kind != CurveKind::Smooth {
+        if !arc.kind.is_smooth() {
             for place in &arc.chain {
                 if let Place::Vertex(v) = *place {
                     fixed[v as usize] = true;
