@@ -35,7 +35,7 @@ pub fn layout(session: &Session, args: &Layout) -> Result<Status, Failure> {
         return Ok(Status::Done);
     }
     session.tell_warnings(&report);
-    let of_kind = |kind: CurveKind| network.curves.iter().filter(|c| c.kind == kind).count() as u64;
+    let of_kind = |is: fn(CurveKind) -> bool| network.curves.iter().filter(|c| is(c.kind)).count() as u64;
     let mut table = Summary::default();
     table.row("input", format!("{}: {} triangles", report.input.path, count(input.triangles.len() as u64)));
     table.row("patches", count(network.patches.len() as u64));
@@ -44,9 +44,9 @@ pub fn layout(session: &Session, args: &Layout) -> Result<Status, Failure> {
         "curves",
         format!(
             "{} smooth, {} on sharp edges, {} on the boundary",
-            count(of_kind(CurveKind::Smooth)),
-            count(of_kind(CurveKind::Feature)),
-            count(of_kind(CurveKind::Boundary))
+            count(of_kind(CurveKind::is_smooth)),
+            count(of_kind(|kind| kind == CurveKind::Feature)),
+            count(of_kind(|kind| kind == CurveKind::Boundary))
         ),
     );
     if let Some(Figure::Count(irregular)) = report.quality.get("patches.irregular_corners") {

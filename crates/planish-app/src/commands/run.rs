@@ -297,13 +297,13 @@ pub fn seam_rows(model: &Model, seams: &[planish::surface::SeamQuality]) -> Vec<
             SeamRow {
                 curve: s.curve,
                 patches: [sides[0].0, sides[1].0],
-                feature: s.kind != planish::network::CurveKind::Smooth,
+                feature: !s.kind.is_smooth(),
                 length: s.length,
                 gap_max: s.gap_max,
                 angle_max_deg: s.angle_max_deg,
                 angle_rms_deg: s.angle_rms_deg,
                 inner_angle_max_deg,
-                folded: s.kind == planish::network::CurveKind::Smooth && inner_angle_max_deg > pipeline::FOLDED_DEG,
+                folded: s.kind.is_smooth() && inner_angle_max_deg > pipeline::FOLDED_DEG,
             }
         })
         .collect()

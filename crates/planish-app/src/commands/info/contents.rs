@@ -156,14 +156,14 @@ fn network(path: &Path, value: &Value) -> Result<Contents, Failure> {
     found.count("corners", network.corners.len());
     found.count("curves", network.curves.len());
     found.count("patches", network.patches.len());
-    let of_kind = |kind: CurveKind| count(network.curves.iter().filter(|c| c.kind == kind).count() as u64);
+    let of_kind = |is: fn(CurveKind) -> bool| count(network.curves.iter().filter(|c| is(c.kind)).count() as u64);
     found.table.row(
         "of the curves",
         format!(
             "{} smooth, {} on sharp edges, {} on the boundary",
-            of_kind(CurveKind::Smooth),
-            of_kind(CurveKind::Feature),
-            of_kind(CurveKind::Boundary)
+            of_kind(CurveKind::is_smooth),
+            of_kind(|kind| kind == CurveKind::Feature),
+            of_kind(|kind| kind == CurveKind::Boundary)
         ),
     );
     if let (Some(vertices), Some(triangles)) = (value["mesh"]["vertices"].as_u64(), value["mesh"]["triangles"].as_u64())
