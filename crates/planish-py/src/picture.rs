@@ -5,7 +5,7 @@ use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use planish::DVec3;
 use planish::curve::SurfaceCurve;
 use planish::mesh::TriMesh;
-use planish::network::{CurveKind, Network};
+use planish::network::Network;
 use planish::render::{self, Camera, Line, Look, Paint, RenderError};
 use pyo3::prelude::*;
 

@@ -10,7 +10,7 @@ use planish::grid::{self, Grid, GridParams};
 use planish::layout::{Known, LayoutParams, layout};
 use planish::mesh::{Adjacency, TriMesh};
 use planish::model::{Drawing, Model};
-use planish::network::{CurveKind, Network, PatchMesh, changed_patches, imprint, reimprint};
+use planish::network::{Network, PatchMesh, changed_patches, imprint, reimprint};
 use planish::pipeline::{self, Earlier, PipelineParams};
 use planish::surface::{self, FitParams};
 use planish::synthetic::shapes;
