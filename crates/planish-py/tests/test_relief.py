@@ -31,7 +31,8 @@ def test_detail_moves_to_a_model_with_another_network(detailed: planish.Model, p
     assert before > 0.03 and after < 0.3 * before
     assert made.history[-1]["command"] == "relief transfer" and made.edit_relief("undo").reliefs[0].vectors.tolist() == plain.reliefs[0].vectors.tolist()
     nothing = plain.transfer_relief(detailed, reach=1e-9)
-    assert nothing.facts["missed"] == nothing.facts["texels"]
+    # But for corners, which lie on the form that was fitted.
+    assert nothing.facts["texels"] - nothing.facts["missed"] <= 4 * len(plain.reliefs)
 
 
 def test_arrays_become_the_relief_and_are_a_layer_that_can_be_taken_back(detailed: planish.Model) -> None:
