@@ -12,6 +12,7 @@ mod curve;
 mod meet;
 mod miss;
 mod motion;
+mod params;
 mod ring;
 mod stitch;
 mod sums;
@@ -20,4 +21,5 @@ mod wish;
 mod work;
 
 pub use meet::{EDGE_ANGLE_DEG, EdgeInSeam, edges_in_seams};
-pub use stitch::{StitchParams, stitch, stitch_near};
+pub use params::StitchParams;
+pub use stitch::{stitch, stitch_near};

@@ -15,6 +15,7 @@
 //! other than four patches that cannot be.
 
 use super::miss::farthest;
+use super::params::StitchParams;
 use super::system::System;
 use super::work::Work;
 use crate::grid::Grid;
@@ -23,51 +24,11 @@ use crate::observe::Observer;
 use crate::surface::fold::folds;
 use crate::surface::{FitError, Surface};
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// How often the weights around patches that fold, or lie too far off somewhere, are lowered.
 const EASINGS: usize = 4;
 /// Passes in which patches that turned over get their curves back: neighbours may turn over in turn.
 const REVERTS: usize = 3;
-
-/// How to smooth seams.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct StitchParams {
-    /// Largest angle between the normals along smooth seams, degrees.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "unit" = "degrees"))]
-    pub angle_tolerance: f64,
-    /// Largest angle by which a sharp seam's sides may turn from the normals of their own grids, degrees.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "unit" = "degrees"))]
-    pub sharp_tolerance: f64,
-    /// Share by which the RMS and the largest distance of the fit may grow for the seams' sake.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub fit_loss: f64,
-    /// Read from models of earlier versions, and not used.
-    #[serde(skip_serializing)]
-    #[schemars(skip)]
-    pub stiffness: Option<f64>,
-}
-
-impl Default for StitchParams {
-    /// .05 degrees, which reflections do not show; a degree for sharp seams; a tenth.
-    fn default() -> StitchParams {
-        StitchParams { angle_tolerance: 0.05, sharp_tolerance: 1.0, fit_loss: 0.1, stiffness: None }
-    }
-}
-
-impl StitchParams {
-    fn check(&self) -> Result<(), FitError> {
-        let above = |name, value: f64, wanted, is: bool| match is && value.is_finite() {
-            true => Ok(()),
-            false => Err(FitError::Parameter { name, value, wanted }),
-        };
-        above("angle_tolerance", self.angle_tolerance, "above 0", self.angle_tolerance > 0.0)?;
-        above("sharp_tolerance", self.sharp_tolerance, "above 0", self.sharp_tolerance > 0.0)?;
-        above("fit_loss", self.fit_loss, "0 or more", self.fit_loss >= 0.0)
-    }
-}
 
 /// Gives the patches on both sides of every smooth seam one tangent plane along it, to the tolerance of the angle where the fit
 /// can afford it, and those on both sides of a feature seam the slopes of their grids.

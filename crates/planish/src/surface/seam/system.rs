@@ -1,8 +1,8 @@
 //! The system: what moves cost the fit and what is left of the angles, minimised together by Gauss-Newton.
 
 use super::motion::{Motion, holds, motions, terms};
+use super::params::StitchParams;
 use super::ring::Condensed;
-use super::stitch::StitchParams;
 use super::sums::{Sums, Terms};
 use super::wish::{FIRST_WEIGHT, Turn, Wish, wishes};
 use super::work::{Filled, Work, shape};

@@ -1,7 +1,7 @@
 //! What is asked along seams: the angle there, and how it changes with the control points.
 
 use super::bend::{Side, Stand, fold_angle};
-use super::stitch::StitchParams;
+use super::params::StitchParams;
 use super::work::Work;
 use crate::surface::basis::{BasisRows, uniform_parameters};
 use crate::surface::fold::MeanNormals;
