@@ -8,8 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Makes the seams along curves smooth or sharp, whatever the mesh has there. A sharp curve counts as one on a sharp edge:
-/// it stays where it is until it is made smooth, and an edge under a smooth one is
-/// rounded.
+/// it stays where it is until it is made smooth. An edge under a smooth one is rounded.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Continuity {

@@ -10,8 +10,8 @@
 //! ```
 //!
 //! The angle is linearised (Gauss-Newton) and the weight of a seam is raised while it misses the tolerance and its
-//! patches can afford it. Control points next to a corner move as one
-//! plane. Departs from [K98], which moves every control point of a seam onto the line between its neighbours: around corners of
+//! patches can afford it. Seams on edges that were not found stay sharp unless a person calls them smooth (`meet`). Control
+//! points next to a corner move as one plane. Departs from [K98], which moves every control point of a seam onto the line between its neighbours: around corners of
 //! other than four patches that cannot be.
 
 use super::miss::farthest;
