@@ -44,7 +44,7 @@ use crate::observe::Cancelled;
 use crate::pipeline::record::Clock;
 use crate::pipeline::scan::run_figures;
 use crate::relief::{self, ReliefError};
-use crate::surface::{self, Continuity, FitError, FitParams, SeamQuality, StitchParams};
+use crate::surface::{self, Continuity, FitError, FitParams, SeamQuality, Spacing, StitchParams};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -470,7 +470,12 @@ fn surfaces_through(
             surface::mirror_surfaces(&model.mesh, network, plane, leveled, surfaces);
         }
     };
-    let mut fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &params.fit, o), control)?;
+    let mut fit = params.fit.clone();
+    if model.sketch.symmetry.is_some() {
+        // What crosses the plane is its own image only with knots that are.
+        fit.knots = Spacing::Even;
+    }
+    let mut fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &fit, o), control)?;
     // Seams are smoothed between images already, and what that takes from their symmetry is given back.
     symmetric(true, &mut fitted);
     let mut smooth = clock.stage(

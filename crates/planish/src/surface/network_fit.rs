@@ -7,11 +7,12 @@
 //! exact, and no patch pays for its neighbour.
 
 use super::basis::Knots;
-use super::fit::{Direction, Directions, FEWEST_CONTROL, project, solve_inside, surface_of};
+use super::fit::{Direction, Directions, project, solve_inside, surface_of};
 use super::fold::folds;
-use super::resolution::{self, Resolution};
+use super::quality::heights;
+use super::resolution::{Measure, Plan, Resolution, Spacing};
 use super::sides::{check_grids, curve_nodes, diagonal, node, side_len};
-use super::{FitError, Surface, deviation_of};
+use super::{FitError, Surface};
 use crate::grid::Grid;
 use crate::network::{Network, Patch};
 use crate::observe::Observer;
@@ -34,6 +35,14 @@ pub(super) const SMOOTHING: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
 pub struct FitParams {
     /// How many control points, directly or by a tolerance.
     pub resolution: Resolution,
+    /// Which distance of a patch the tolerance bounds: the root of the mean square, that which 95 of 100 do not exceed, or the
+    /// largest.
+    pub tolerance_of: Measure,
+    /// Where the knots of a tolerance stand: `fitted`, close where the shape bends much, or `even`, at equal steps.
+    pub knots: Spacing,
+    /// Most control points of all surfaces together that a tolerance may take; it is widened until they do.
+    #[schemars(range(min = 16))]
+    pub max_control: Option<usize>,
     /// Fewest grid cells per knot span in each direction; a tolerance that asks for more control points is not
     /// reached. Spans of a cell or two follow the noise of a scan and swing between its points.
     #[schemars(range(min = 1.0, max = 1e3), extend("unit" = "cells"))]
@@ -67,6 +76,9 @@ impl Default for FitParams {
     fn default() -> FitParams {
         FitParams {
             resolution: Resolution::Tolerance(1e-3),
+            tolerance_of: Measure::Rms,
+            knots: Spacing::Fitted,
+            max_control: None,
             cells_per_span: 4.0,
             smoothing: 0.01,
             continuity: Continuity::G1,
@@ -96,36 +108,36 @@ pub fn fit_network(
     if !(params.smoothing >= 0.0 && params.smoothing.is_finite()) {
         return Err(FitError::Parameter { name: "smoothing", value: params.smoothing, wanted: "0 or more" });
     }
-    let size = diagonal(grids);
-    let spans = |n: usize| (n.saturating_sub(1) as f64 / cells) as usize;
-    let most: Vec<usize> = nodes.iter().map(|&n| (spans(n) + 3).clamp(FEWEST_CONTROL, n.max(FEWEST_CONTROL))).collect();
-    let kinds = match params.continuity {
-        Continuity::C0 | Continuity::G1 => vec![Knots::Simple; network.curves.len()],
-        Continuity::G1Double => resolution::knots(network),
+    let allowed = match params.resolution {
+        Resolution::Tolerance(fraction) if !(fraction > 0.0 && fraction.is_finite()) => {
+            return Err(FitError::Parameter { name: "tolerance", value: fraction, wanted: "above 0" });
+        }
+        Resolution::Tolerance(fraction) => fraction * diagonal(grids),
+        _ => 0.0,
     };
-    let possible = |counts: Vec<usize>| resolution::possible(counts, &kinds, &nodes);
-    let mut counts = possible(resolution::counts(network, grids, &most, &params.resolution, size)?);
+    let mut plan = Plan::new(network, grids, &nodes, params, allowed, observer)?;
+    let mut knots = plan.knots();
     let mut smoothing = vec![params.smoothing; grids.len()];
-    let fit = |counts: &[usize], smoothing: &[f64]| {
-        fit_counts(network, grids, (&nodes, &kinds), counts, (params.smoothing, smoothing), observer)
+    let fit = |knots: &[Knots], smoothing: &[f64]| {
+        fit_knots(network, grids, &nodes, knots, (params.smoothing, smoothing), observer)
     };
-    let mut surfaces = fit(&counts, &smoothing)?;
-    if let &Resolution::Tolerance(fraction) = &params.resolution {
+    let mut surfaces = fit(&knots, &smoothing)?;
+    if matches!(params.resolution, Resolution::Tolerance(_)) {
         for _ in 0..COUNT_ROUNDS {
-            let over: Vec<bool> =
-                surfaces.par_iter().zip(grids).map(|(s, g)| deviation_of(s, g).rms > fraction * size).collect();
-            let mut raised = counts.clone();
-            for (patch, _) in network.patches.iter().zip(&over).filter(|(_, over)| **over) {
-                for c in patch.sides.map(|side| side.curve as usize) {
-                    raised[c] = resolution::finer(counts[c]);
-                }
-            }
-            let raised = possible(resolution::level(network, raised, Some(&most)));
-            if raised == counts {
+            let left = |(s, g): (&Surface, &Grid)| params.tolerance_of.of(&heights(s, g));
+            let over: Vec<bool> = surfaces.par_iter().zip(grids).map(|of| left(of) > allowed).collect();
+            let patches = network.patches.iter().zip(&over).filter(|(_, over)| **over);
+            if !plan.refine(patches.flat_map(|(patch, _)| patch.sides.map(|side| side.curve as usize))) {
                 break;
             }
-            counts = raised;
-            surfaces = fit(&counts, &smoothing)?;
+            let finer = plan.knots();
+            let control = |patch: &Patch| [0, 1].map(|k| finer[patch.sides[k].curve as usize].control());
+            let all: usize = network.patches.iter().map(|patch| control(patch).iter().product::<usize>()).sum();
+            if params.max_control.is_some_and(|most| all > most) {
+                break;
+            }
+            knots = finer;
+            surfaces = fit(&knots, &smoothing)?;
         }
     }
     let folded =
@@ -136,30 +148,30 @@ pub fn fit_network(
             break;
         }
         let trial: Vec<f64> = smoothing.iter().zip(&counted).map(|(&s, &n)| if n > 0 { weight } else { s }).collect();
-        let found = folded(&fit(&counts, &trial)?);
+        let found = folded(&fit(&knots, &trial)?);
         // A fold that smoothing does not at least halve is the grid's own, and the detail would be lost for nothing.
         for p in 0..grids.len() {
             if counted[p] > 0 && 2 * found[p] <= counted[p] {
                 smoothing[p] = weight;
             }
         }
-        surfaces = fit(&counts, &smoothing)?;
+        surfaces = fit(&knots, &smoothing)?;
         counted = folded(&surfaces);
     }
     Ok(surfaces)
 }
 
-/// Fits with known counts of nodes and control points along the curves, a smoothing for all curves and one for the inside
+/// Fits with known counts of nodes and knots along the curves, a smoothing for all curves and one for the inside
 /// of each patch: a folded patch does not bend the curves of its neighbours, which would fold in turn.
-fn fit_counts(
+fn fit_knots(
     network: &Network,
     grids: &[Grid],
-    (nodes, kinds): (&[usize], &[Knots]),
-    counts: &[usize],
+    nodes: &[usize],
+    knots: &[Knots],
     (curve_smoothing, smoothing): (f64, &[f64]),
     observer: &dyn Observer,
 ) -> Result<Vec<Surface>, FitError> {
-    let used = (0..nodes.len()).filter(|&c| nodes[c] > 0).map(|c| (nodes[c], counts[c], kinds[c]));
+    let used = (0..nodes.len()).filter(|&c| nodes[c] > 0).map(|c| (nodes[c], knots[c].clone()));
     let directions = Directions::new(used)?;
     let uses = network.uses();
     let curves: Vec<Result<Vec<DVec3>, FitError>> = curve_nodes(network, &uses, grids)
@@ -168,8 +180,8 @@ fn fit_counts(
         .map(|(c, nodes)| {
             Ok(match nodes.len() {
                 0 => Vec::new(),
-                n if curve_smoothing == 0.0 => fit_curve(&nodes, directions.get((n, counts[c], kinds[c]))),
-                n => fit_curve(&nodes, &directions.get((n, counts[c], kinds[c])).smoothed(curve_smoothing)?),
+                n if curve_smoothing == 0.0 => fit_curve(&nodes, directions.get(n, &knots[c])),
+                n => fit_curve(&nodes, &directions.get(n, &knots[c]).smoothed(curve_smoothing)?),
             })
         })
         .collect();
@@ -182,7 +194,7 @@ fn fit_counts(
         .zip(smoothing)
         .map(|((patch, grid), &smoothing)| {
             observer.check()?;
-            let [along_u, along_v] = patch_directions(patch, grid, &directions, counts, kinds);
+            let [along_u, along_v] = patch_directions(patch, grid, &directions, knots);
             let projection = project(&grid.points, along_u, along_v);
             let net = if smoothing > 0.0 {
                 fill(patch, &curves, &projection, &along_u.smoothed(smoothing)?, &along_v.smoothed(smoothing)?)
@@ -201,12 +213,12 @@ pub(crate) fn patch_directions<'a>(
     patch: &Patch,
     grid: &Grid,
     directions: &'a Directions,
-    counts: &[usize],
-    kinds: &[Knots],
+    knots: &[Knots],
 ) -> [&'a Direction; 2] {
     let along = |side: usize, nodes: usize| {
-        let c = patch.sides[side].curve as usize;
-        directions.get((nodes, counts[c], kinds[c]))
+        let side = patch.sides[side];
+        let knots = &knots[side.curve as usize];
+        if side.reversed { directions.get(nodes, &knots.reversed()) } else { directions.get(nodes, knots) }
     };
     [along(0, grid.cols), along(1, grid.rows)]
 }
