@@ -24,11 +24,11 @@ mod side;
 mod sizes;
 
 pub use feature::curve::{FeatureGrid, Sections, relax_with_features};
-pub use feature::network::{check_features, family_of, relax_network};
+pub use feature::network::{Drawn, check_features, family_of, relax_network};
 pub use feature::{Family, FeatureCurve, FeatureError};
 pub use follow::follow;
 pub use quality::{GridQuality, measure};
-pub use resample::resample;
+pub use resample::{densify, resample};
 pub use sizes::choose_sizes;
 
 use crate::grid::chart::locate::Spot;

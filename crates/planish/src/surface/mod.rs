@@ -26,7 +26,7 @@ pub(crate) use evaluate::RowSampler;
 pub use fit::{FEWEST_CONTROL, fit};
 pub use fold::folds;
 pub use mirrored::mirror_surfaces;
-pub use network_fit::{Continuity, FitParams, fit_network};
+pub use network_fit::{Continuity, FitParams, fit_network, starved};
 pub use quality::{
     Deviation, SeamAngle, SeamQuality, deviation, deviation_of, measure_seams, measure_seams_apart, normal_deviation_of, seam_angles,
 };

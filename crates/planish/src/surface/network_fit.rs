@@ -86,6 +86,43 @@ impl Default for FitParams {
     }
 }
 
+impl FitParams {
+    fn check(&self) -> Result<(), FitError> {
+        let (cells, smoothing) = (self.cells_per_span, self.smoothing);
+        let wrong = |name, value, wanted| Err(FitError::Parameter { name, value, wanted });
+        match self.resolution {
+            Resolution::Tolerance(share) if !(share > 0.0 && share.is_finite()) => wrong("tolerance", share, "above 0"),
+            _ if !(cells >= 1.0 && cells.is_finite()) => wrong("cells_per_span", cells, "1 or more"),
+            _ if !(smoothing >= 0.0 && smoothing.is_finite()) => wrong("smoothing", smoothing, "0 or more"),
+            _ => Ok(()),
+        }
+    }
+
+    /// The distance that the tolerance allows, world units; 0 without one.
+    fn allowed(&self, grids: &[Grid]) -> f64 {
+        match self.resolution {
+            Resolution::Tolerance(share) => share * diagonal(grids),
+            _ => 0.0,
+        }
+    }
+}
+
+/// For each curve how many times the tolerance a patch misses along its chord with as many control points as the grids carry,
+/// and 0 if all keep it: where it is more, only finer grids help.
+///
+/// # Errors
+/// As [`fit_network`].
+pub fn starved(
+    network: &Network,
+    grids: &[Grid],
+    params: &FitParams,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, FitError> {
+    let nodes = check_grids(network, grids)?;
+    params.check()?;
+    Ok(Plan::new(network, grids, &nodes, params, params.allowed(grids), observer)?.excess())
+}
+
 /// Fits one surface to each grid of a network; neighbours share their boundary control points bit for bit.
 ///
 /// * `grids` - one per patch, their boundary nodes the same on both sides of a curve
@@ -101,20 +138,8 @@ pub fn fit_network(
     observer: &dyn Observer,
 ) -> Result<Vec<Surface>, FitError> {
     let nodes = check_grids(network, grids)?;
-    let cells = params.cells_per_span;
-    if !(cells >= 1.0 && cells.is_finite()) {
-        return Err(FitError::Parameter { name: "cells_per_span", value: cells, wanted: "1 or more" });
-    }
-    if !(params.smoothing >= 0.0 && params.smoothing.is_finite()) {
-        return Err(FitError::Parameter { name: "smoothing", value: params.smoothing, wanted: "0 or more" });
-    }
-    let allowed = match params.resolution {
-        Resolution::Tolerance(fraction) if !(fraction > 0.0 && fraction.is_finite()) => {
-            return Err(FitError::Parameter { name: "tolerance", value: fraction, wanted: "above 0" });
-        }
-        Resolution::Tolerance(fraction) => fraction * diagonal(grids),
-        _ => 0.0,
-    };
+    params.check()?;
+    let allowed = params.allowed(grids);
     let mut plan = Plan::new(network, grids, &nodes, params, allowed, observer)?;
     let mut knots = plan.knots();
     let mut smoothing = vec![params.smoothing; grids.len()];

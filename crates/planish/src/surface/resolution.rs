@@ -7,7 +7,7 @@ use super::FitError;
 use super::basis::Knots;
 use super::fit::FEWEST_CONTROL;
 use super::network_fit::{Continuity, FitParams};
-use super::quality::normal;
+use super::quality::{Deviation, normal};
 use super::seam::corner::sectors;
 use super::spacing::{Chord, Spaced};
 use crate::grid::Grid;
@@ -53,6 +53,24 @@ pub enum Measure {
 }
 
 impl Measure {
+    /// Its short name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Measure::Rms => "RMS",
+            Measure::P95 => "at 95 %",
+            Measure::Max => "at most",
+        }
+    }
+
+    /// The one of three measures that this is.
+    pub fn among(self, deviation: &Deviation) -> f64 {
+        match self {
+            Measure::Rms => deviation.rms,
+            Measure::P95 => deviation.p95,
+            Measure::Max => deviation.max,
+        }
+    }
+
     /// The measure of some distances; 0 of none.
     pub fn of(self, distances: &[f64]) -> f64 {
         let n = distances.len();
@@ -137,6 +155,12 @@ impl Plan {
             if run.reversed { knots.reversed() } else { knots.clone() }
         };
         self.along.iter().enumerate().map(one).collect()
+    }
+
+    /// For each curve how many times the tolerance a patch misses along its chord with as many spans as the grids carry; 0 if
+    /// all keep it.
+    pub fn excess(&self) -> Vec<f64> {
+        self.of.iter().map(|&chord| self.chords[chord].excess).collect()
     }
 
     /// Gives the chords of these curves about a quarter more spans, as far as their grids carry them. False if none got more.
