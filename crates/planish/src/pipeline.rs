@@ -276,8 +276,6 @@ fn fit_with(
     })
 }
 
-/// Rounds in which grids are made finer for the tolerance of the fit; each doubles sides.
-const DENSER_ROUNDS: usize = 3;
 /// Finer grids that leave more than this part of a miss do not help: the form has an edge there, or is rough at every scale. A
 /// smooth form leaves a sixteenth, a kink half.
 const DENSER_HELPS: f64 = 0.7;
@@ -295,8 +293,8 @@ fn resampled(
     let mut grids = grid::resample(mesh, network, patches, drawn, &params.grid, &first)?;
     let start = grids.iter().map(|g| g.points.len()).sum();
     let mut before: Vec<f64> = Vec::new();
-    for round in 0..DENSER_ROUNDS {
-        let part = Part::new(observer, 0.7 + 0.1 * round as f64, 0.1);
+    for round in 0..params.grid.denser_rounds {
+        let part = Part::new(observer, 1.0 - 0.3 * 0.5f64.powi(round as i32), 0.15 * 0.5f64.powi(round as i32));
         let mut need = surface::starved(network, &grids, &params.fit, &part)?;
         for (need, before) in need.iter_mut().zip(&before) {
             // What was not made finer for itself is not asked again.

@@ -165,9 +165,11 @@ pub fn mesh_samples(
     Ok(ScanMeshed { samples, meshed, specks, closed, lids, to_points })
 }
 
-/// A surface fitted to a scan follows its mesh to this share of the noise, within these shares of the diagonal.
-const FIT_NOISE: f64 = 0.5;
-const FIT_CLOSEST: f64 = 2e-4;
+/// A surface fitted to a scan follows its mesh along the normal to this share of the noise, within these shares of the diagonal:
+/// a quarter of what kept distances at equal parameters as near, of which most goes sideways.
+const FIT_NOISE: f64 = 0.125;
+const FIT_CLOSEST: f64 = 5e-5;
+const FIT_FARTHEST: f64 = 2.5e-4;
 /// Edges of the mesh of a scan that pass more than this share of that beside the surface are split.
 const BENT_TOLERANCE: f64 = 0.2;
 /// Smoothing at noise of a thousandth of the diagonal; it goes with the square of the noise, as in Wiener's filter. Less leaves
@@ -181,7 +183,7 @@ const GRID_DENSITY: f64 = 6.0;
 
 /// How closely a surface is fitted to a scan, as a share of the diagonal.
 fn fit_tolerance(samples: &Samples) -> f64 {
-    (FIT_NOISE * samples.noise / samples.diagonal).max(FIT_CLOSEST)
+    (FIT_NOISE * samples.noise / samples.diagonal).clamp(FIT_CLOSEST, FIT_FARTHEST)
 }
 
 /// The parameters that suit the mesh of a scan: how fine its grids are, and how closely surfaces are fitted to it.
@@ -197,7 +199,7 @@ pub fn params_for(made: &ScanMeshed) -> PipelineParams {
     let density = (GRID_POINTS / vertices as f64).min(GRID_DENSITY).max(usual.grid.density);
     PipelineParams {
         fit: FitParams { resolution, smoothing, ..usual.fit },
-        grid: GridParams { density, ..usual.grid },
+        grid: GridParams { density, denser_rounds: 0, ..usual.grid },
         ..usual
     }
 }

@@ -91,6 +91,14 @@ pub enum FitError {
         /// What it must be.
         wanted: &'static str,
     },
+    /// Control points are asked for at a patch that does not exist.
+    #[error("control points are asked for at patch {patch}, but there are {patches}, counted from 0; `planish info` lists them")]
+    NoSuchPatch {
+        /// The patch.
+        patch: usize,
+        /// Patches of the network.
+        patches: usize,
+    },
     /// A budget of control points that no tolerance keeps.
     #[error("{most} control points in all are too few, {least} are needed; raise the limit, or give fewer patches")]
     Budget {

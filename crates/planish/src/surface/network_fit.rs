@@ -40,6 +40,10 @@ pub struct FitParams {
     pub tolerance_of: Measure,
     /// Where the knots of a tolerance stand: `fitted`, close where the shape bends much, or `even`, at equal steps.
     pub knots: Spacing,
+    /// Control points of single patches: the patch, those along `u` and those along `v`, at least 4 each. They go over all else,
+    /// along the chords of the patch; of two patches on a chord the larger number counts.
+    #[schemars(extend("per_patch" = true))]
+    pub control_at: Vec<[usize; 3]>,
     /// Most control points of all surfaces together that a tolerance may take; it is widened until they do.
     #[schemars(range(min = 16))]
     pub max_control: Option<usize>,
@@ -78,6 +82,7 @@ impl Default for FitParams {
             resolution: Resolution::Tolerance(1e-3),
             tolerance_of: Measure::Rms,
             knots: Spacing::Fitted,
+            control_at: Vec::new(),
             max_control: None,
             cells_per_span: 4.0,
             smoothing: 0.01,

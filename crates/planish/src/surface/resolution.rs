@@ -137,11 +137,14 @@ impl Plan {
                 chord.strands.push((p, axis, side.reversed != along[side.curve as usize].reversed));
             }
         }
+        let asked = counts_at(network, &of, chords.len(), &params.control_at)?;
+        chords.iter_mut().zip(asked).for_each(|(chord, count)| chord.asked = count);
         let chords = match &params.resolution {
             Resolution::Tolerance(_) => spaced(grids, &chords, params, allowed, observer)?,
             given => {
                 let counts = given_counts(network, &of, chords.len(), given)?;
-                chords.iter().zip(counts).map(|(chord, count)| Spaced::even(chord, count)).collect()
+                let even = |(chord, count): (&Chord, usize)| Spaced::even(chord, chord.asked.unwrap_or(count));
+                chords.iter().zip(counts).map(even).collect()
             }
         };
         Ok(Plan { along, of, chords })
@@ -217,6 +220,29 @@ fn spaced(
         }
     }
     Ok(best)
+}
+
+/// Counts of the chords that single patches ask for.
+fn counts_at(
+    network: &Network,
+    of: &[usize],
+    chords: usize,
+    asked: &[[usize; 3]],
+) -> Result<Vec<Option<usize>>, FitError> {
+    let mut wanted = vec![None; chords];
+    for &[patch, along_u, along_v] in asked {
+        let Some(sides) = network.patches.get(patch).map(|p| p.sides) else {
+            return Err(FitError::NoSuchPatch { patch, patches: network.patches.len() });
+        };
+        for (side, control) in sides.into_iter().zip([along_u, along_v]) {
+            if control < FEWEST_CONTROL {
+                return Err(FitError::TooFewControl { control });
+            }
+            let entry = &mut wanted[of[side.curve as usize]];
+            *entry = Some(entry.map_or(control, |before: usize| before.max(control)));
+        }
+    }
+    Ok(wanted)
 }
 
 /// Counts of the chords as they are given, the largest of their curves.

@@ -25,7 +25,7 @@ use crate::surface::fold::folds;
 use crate::surface::{FitError, Surface};
 use rayon::prelude::*;
 
-/// How often the weights around patches that fold, or lie too far off somewhere, are lowered; the last time to nothing.
+/// How often the weights around patches that fold, or lie too far off somewhere, are lowered.
 const EASINGS: usize = 4;
 /// Passes in which patches that turned over get their curves back: neighbours may turn over in turn.
 const REVERTS: usize = 3;
@@ -143,7 +143,7 @@ fn solved(
             observer.progress(1.0);
             return Ok(made);
         }
-        system.ease(&worse, easing + 1 == EASINGS);
+        system.ease(&worse);
     }
     unreachable!("the last easing returns")
 }

@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// overshoot, the next doubles the digits.
 const SETTLING_ROUNDS: usize = 2;
 const ROUNDS: usize = 20;
-/// Weight that seams around a folded patch keep at least, until they are given up: a hundredth of the first.
+/// Weight that seams around a folded patch keep at least: a hundredth of the first.
 const LEAST_WEIGHT: f64 = 1e-5;
 /// What a seam's weight is raised by while it misses the tolerance.
 const RAISE: f64 = 3.0;
@@ -240,10 +240,10 @@ impl<'a> System<'a> {
         sums.done()
     }
 
-    /// Lowers the weights around some patches, to nothing if this is the last time, and starts there anew.
-    pub fn ease(&mut self, patches: &[usize], is_last: bool) {
+    /// Lowers the weights around some patches, and starts there anew.
+    pub fn ease(&mut self, patches: &[usize]) {
         for wish in self.wishes.iter_mut().filter(|w| w.sides.iter().any(|s| patches.contains(&s.patch))) {
-            wish.ceiling = if is_last { 0.0 } else { (wish.weight.min(1.0) * EASE).max(LEAST_WEIGHT) };
+            wish.ceiling = (wish.weight.min(1.0) * EASE).max(LEAST_WEIGHT);
         }
         for wish in &mut self.wishes {
             (wish.weight, wish.last) = (FIRST_WEIGHT.min(wish.ceiling), f64::INFINITY);
