@@ -1,6 +1,7 @@
 """Every line of a shell in README, guide and tutorials runs, in the order of its page, on small stand-ins for the reader's files; so
-does every block of a script. What cannot run is in `LEFT_OUT`, with the reason. The Python blocks are run by
-crates/planish-py/tests (those of `docs/examples.md` and of the tutorial for researchers) or checked there for their names."""
+does every block of a script. What cannot run is in `LEFT_OUT` and `PIECES`, with the reason. Of the Python blocks those of
+`docs/examples.md` and of the tutorial for researchers are run by crates/planish-py/tests; those of README, guide/python.md and the
+tutorial for many files are not."""
 
 import gzip
 import os

@@ -3,7 +3,7 @@
 //! `docs/methods/layout.md`, step 3.
 
 use super::conformal;
-use super::energy::Effort;
+use super::effort::Effort;
 use super::room::Room;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::field::CrossField;

@@ -2,18 +2,13 @@
 //! from being flipped.
 
 use super::cones::Charts;
+use super::effort::Effort;
 use super::seams::Seams;
 use crate::mesh::TriMesh;
 use crate::network::field::flat;
 use glam::{DMat2, DVec2};
 use planish_sparse::SparseCholesky;
 use rayon::prelude::*;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-
-/// Faces whose energy is asked for at most: on one core half a minute. Layouts of the measured meshes end before that and
-/// have the same bytes without it.
-const MOST_EFFORT: u64 = 400_000_000;
 
 /// Entries of a system at most. A face has 9 for each axis where its corners are unknowns of their own, some 100 000 on a
 /// usual mesh; where places hang on many others, as along thousands of rims, they would be any number. These take 200 MB.
@@ -54,18 +49,6 @@ pub(super) struct Maps<'a> {
     /// Whether the barrier keeps every face within a quarter turn of its field, too.
     within_quarter: bool,
     effort: Effort,
-}
-
-/// Faces whose energy was asked for, over all maps of a layout together: what most of their time goes by, and the same on
-/// any machine.
-#[derive(Clone, Debug, Default)]
-pub(in crate::layout) struct Effort(Arc<AtomicU64>);
-
-impl Effort {
-    /// True once the maps of a layout have had their share of work: those that are not there by then are given up.
-    pub fn is_spent(&self) -> bool {
-        self.0.load(Ordering::Relaxed) > MOST_EFFORT
-    }
 }
 
 impl<'a> Maps<'a> {
@@ -197,7 +180,7 @@ impl<'a> Maps<'a> {
     /// half around against the field; while the trace of every Jacobian is positive none is. So the trace has a barrier of
     /// the same form, least at the identity, if the map is to stay within a quarter turn.
     pub fn barrier(&self, x: &[f64], softness: f64) -> (f64, Vec<f64>) {
-        self.effort.0.fetch_add(self.gradient.len() as u64, Ordering::Relaxed);
+        self.effort.add(self.gradient.len());
         let each = |f: usize| self.face_barrier(&self.jacobian(f, x), softness);
         let infinite = (f64::INFINITY, DMat2::ZERO);
         let each = |f: usize| each(f).map_or(infinite, |(e, by)| (self.share[f] * e, self.share[f] * by));

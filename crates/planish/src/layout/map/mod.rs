@@ -11,6 +11,7 @@
 mod carry;
 mod cones;
 mod conformal;
+mod effort;
 mod eliminate;
 mod energy;
 #[cfg(test)]
@@ -20,7 +21,7 @@ mod seams;
 mod untangle;
 
 pub(super) use cones::Charts;
-pub(super) use energy::Effort;
+pub(super) use effort::Effort;
 
 use crate::geom::predicates::orient2d;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
