@@ -26,7 +26,7 @@ use glam::{DVec2, DVec3};
 const PROXY_TRIANGLES: usize = 6_000;
 
 /// A proxy that has more times the triangles wanted, for its lines are dense, is not mapped: time and memory of a map grow
-/// faster than its triangles. None of the measured meshes comes near to it.
+/// faster than its triangles. Chosen; the measured meshes that were tried do not meet it.
 const MOST_TO_WANTED: usize = 4;
 
 /// Radius of the mean of principal directions, in sides of a patch of [`TYPICAL_PATCHES`].
