@@ -5,7 +5,7 @@
 #   make studio  the page of the studio, which the program has inside
 #   make site    the documentation as a site: out/site
 #   make wheel   the Python package with the program inside: out/wheels
-#   make fuzz    damaged files for ten minutes a format, 300 killed sessions, hostile shapes through every command
+#   make fuzz    damaged files for ten minutes a format, 300 killed sessions, 3 000 hostile inputs through every command
 #   make lint    formatting and clippy, warnings are errors
 #   make bench   time every stage: bench/runs/<date>-<machine>.json
 #   make bench-studio  figures of the studio: opening, dragging, fitting, memory

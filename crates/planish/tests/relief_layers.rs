@@ -121,6 +121,22 @@ fn what_is_even_everywhere_is_no_short_wave_on_a_closed_surface() {
 }
 
 #[test]
+fn a_blur_over_1e9_and_1e150_sizes_of_the_surface_leaves_the_mean_and_is_no_fault() {
+    let work = flat(2, 17);
+    let s = surfaces(&work, 6);
+    let shapes: Vec<[usize; 2]> = work.grids.iter().map(|g| [g.rows, g.cols]).collect();
+    let filter = layers::Filter::new(&work.network, &s, &shapes, &Silent).unwrap();
+    // A half of the square is up by 1.
+    let half = |p: &DVec3| DVec3::new(0.0, 0.0, if p.x < 1.0 { 1.0 } else { 0.0 });
+    let nodes: Vec<Vec<DVec3>> = work.grids.iter().map(|g| g.points.iter().map(half).collect()).collect();
+    for radius in [1e9, 1e150] {
+        let soft = filter.blur(&filter.gather(&nodes), radius, &Silent).unwrap();
+        let spread = soft.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], d| [a.min(d.z), b.max(d.z)]);
+        assert!(spread[1] - spread[0] < 1e-6 && (0.45..0.55).contains(&spread[0]), "{radius}: {spread:?}");
+    }
+}
+
+#[test]
 fn a_stroke_has_its_height_in_the_middle_and_goes_on_over_seams_without_a_crack() {
     let work = flat(2, 33);
     let mut edited = Edited::new(&work, &heights(&work, |_| 0.0));

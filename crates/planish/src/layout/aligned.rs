@@ -12,7 +12,7 @@ use super::embed::{self, EmbedError};
 use super::fan;
 use super::fitness;
 use super::integers::{self, IntegerMap, QuantizeError, Scale};
-use super::map::{self, Charts};
+use super::map::{self, Charts, Effort};
 use super::proxy::{self, Proxy, Sizing};
 use super::recut::Bench;
 use super::{LayoutParams, SETTLING_PER_SMOOTHING, improve};
@@ -24,6 +24,10 @@ use glam::{DVec2, DVec3};
 
 /// Triangles of the proxy: the seamless maps of the measured meshes were made on 5 000 to 6 000 (two fifths of a second).
 const PROXY_TRIANGLES: usize = 6_000;
+
+/// A proxy that has more times the triangles wanted, for its lines are dense, is not mapped: time and memory of a map grow
+/// faster than its triangles. Chosen; the measured meshes that were tried do not meet it.
+const MOST_TO_WANTED: usize = 4;
 
 /// Radius of the mean of principal directions, in sides of a patch of [`TYPICAL_PATCHES`].
 const RADIUS_TO_SIDE: f64 = 0.4;
@@ -74,14 +78,20 @@ impl Aligned {
         (mesh, sharp): (&TriMesh, &[bool]),
         attempt: &Attempt,
         sizing: &mut Sizing,
+        effort: &Effort,
         observer: &dyn Observer,
-    ) -> Result<Option<Aligned>, Cancelled> {
+    ) -> Result<Option<Aligned>, AlignError> {
         let mut rounds = REFINEMENTS;
         let (proxy, charts) = loop {
             let Some(proxy) = proxy::proxy(mesh, sharp, &[], sizing, observer) else { return Ok(None) };
-            let charts = charts(&proxy, attempt, observer)?;
+            let most = MOST_TO_WANTED * sizing.triangles(mesh);
+            if proxy.mesh.triangles.len() > most {
+                return Err(AlignError::Dense { found: proxy.mesh.triangles.len(), most });
+            }
+            let mut charts = charts(&proxy, attempt, observer)?;
+            charts.effort = effort.clone();
             let tight: Vec<DVec3> = charts.tight.iter().map(|&v| proxy.mesh.points[v as usize]).collect();
-            if tight.is_empty() || rounds == 0 {
+            if tight.is_empty() || rounds == 0 || !sizing.has_room_for(tight.len()) {
                 break (proxy, charts);
             }
             rounds -= 1;
@@ -122,6 +132,14 @@ pub(super) enum AlignError {
     /// There is no even mesh or no map.
     #[error("the mesh cannot be mapped")]
     Unmapped,
+    /// Lines and boundaries leave no room for an even mesh of some thousand triangles.
+    #[error("its lines are so dense that an even mesh has {found} triangles, and maps are for {most} at most")]
+    Dense {
+        /// Triangles of the proxy.
+        found: usize,
+        /// The most that are mapped.
+        most: usize,
+    },
     /// The map is not one-to-one.
     #[error("its map stays folded in {faults} places")]
     Folded {
@@ -204,6 +222,7 @@ pub(super) fn lay(
     let mut why = AlignError::Unmapped;
     let mut best: Option<Laid> = None;
     let mut has_tight = false;
+    let effort = Effort::default();
     for attempt in &ATTEMPTS {
         // Where no cone is to be moved it would be the same again.
         if attempt.roomy && attempt.curvature > 0.0 && !has_tight {
@@ -211,7 +230,7 @@ pub(super) fn lay(
         }
         let mut sizing = Sizing::even(mesh, PROXY_TRIANGLES);
         for _ in 0..=FINER_ROUNDS {
-            let Some(aligned) = Aligned::on((mesh, sharp), attempt, &mut sizing, observer)? else {
+            let Some(aligned) = Aligned::on((mesh, sharp), attempt, &mut sizing, &effort, observer)? else {
                 observer.check()?;
                 break;
             };
@@ -228,8 +247,14 @@ pub(super) fn lay(
             }
             let Some(trouble) = trouble else { break };
             why = trouble;
+            if effort.is_spent() {
+                return best.ok_or(why);
+            }
             // Where no number had room, finer edges hardly ever help.
             if best.is_none() || why.places().is_empty() {
+                break;
+            }
+            if !sizing.has_room_for(why.places().len()) {
                 break;
             }
             halve(&mut sizing, why.places());
@@ -297,6 +322,9 @@ impl Aligned {
                 }
                 Err(AlignError::Cancelled(cancelled)) => return Err(cancelled),
                 Err(e) => trouble = Some(e),
+            }
+            if self.charts.effort.is_spent() {
+                break;
             }
             // What has no room for two numbers of squares has none for more.
             if i > 0 && best.is_none() && trouble.as_ref().is_some_and(|e| !e.places().is_empty()) {

@@ -48,6 +48,12 @@ const EDGE_TO_SIDE: f64 = 0.12;
 /// Attempts with edges of half the length each, where the working mesh proves too coarse.
 const MESH_ATTEMPTS: usize = 5;
 
+/// Triangles of the working mesh at most, for each one of the input and for each patch. Even ones of [`EDGE_TO_SIDE`] are
+/// 160 a patch (2.3 / EDGE_TO_SIDE^2), and up to four times as many where halving passes that length. Strips and needles,
+/// which would take any number, are followed less closely.
+const WORK_PER_TRIANGLE: usize = 4;
+const WORK_PER_PATCH: usize = 640;
+
 /// Attempts at the number of patches asked for: the features decide how many patches a partition gives.
 const COUNT_ATTEMPTS: usize = 3;
 
@@ -224,8 +230,15 @@ fn partitioned(
             fixed[mesh.origin(next(h)) as usize] = true;
         }
     }
+    let most = WORK_PER_TRIANGLE * mesh.triangles.len() + WORK_PER_PATCH * params.patches;
+    let mut before = 0;
     for _ in 0..MESH_ATTEMPTS {
-        let work = refine::refine(mesh, edge, &fixed);
+        let work = refine::refine(mesh, edge, &fixed, most);
+        // No room for shorter edges.
+        if work.mesh.triangles.len() == before {
+            break;
+        }
+        before = work.mesh.triangles.len();
         if let Some((work, complex)) = draft(work, (sharp, corners), side, params, observer)? {
             let work_adjacency = Adjacency::new(&work.mesh);
             if let Some(mut bench) = Bench::new(&work.mesh, &work_adjacency, complex)
@@ -320,10 +333,13 @@ fn draft(
     let work_sharp = carry(&work, &adjacency, sharp);
     let ground = partition::Ground::new(&work.mesh, &adjacency, &work_sharp);
     let mut cells = (params.patches as f64 / 2.0).max(1.0);
+    // A cell becomes two patches or so, and needles reach over any number of sides.
+    let faces = work.parent.iter().map(|p| p.0 as usize + 1).max().unwrap_or(0);
+    let most = (faces / TRIANGLES_PER_PATCH).max(PARTITION_PATCHES) / 2;
     let mut best: Option<(usize, Refined, Complex)> = None;
     for attempt in 0..COUNT_ATTEMPTS {
         observer.progress(0.1 * attempt as f64);
-        let (label, count) = partition::partition(&ground, cells.round() as usize, COVER * side, observer)?;
+        let (label, count) = partition::partition(&ground, cells.round() as usize, (COVER * side, most), observer)?;
         let (finer, mut complex) = draw(&work, &ground, (sharp, given), &label, count, side / 4.0);
         if !polygon::make_even(&finer.mesh, &mut complex) {
             break;

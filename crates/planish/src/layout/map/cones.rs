@@ -3,6 +3,7 @@
 //! `docs/methods/layout.md`, step 3.
 
 use super::conformal;
+use super::effort::Effort;
 use super::room::Room;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::field::CrossField;
@@ -27,6 +28,8 @@ pub(in crate::layout) struct Charts {
     pub tight: Vec<u32>,
     /// For each face how much a map along the field stretches it ([`conformal`]).
     pub scale: Vec<f64>,
+    /// What has gone into maps of this layout, those of other charts among them.
+    pub effort: Effort,
 }
 
 impl Charts {
@@ -60,7 +63,7 @@ impl Charts {
         }
         let axis = theta.iter().zip(&turned).map(|(theta, &m)| theta + f64::from(m) * FRAC_PI_2).collect();
         let cut = prune(mesh, adjacency, &jump, &index, &tree);
-        Charts { axis, jump, cut, index, sectors, tight, scale }
+        Charts { axis, jump, cut, index, sectors, tight, scale, effort: Effort::default() }
     }
 
     /// Vertices where a map has to have a corner of a patch: cones, and places where lines end, meet or turn.

@@ -2,12 +2,17 @@
 //! from being flipped.
 
 use super::cones::Charts;
+use super::effort::Effort;
 use super::seams::Seams;
 use crate::mesh::TriMesh;
 use crate::network::field::flat;
 use glam::{DMat2, DVec2};
 use planish_sparse::SparseCholesky;
 use rayon::prelude::*;
+
+/// Entries of a system at most. A face has 9 for each axis where its corners are unknowns of their own, some 100 000 on a
+/// usual mesh; where places hang on many others, as along thousands of rims, they would be any number. These take 200 MB.
+const MOST_ENTRIES: usize = 8_000_000;
 
 /// Weight of the change of area beside the change of angles in [`Maps::barrier`] (the authors' choice is a half or less).
 const AREA_WEIGHT: f64 = 0.3;
@@ -43,6 +48,7 @@ pub(super) struct Maps<'a> {
     share: Vec<f64>,
     /// Whether the barrier keeps every face within a quarter turn of its field, too.
     within_quarter: bool,
+    effort: Effort,
 }
 
 impl<'a> Maps<'a> {
@@ -62,7 +68,12 @@ impl<'a> Maps<'a> {
         };
         let gradient = (0..faces).map(gradient).collect();
         let share = area.iter().map(|a| a.max(least) / whole).collect();
-        Maps { seams, gradient, share, within_quarter }
+        Maps { seams, gradient, share, within_quarter, effort: charts.effort.clone() }
+    }
+
+    /// True once no more work may go into the maps.
+    pub fn is_spent(&self) -> bool {
+        self.effort.is_spent()
     }
 
     /// Jacobian of face `f`, columns along and across its field, from the corners of all faces.
@@ -80,8 +91,11 @@ impl<'a> Maps<'a> {
         self.system(&self.share)
     }
 
-    /// The system of `sum weight |J|^2`.
+    /// The system of `sum weight |J|^2`. `None` if it is not positive or has more than [`MOST_ENTRIES`].
     fn system(&self, weight: &[f64]) -> Option<SparseCholesky> {
+        if self.entries() > MOST_ENTRIES {
+            return None;
+        }
         let entries: Vec<Vec<(usize, usize, f64)>> = (0..self.gradient.len())
             .into_par_iter()
             .with_min_len(256)
@@ -103,6 +117,15 @@ impl<'a> Maps<'a> {
             })
             .collect();
         SparseCholesky::factor(self.seams.free(), &entries.concat()).ok()
+    }
+
+    /// Entries of the system at most, before those of one place are added up.
+    fn entries(&self) -> usize {
+        let of = |f: usize, axis: u32| -> usize {
+            let terms: usize = self.seams.place[f].iter().map(|p| self.seams.row(2 * p + axis).0.len()).sum();
+            terms * terms
+        };
+        (0..self.gradient.len()).map(|f| of(f, 0) + of(f, 1)).sum()
     }
 
     /// The free unknowns of the map that follows the field best if each face is stretched by its scale. What a face misses
@@ -157,6 +180,7 @@ impl<'a> Maps<'a> {
     /// half around against the field; while the trace of every Jacobian is positive none is. So the trace has a barrier of
     /// the same form, least at the identity, if the map is to stay within a quarter turn.
     pub fn barrier(&self, x: &[f64], softness: f64) -> (f64, Vec<f64>) {
+        self.effort.add(self.gradient.len());
         let each = |f: usize| self.face_barrier(&self.jacobian(f, x), softness);
         let infinite = (f64::INFINITY, DMat2::ZERO);
         let each = |f: usize| each(f).map_or(infinite, |(e, by)| (self.share[f] * e, self.share[f] * by));

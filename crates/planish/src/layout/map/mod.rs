@@ -11,6 +11,7 @@
 mod carry;
 mod cones;
 mod conformal;
+mod effort;
 mod eliminate;
 mod energy;
 #[cfg(test)]
@@ -20,6 +21,7 @@ mod seams;
 mod untangle;
 
 pub(super) use cones::Charts;
+pub(super) use effort::Effort;
 
 use crate::geom::predicates::orient2d;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
@@ -128,7 +130,7 @@ fn untangled(
         if best.as_ref().is_none_or(|b| mapped.faults() < b.faults()) {
             best = Some(mapped);
         }
-        if done {
+        if done || maps.is_spent() {
             break;
         }
     }

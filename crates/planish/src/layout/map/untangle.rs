@@ -46,6 +46,9 @@ pub(super) fn untangle(
         let after = descend(maps, laplacian, free, softness, observer)?;
         x = maps.seams.coordinates(free);
         least = maps.least_guarded(&x);
+        if maps.is_spent() {
+            break;
+        }
         if least > 0.0 {
             if softness == 0.0 && after > (1.0 - EVEN) * before {
                 return Ok(true);
@@ -84,6 +87,9 @@ fn descend(
     let mut pairs: Vec<(Vec<f64>, Vec<f64>, f64)> = Vec::new();
     for _ in 0..STEPS {
         observer.check()?;
+        if maps.is_spent() {
+            break;
+        }
         let step = direction(laplacian, &gradient, &pairs);
         let slope = dot(&step, &gradient);
         if slope >= 0.0 {

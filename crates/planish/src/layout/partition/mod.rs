@@ -114,8 +114,8 @@ impl<'a> Ground<'a> {
     }
 
     /// Sites by farthest-point sampling: one per region (more where the surface is closed), then up to `count` and
-    /// until no face is further than `reach` from its site.
-    fn sample(&self, count: usize, reach: f64) -> Vec<u32> {
+    /// until no face is further than `reach` from its site or there are `most`.
+    fn sample(&self, count: usize, reach: f64, most: usize) -> Vec<u32> {
         let n = self.area.len();
         let mut region = vec![NONE; n];
         let mut closed = Vec::new();
@@ -158,7 +158,9 @@ impl<'a> Ground<'a> {
             }
         }
         let mut left = count.saturating_sub(first.len());
-        loop {
+        let mut room = most.saturating_sub(first.len()).max(left);
+        while room > 0 {
+            room -= 1;
             match (0..n as u32).max_by(|&a, &b| nearer(&ways, a, b)) {
                 Some(f) if ways.distance(f) > if left > 0 { 0.0 } else { reach } => add(f, &mut ways),
                 _ => break,
@@ -295,15 +297,15 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// Parts the faces into about `count` cells (more where one would reach further than `reach`), each a disk that does not
+/// Parts the faces into about `count` cells (up to `most` where one would reach further than `reach`), each a disk that does not
 /// meet itself: a label per face and the number of labels.
 pub(super) fn partition(
     ground: &Ground,
     count: usize,
-    reach: f64,
+    (reach, most): (f64, usize),
     observer: &dyn Observer,
 ) -> Result<(Vec<u32>, usize), LayoutError> {
-    let mut sites = ground.sample(count, reach);
+    let mut sites = ground.sample(count, reach, most);
     for _ in 0..LLOYD_ROUNDS {
         observer.check()?;
         sites = ground.middles(&ground.cells(&sites).via, sites.len());
@@ -333,4 +335,21 @@ pub(super) fn next_around(adjacency: &Adjacency, barrier: &[bool], h: u32) -> u3
         g = next(adjacency.opposite[g as usize]);
     }
     g
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Silent;
+    use crate::synthetic::shapes;
+
+    #[test]
+    fn a_strip_of_1_to_1e6_gets_30_cells_where_30_are_the_most_and_not_one_for_each_face() {
+        let strip = shapes::rectangle(1e6, 1.0, 300, 1);
+        let adjacency = Adjacency::new(&strip);
+        let sharp = vec![false; 3 * strip.triangles.len()];
+        let ground = Ground::new(&strip, &adjacency, &sharp);
+        let (_, count) = partition(&ground, 2, (10.0, 30), &Silent).unwrap();
+        assert!((29..=30).contains(&count), "{count}");
+    }
 }

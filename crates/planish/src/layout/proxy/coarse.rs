@@ -275,7 +275,7 @@ mod tests {
         let torus = shapes::torus(1.0, 0.4, 240, 120);
         let params = LayoutParams { patches: 60, ..LayoutParams::default() };
         let sharp = vec![false; 3 * torus.triangles.len()];
-        let work = refine::refine(&torus, f64::INFINITY, &vec![false; torus.points.len()]);
+        let work = refine::refine(&torus, f64::INFINITY, &vec![false; torus.points.len()], usize::MAX);
         let side = (4.0 * std::f64::consts::PI.powi(2) * 0.4 / 60.0f64).sqrt();
         let (work, complex) = draft(work, (&sharp, &[]), side, &params, &Silent).unwrap().unwrap();
         let adjacency = Adjacency::new(&work.mesh);

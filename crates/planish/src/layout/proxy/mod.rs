@@ -28,8 +28,17 @@ const FINE: f64 = 0.6;
 /// Area of an equilateral triangle with edges of length 1.
 const EQUILATERAL: f64 = 0.433_012_701_892_219_3;
 
+/// Places with shorter edges at most: every length looks at all of them. Where more ask for room, as in soups of triangles,
+/// all of the mesh is too coarse, and shorter edges here and there help no longer.
+const MOST_SPOTS: usize = 256;
+
 /// How fast edges get longer away from a spot: neighbours differ by a third, which leaves room for good triangles.
 const GRADE: f64 = 0.3;
+
+/// Triangles of the refined mesh at most, besides those of the input, for each one of the proxy. Halving edges until none is
+/// longer than [`FINE`] leaves up to 4 / FINE^2 = 11 even ones; twice as many are for thin triangles. Needles, which would
+/// take any number, stay longer.
+const REFINED_PER_PROXY: usize = 22;
 
 /// Rounds of splitting; each halves an edge.
 const SPLIT_ROUNDS: usize = 14;
@@ -71,13 +80,18 @@ impl Sizing {
         self.spots.push((place, edge));
     }
 
+    /// True if so many more places may be given.
+    pub fn has_room_for(&self, places: usize) -> bool {
+        self.spots.len() + places <= MOST_SPOTS
+    }
+
     /// Length wanted at a place.
     pub fn at(&self, place: DVec3) -> f64 {
         self.spots.iter().map(|&(p, edge)| edge + GRADE * p.distance(place)).fold(self.edge, f64::min)
     }
 
     /// Triangles of these edges that cover `mesh`.
-    fn triangles(&self, mesh: &TriMesh) -> usize {
+    pub fn triangles(&self, mesh: &TriMesh) -> usize {
         let count = |f: usize| {
             let [a, b, c] = mesh.corners(f);
             mesh.area(f) / (EQUILATERAL * self.at((a + b + c) / 3.0).powi(2))
@@ -103,7 +117,9 @@ pub(super) fn proxy(
     if !(sizing.edge.is_finite() && sizing.edge > 0.0) {
         return None;
     }
-    let work = refined(mesh, sharp, |p| FINE * sizing.at(p));
+    let most =
+        |work: &TriMesh| mesh.triangles.len().saturating_add(REFINED_PER_PROXY.saturating_mul(sizing.triangles(work)));
+    let work = refined(mesh, sharp, |p| FINE * sizing.at(p), most);
     let work_adjacency = Adjacency::new(&work.mesh);
     let tagged = tags(&work, &work_adjacency, sharp);
     observer.progress(0.2);
@@ -155,8 +171,14 @@ impl Proxy {
     }
 }
 
-/// The input without edges longer than `longest` at their middle, those apart that no split shortens, and without what a map cannot use.
-fn refined(mesh: &TriMesh, sharp: &[bool], longest: impl Fn(DVec3) -> f64) -> Refined {
+/// The input without edges longer than `longest` at their middle, as far as `most` triangles allow, and without what a map
+/// cannot use.
+fn refined(
+    mesh: &TriMesh,
+    sharp: &[bool],
+    longest: impl Fn(DVec3) -> f64,
+    most: impl Fn(&TriMesh) -> usize,
+) -> Refined {
     let mut work = Refined::new(mesh);
     let adjacency = Adjacency::new(mesh);
     let bound = |tagged: &[bool], f: u32| (0..3).all(|k| tagged[3 * f as usize + k]);
@@ -179,6 +201,9 @@ fn refined(mesh: &TriMesh, sharp: &[bool], longest: impl Fn(DVec3) -> f64) -> Re
             let (a, b) = (points[a as usize], points[b as usize]);
             a.distance(b) > longest(a.midpoint(b))
         };
+        if refine::count(&work, long) > most(&work.mesh) {
+            break;
+        }
         let (finer, from) = refine::split(&work, long);
         if from.len() == work.parent.len() {
             break;
@@ -230,6 +255,18 @@ mod tests {
             let length: f64 =
                 (0..p.lines.len() as u32).filter(|&h| p.lines[h as usize]).map(|h| p.mesh.edge_length(h)).sum();
             assert!((length - 2.0 * 24.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_strip_of_1_to_1e6_and_a_vertex_at_1e9_are_refined_to_22_triangles_for_each_one_wanted_at_most() {
+        let strip = shapes::rectangle(1e6, 1.0, 60, 1);
+        let mut wild = shapes::sphere(1.0, 3);
+        wild.points[40] = DVec3::new(1e9, 0.0, 0.0);
+        for mesh in [strip, wild] {
+            let p = made(&mesh, 1000);
+            let most = mesh.triangles.len() + REFINED_PER_PROXY * 1000;
+            assert!(p.work.mesh.triangles.len() <= most, "{} > {most}", p.work.mesh.triangles.len());
         }
     }
 

@@ -15,9 +15,10 @@ pub(in crate::layout) struct Refined {
     pub parent: Vec<(u32, [[f64; 3]; 3])>,
 }
 
-/// Splits every edge longer than `longest` at its middle until none is left. Edges with both ends on a fixed line
-/// (`fixed`, per vertex) are split once in any case: a curve across a narrow strip needs an inner vertex.
-pub(in crate::layout) fn refine(mesh: &TriMesh, longest: f64, fixed: &[bool]) -> Refined {
+/// Splits every edge longer than `longest` at its middle until none is left or there would be more than `most` triangles:
+/// halving both long edges of a needle makes three of it, so that one of n lengths ends as n^1.6 triangles. Edges with both
+/// ends on a fixed line (`fixed`, per vertex) are split once in any case: a curve across a narrow strip needs an inner vertex.
+pub(in crate::layout) fn refine(mesh: &TriMesh, longest: f64, fixed: &[bool], most: usize) -> Refined {
     let mut work = Refined::new(mesh);
     for round in 0..SPLIT_ROUNDS {
         let points = &work.mesh.points;
@@ -25,6 +26,9 @@ pub(in crate::layout) fn refine(mesh: &TriMesh, longest: f64, fixed: &[bool]) ->
             let narrow = round == 0 && fixed[a as usize] && fixed[b as usize];
             narrow || points[a as usize].distance(points[b as usize]) > longest
         };
+        if round > 0 && count(&work, chosen) > most {
+            break;
+        }
         let (finer, from) = split(&work, chosen);
         if from.len() == work.parent.len() {
             break;
@@ -32,6 +36,15 @@ pub(in crate::layout) fn refine(mesh: &TriMesh, longest: f64, fixed: &[bool]) ->
         work = finer;
     }
     work
+}
+
+/// Triangles that [`split`] would leave.
+pub(super) fn count(work: &Refined, chosen: impl Fn(u32, u32) -> bool) -> usize {
+    let split = |t: &[u32; 3], k: usize| {
+        let (a, b) = (t[k], t[(k + 1) % 3]);
+        usize::from(chosen(a.min(b), a.max(b)))
+    };
+    work.mesh.triangles.iter().map(|t| 1 + (0..3).map(|k| split(t, k)).sum::<usize>()).sum()
 }
 
 /// Splits the edges between the vertices that `chosen` accepts (lower vertex first) at their middle. Returns the

@@ -19,6 +19,9 @@ const WIDTH: f64 = 0.03;
 const TERMS: usize = 80;
 /// Least thickness of a triangle against its length, for its cotangents.
 const THINNEST: f64 = 1e-3;
+/// Longest standard deviation and cut-off in diagonals of the surface: the waves that fit on it are left to 1e-4 by one step of
+/// that smoother. Beyond, the masses would be lost in the rounding of the stiffnesses.
+const REACH: f64 = 30.0;
 /// Least mass of a vertex against the mean: vertices of collapsed cells have none of their own.
 const LEAST_MASS: f64 = 1e-9;
 
@@ -135,6 +138,7 @@ impl Filter {
     }
 
     fn smoother(&self, time: f64, observer: &dyn Observer) -> Result<SparseCholesky, Cancelled> {
+        let time = time.min((REACH * self.base.mesh.bounds().diagonal()).powi(2));
         let masses = self.mass.iter().enumerate().map(|(i, &m)| (i, i, m));
         let lower = masses.chain(self.stiff.iter().map(|&(i, j, w)| (i, j, w * time))).collect();
         let cancelled = || observer.cancelled();
