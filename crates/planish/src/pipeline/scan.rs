@@ -171,7 +171,7 @@ const FIT_NOISE: f64 = 0.125;
 const FIT_CLOSEST: f64 = 5e-5;
 const FIT_FARTHEST: f64 = 2.5e-4;
 /// Edges of the mesh of a scan that pass more than this share of that beside the surface are split.
-const BENT_TOLERANCE: f64 = 0.2;
+const BENT_TOLERANCE: f64 = 0.8;
 /// Smoothing at noise of a thousandth of the diagonal; it goes with the square of the noise, as in Wiener's filter. Less leaves
 /// the noise beside sharp edges, more flattens what bends there.
 const FIT_SMOOTHING: f64 = 0.05;
@@ -183,7 +183,7 @@ const GRID_DENSITY: f64 = 6.0;
 
 /// How closely a surface is fitted to a scan, as a share of the diagonal.
 fn fit_tolerance(samples: &Samples) -> f64 {
-    (FIT_NOISE * samples.noise / samples.diagonal).clamp(FIT_CLOSEST, FIT_FARTHEST)
+    (FIT_NOISE * samples.noise / samples.diagonal).max(FIT_CLOSEST)
 }
 
 /// The parameters that suit the mesh of a scan: how fine its grids are, and how closely surfaces are fitted to it.
@@ -191,7 +191,7 @@ pub fn params_for(made: &ScanMeshed) -> PipelineParams {
     let usual = PipelineParams::default();
     let noise = made.samples.noise / made.samples.diagonal;
     let resolution = match usual.fit.resolution {
-        Resolution::Tolerance(most) => Resolution::Tolerance(fit_tolerance(&made.samples).min(most)),
+        Resolution::Tolerance(most) => Resolution::Tolerance(fit_tolerance(&made.samples).min(FIT_FARTHEST).min(most)),
         other => other,
     };
     let smoothing = (FIT_SMOOTHING * (noise / 1e-3).powi(2)).clamp(usual.fit.smoothing, 1.0);
