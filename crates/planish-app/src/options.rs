@@ -193,10 +193,21 @@ struct Field {
 #[derive(Clone)]
 enum Kind {
     Flag,
-    Whole { min: Option<f64>, max: Option<f64> },
-    Real { min: Option<f64>, max: Option<f64>, above: Option<f64> },
+    Whole {
+        min: Option<f64>,
+        max: Option<f64>,
+    },
+    Real {
+        min: Option<f64>,
+        max: Option<f64>,
+        above: Option<f64>,
+    },
     Choice(Vec<String>),
-    Wholes { count: Option<usize>, min: Option<f64>, max: Option<f64> },
+    Wholes {
+        count: Option<usize>,
+        min: Option<f64>,
+        max: Option<f64>,
+    },
     /// Two whole numbers at each of some patches: `12x8@17`.
     PerPatch,
     Tolerance(Of),

@@ -172,7 +172,9 @@ fn corners_lie_on_the_grid_corners_to_the_bit() {
 
 #[test]
 fn a_tolerance_of_any_measure_is_kept_in_every_patch() {
-    for (fraction, tolerance_of) in [(1e-2, Measure::Rms), (1e-3, Measure::P95), (1e-3, Measure::Max), (1e-5, Measure::Rms)] {
+    for (fraction, tolerance_of) in
+        [(1e-2, Measure::Rms), (1e-3, Measure::P95), (1e-3, Measure::Max), (1e-5, Measure::Rms)]
+    {
         for work in [cube(41, CurveKind::Smooth, blob), wavy([41, 33])] {
             let points: Vec<DVec3> = work.grids.iter().flat_map(|g| g.points.clone()).collect();
             let allowed = fraction * planish::geom::Aabb::of(&points).diagonal();
@@ -236,7 +238,9 @@ fn a_patch_gets_the_control_points_that_are_asked_for_at_it() {
         let params = FitParams { control_at: vec![[2, 13, 9]], ..plain(resolution) };
         let surfaces = fit(&work, &params);
         // Patches 0, 2 and 4 stand above each other, 2 and 3 side by side.
-        assert!(surfaces.iter().enumerate().all(|(p, s)| (s.cols == 13) == (p % 2 == 0) && (s.rows == 9) == (p / 2 == 1)));
+        assert!(
+            surfaces.iter().enumerate().all(|(p, s)| (s.cols == 13) == (p % 2 == 0) && (s.rows == 9) == (p / 2 == 1))
+        );
     }
     let params = FitParams { control_at: vec![[6, 13, 9]], ..control(6, 6) };
     let error = surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap_err();
@@ -275,7 +279,8 @@ fn coarse_grids_are_told_to_be_too_coarse_for_a_tolerance() {
 
 #[test]
 fn opposite_sides_run_the_same_way_along_their_chord() {
-    let works = [cube(5, CurveKind::Smooth, blob), torus(5), wavy([5, 5]), tube([5, 5]), one_patch_torus([5, 5]), purse(5)];
+    let works =
+        [cube(5, CurveKind::Smooth, blob), torus(5), wavy([5, 5]), tube([5, 5]), one_patch_torus([5, 5]), purse(5)];
     for work in works {
         let along = work.network.directed_chords();
         for patch in &work.network.patches {

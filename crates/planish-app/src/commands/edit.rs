@@ -1,7 +1,7 @@
 //! `planish edit`: a script of edits applied to a model, as one history.
 
-use super::run::{seam_rows, summary, verdict};
 use super::missed::{self, Reach};
+use super::run::{seam_rows, summary, verdict};
 use super::{Session, commit_report, pipeline_failure};
 use crate::args::{AllStages, Edit as EditArgs};
 use crate::failure::{Failure, Status};

@@ -1,7 +1,7 @@
 //! `planish fit`: mesh and network to a model; or the surfaces of a model, and its grids where it has none.
 
-use super::run::{From, Job, Made, fitted, seam_rows, summary, verdict};
 use super::missed::{self, Reach};
+use super::run::{From, Job, Made, fitted, seam_rows, summary, verdict};
 use super::{Session, commit_report, pipeline_failure};
 use crate::args::{AllStages, Fit};
 use crate::failure::{Failure, Status};

@@ -34,7 +34,8 @@ impl Knots {
 
     /// Knots at `breaks`, which rise from 0 to 1; inner ones stand twice if `is_double`.
     pub fn at(breaks: &[f64], is_double: bool) -> Knots {
-        let inner = breaks[1..breaks.len() - 1].iter().flat_map(|&b| std::iter::repeat_n(b, 1 + usize::from(is_double)));
+        let inner =
+            breaks[1..breaks.len() - 1].iter().flat_map(|&b| std::iter::repeat_n(b, 1 + usize::from(is_double)));
         Knots([0.0; 4].into_iter().chain(inner).chain([1.0; 4]).collect())
     }
 

@@ -92,7 +92,9 @@ pub enum FitError {
         wanted: &'static str,
     },
     /// Control points are asked for at a patch that does not exist.
-    #[error("control points are asked for at patch {patch}, but there are {patches}, counted from 0; `planish info` lists them")]
+    #[error(
+        "control points are asked for at patch {patch}, but there are {patches}, counted from 0; `planish info` lists them"
+    )]
     NoSuchPatch {
         /// The patch.
         patch: usize,

@@ -28,7 +28,8 @@ pub use fold::folds;
 pub use mirrored::mirror_surfaces;
 pub use network_fit::{Continuity, FitParams, fit_network, starved};
 pub use quality::{
-    Deviation, SeamAngle, SeamQuality, deviation, deviation_of, measure_seams, measure_seams_apart, normal_deviation_of, seam_angles,
+    Deviation, SeamAngle, SeamQuality, deviation, deviation_of, measure_seams, measure_seams_apart,
+    normal_deviation_of, seam_angles,
 };
 pub use resolution::{Measure, Resolution, Spacing};
 pub use retouch::retouch;

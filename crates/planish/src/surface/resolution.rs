@@ -171,7 +171,7 @@ impl Plan {
         let mut which: Vec<usize> = curves.map(|c| self.of[c]).collect();
         which.sort_unstable();
         which.dedup();
-        which.into_iter().fold(false, |any, chord| self.chords[chord].refine() || any)
+        which.into_iter().filter(|&chord| self.chords[chord].refine()).count() > 0
     }
 }
 

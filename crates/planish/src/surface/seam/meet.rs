@@ -44,7 +44,11 @@ impl<'a> Seam<'a> {
             let &[a, b] = &uses[..] else { return None };
             let side =
                 |(p, k): (u32, u8)| (p as usize, k as usize, network.patches[p as usize].sides[k as usize].reversed);
-            (network.curves[curve].kind == kind).then(|| Seam { curve, sides: [side(a), side(b)], breaks: &breaks[curve] })
+            (network.curves[curve].kind == kind).then(|| Seam {
+                curve,
+                sides: [side(a), side(b)],
+                breaks: &breaks[curve],
+            })
         };
         network.uses().iter().enumerate().filter_map(one).collect()
     }
@@ -82,7 +86,13 @@ impl<'a> Seam<'a> {
 impl Meets {
     /// * `breaks` - where knot spans begin and end along each curve
     /// * `misses` - what the fit misses
-    pub fn new(network: &Network, grids: &[Grid], means: &[MeanNormals], breaks: &[Vec<f64>], misses: &Misses) -> Meets {
+    pub fn new(
+        network: &Network,
+        grids: &[Grid],
+        means: &[MeanNormals],
+        breaks: &[Vec<f64>],
+        misses: &Misses,
+    ) -> Meets {
         let of = |seam: &Seam| -> Vec<(f64, bool)> {
             let miss = seam.sides.iter().map(|&(p, ..)| misses.afford(p) / 2.0).sum::<f64>().sqrt();
             let is_sharp = |span: usize| {
@@ -119,7 +129,12 @@ impl Meets {
 }
 
 /// For each patch beside curves that a person calls smooth, how far rounding these takes it from its grid.
-pub(crate) fn roundings(network: &Network, grids: &[Grid], means: &[MeanNormals], breaks: &[Vec<f64>]) -> Vec<Option<f64>> {
+pub(crate) fn roundings(
+    network: &Network,
+    grids: &[Grid],
+    means: &[MeanNormals],
+    breaks: &[Vec<f64>],
+) -> Vec<Option<f64>> {
     let mut found = vec![None; grids.len()];
     for seam in Seam::all(network, CurveKind::Rounded, breaks) {
         let needed = |span: usize| seam.angle(means, span) * seam.rounding(grids, means, span);
@@ -150,9 +165,8 @@ pub fn edges_in_seams(network: &Network, grids: &[Grid], surfaces: &[Surface]) -
     }
     let means: Vec<MeanNormals> =
         grids.par_iter().zip(surfaces).map(|(g, s)| MeanNormals::new(g, [s.cols, s.rows])).collect();
-    let breaks = |uses: &Vec<(u32, u8)>| {
-        uses.first().map_or_else(Vec::new, |&at| knots_along(network, surfaces, at).breaks())
-    };
+    let breaks =
+        |uses: &Vec<(u32, u8)>| uses.first().map_or_else(Vec::new, |&at| knots_along(network, surfaces, at).breaks());
     let breaks: Vec<Vec<f64>> = network.uses().iter().map(breaks).collect();
     let of = |seam: &Seam| {
         let mut found: Vec<EdgeInSeam> = Vec::new();
