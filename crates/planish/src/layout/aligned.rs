@@ -230,9 +230,14 @@ pub(super) fn lay(
         }
         let mut sizing = Sizing::even(mesh, PROXY_TRIANGLES);
         for _ in 0..=FINER_ROUNDS {
-            let Some(aligned) = Aligned::on((mesh, sharp), attempt, &mut sizing, &effort, observer)? else {
-                observer.check()?;
-                break;
+            let aligned = match Aligned::on((mesh, sharp), attempt, &mut sizing, &effort, observer) {
+                Ok(Some(aligned)) => aligned,
+                Ok(None) => {
+                    observer.check()?;
+                    break;
+                }
+                Err(dense @ AlignError::Dense { .. }) => return best.ok_or(dense),
+                Err(cancelled) => return Err(cancelled),
             };
             has_tight |= !aligned.charts.tight.is_empty();
             observer.progress(0.3);
