@@ -167,6 +167,7 @@ pub fn check_stored<P: StageParams>(params: &P) -> Result<(), String> {
         };
         let text = match value {
             Value::Number(x) => x.to_string(),
+            Value::Array(list) if list.iter().all(Value::is_array) => continue,
             Value::Array(list) => list.iter().map(Value::to_string).collect::<Vec<_>>().join(","),
             _ => continue,
         };
@@ -192,10 +193,23 @@ struct Field {
 #[derive(Clone)]
 enum Kind {
     Flag,
-    Whole { min: Option<f64>, max: Option<f64> },
-    Real { min: Option<f64>, max: Option<f64>, above: Option<f64> },
+    Whole {
+        min: Option<f64>,
+        max: Option<f64>,
+    },
+    Real {
+        min: Option<f64>,
+        max: Option<f64>,
+        above: Option<f64>,
+    },
     Choice(Vec<String>),
-    Wholes { count: Option<usize>, min: Option<f64>, max: Option<f64> },
+    Wholes {
+        count: Option<usize>,
+        min: Option<f64>,
+        max: Option<f64>,
+    },
+    /// Two whole numbers at each of some patches: `12x8@17`.
+    PerPatch,
     Tolerance(Of),
 }
 
@@ -219,6 +233,7 @@ impl Field {
             Kind::Real { .. } => "X",
             Kind::Choice(_) => "WORD",
             Kind::Wholes { .. } => "N,N",
+            Kind::PerPatch => "NxN@PATCH",
             Kind::Tolerance(_) => "LENGTH|%",
         };
         let arg = Arg::new(self.id.clone()).long(self.flag.clone()).help(self.help.clone()).value_name(value_name);
@@ -266,6 +281,20 @@ impl Field {
                         wrong(&format!("{many}whole numbers{each} with commas between are needed"))
                     }
                 }
+            }
+            Kind::PerPatch => {
+                let one = |text: &str| -> Option<Value> {
+                    let (control, patch) = text.trim().split_once('@')?;
+                    let (along_u, along_v) = control.split_once('x')?;
+                    let number = |text: &str| text.trim().parse::<u32>().ok();
+                    let [u, v] = [number(along_u)?, number(along_v)?];
+                    (u.min(v) >= 4 && u.max(v) <= 8193).then_some(())?;
+                    Some([number(patch)?, u, v].as_slice().into())
+                };
+                let all: Option<Vec<Value>> = text.split(',').map(one).collect();
+                all.map(Value::Array).ok_or(()).or_else(|()| {
+                    wrong("control points along u and v at a patch are needed, each from 4 to 8193, as 12x8@17,6x6@3")
+                })
             }
             Kind::Tolerance(_) => match text.parse::<Tolerance>() {
                 Ok(tolerance) => Ok(Value::String(tolerance.to_string())),
@@ -328,7 +357,7 @@ fn help_of(property: &Value, default: &Value, kind: &Kind) -> String {
         help += ": a length (0.05 in units of the input, 0.05mm) or a share of the diagonal (0.02%)";
     }
     match (default, kind) {
-        (Value::Null, _) => {}
+        (Value::Null, _) | (_, Kind::PerPatch) => {}
         (value, Kind::Tolerance(Of::Share)) => {
             help += &format!(" [default: {}%]", value.as_f64().unwrap_or(0.0) * 100.0);
         }
@@ -377,6 +406,9 @@ fn kind_of(property: &Value, schema: &Value) -> Option<(Kind, bool)> {
         Some("share") => return Some((Kind::Tolerance(Of::Share), false)),
         Some("length") => return Some((Kind::Tolerance(Of::Length), false)),
         _ => {}
+    }
+    if property["per_patch"] == true {
+        return Some((Kind::PerPatch, false));
     }
     let types: Vec<&str> = match &property["type"] {
         Value::String(t) => vec![t],
@@ -539,6 +571,10 @@ mod tests {
             }
             Kind::Tolerance(_) => {
                 (vec!["0.05mm".into(), "0.02%".into(), "1e-9".into()], vec!["0".into(), "-1%".into(), "5ft".into()])
+            }
+            Kind::PerPatch => {
+                let wrong = ["12x8", "12@3", "3x8@1", "12x8@-1", "12x8@1,", "8194x8@0"];
+                (vec!["12x8@17".into(), "4x8193@0,5x5@1".into()], wrong.map(String::from).to_vec())
             }
             Kind::Flag | Kind::Choice(_) => (Vec::new(), vec!["perhaps".into()]),
         }

@@ -40,11 +40,11 @@ use crate::mend::{self, Repairs};
 use crate::mesh::{CompareError, FeatureTags, MeshError, TriMesh};
 use crate::model::Model;
 use crate::network::{self, ImprintError, Network};
-use crate::observe::Cancelled;
+use crate::observe::{Cancelled, Observer, Part};
 use crate::pipeline::record::Clock;
 use crate::pipeline::scan::run_figures;
 use crate::relief::{self, ReliefError};
-use crate::surface::{self, Continuity, FitError, FitParams, SeamQuality, StitchParams};
+use crate::surface::{self, Continuity, FitError, FitParams, KnotSpacing, SeamQuality, StitchParams};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -257,7 +257,7 @@ fn fit_with(
     let patches = clock.stage("imprint", |o| network::imprint(&mesh, &network, o), |p| [("patches", p.len())])?;
     let grids = clock.stage(
         "grids",
-        |o| grid::resample(&mesh, &network, &patches, (&[], &[]), &params.grid, o),
+        |o| resampled(&mesh, &network, &patches, (&[], &[]), params, o),
         |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;
     let mut model = Model { mesh, network, grids, ..Model::default() };
@@ -274,6 +274,41 @@ fn fit_with(
         seams: measured.seams,
         warnings: measured.warnings,
     })
+}
+
+/// Finer grids that leave more than this part of a miss do not help: the form has an edge there, or is rough at every scale. A
+/// smooth form leaves a sixteenth, a kink half.
+const DENSER_HELPS: f64 = 0.7;
+
+/// Grids as they are by themselves, and finer ones along the chords where they carry too few control points for the tolerance.
+fn resampled(
+    mesh: &TriMesh,
+    network: &Network,
+    patches: &[network::PatchMesh],
+    drawn: grid::Drawn,
+    params: &PipelineParams,
+    observer: &dyn Observer,
+) -> Result<Vec<Grid>, PipelineError> {
+    let first = Part::new(observer, 0.0, 0.7);
+    let mut grids = grid::resample(mesh, network, patches, drawn, &params.grid, &first)?;
+    let start = grids.iter().map(|g| g.points.len()).sum();
+    let mut before: Vec<f64> = Vec::new();
+    for round in 0..params.grid.denser_rounds {
+        let part = Part::new(observer, 1.0 - 0.3 * 0.5f64.powi(round as i32), 0.15 * 0.5f64.powi(round as i32));
+        let mut need = surface::starved(network, &grids, &params.fit, &part)?;
+        for (need, before) in need.iter_mut().zip(&before) {
+            // What was not made finer for itself is not asked again.
+            if *before == 0.0 || *need > DENSER_HELPS * before {
+                *need = 0.0;
+            }
+        }
+        let drawn_grids = (&mut grids[..], start);
+        if !grid::densify(mesh, network, patches, drawn, drawn_grids, &need, &params.grid, &part)? {
+            break;
+        }
+        before = need;
+    }
+    Ok(grids)
 }
 
 /// What [`layout`] makes.
@@ -470,7 +505,12 @@ fn surfaces_through(
             surface::mirror_surfaces(&model.mesh, network, plane, leveled, surfaces);
         }
     };
-    let mut fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &params.fit, o), control)?;
+    let mut fit = params.fit.clone();
+    if model.sketch.symmetry.is_some() {
+        // What crosses the plane is its own image only with knots that are.
+        fit.knots = KnotSpacing::Even;
+    }
+    let mut fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &fit, o), control)?;
     // Seams are smoothed between images already, and what that takes from their symmetry is given back.
     symmetric(true, &mut fitted);
     let mut smooth = clock.stage(

@@ -10,7 +10,7 @@ use planish::surface::{self, Continuity, FitParams, Resolution, SeamQuality, Sti
 
 fn params(control: usize, continuity: Continuity) -> FitParams {
     let resolution = Resolution::Control([control, control]);
-    FitParams { resolution, cells_per_span: 1.0, smoothing: 0.0, continuity }
+    FitParams { resolution, cells_per_span: 1.0, smoothing: 0.0, continuity, ..FitParams::default() }
 }
 
 /// The surfaces as fitted, and with smooth seams.
@@ -139,14 +139,14 @@ fn the_fit_loses_no_more_than_it_may_however_small_the_tolerance_of_the_angle() 
 #[test]
 fn double_knots_stand_in_chords_that_end_in_corners_of_other_than_four_patches() {
     use surface::basis::Knots;
-    let kinds = |work: &Patchwork, continuity| -> Vec<[Option<Knots>; 2]> {
+    let all = |work: &Patchwork, continuity, knots: Knots| {
         let [_, after] = both(work, &params(8, continuity), &StitchParams::default());
-        after.iter().map(|s| [Knots::of(&s.knots_u), Knots::of(&s.knots_v)]).collect()
+        after.iter().flat_map(|s| [&s.knots_u, &s.knots_v]).all(|list| Knots::of(list) == knots)
     };
     let (cube, torus) = (cube(33, CurveKind::Smooth, blob), torus(17));
-    assert!(kinds(&cube, Continuity::G1Double).iter().flatten().all(|k| *k == Some(Knots::Double)));
-    assert!(kinds(&cube, Continuity::G1).iter().flatten().all(|k| *k == Some(Knots::Simple)));
-    assert!(kinds(&torus, Continuity::G1Double).iter().flatten().all(|k| *k == Some(Knots::Simple)));
+    assert!(all(&cube, Continuity::G1Double, Knots::double(8)));
+    assert!(all(&cube, Continuity::G1, Knots::uniform(8)));
+    assert!(all(&torus, Continuity::G1Double, Knots::uniform(8)));
 }
 
 #[test]

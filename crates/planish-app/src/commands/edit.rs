@@ -1,7 +1,8 @@
 //! `planish edit`: a script of edits applied to a model, as one history.
 
+use super::missed::{self, Reach};
 use super::run::{seam_rows, summary, verdict};
-use super::{Session, commit_report, missed, pipeline_failure};
+use super::{Session, commit_report, pipeline_failure};
 use crate::args::{AllStages, Edit as EditArgs};
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -67,6 +68,7 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
         report.warnings.push(Warning::new("network_unfinished", fault.to_string(), ""));
     }
     let finished = found.is_finished() && !model.network.patches.is_empty();
+    let mut reach = None;
     if finished && !args.no_fit && model.grids.is_empty() {
         let wrong = |e| pipeline_failure(&args.input, None, e);
         args.stages.check_curves(&model.network)?;
@@ -74,6 +76,8 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
         report.stages.extend(made.stages);
         report.quality = made.quality;
         report.warnings.extend(made.warnings);
+        reach = Reach::new(args.stages.demanded_tolerance(), params.fit.tolerance_of, &report, model.units);
+        report.warnings.extend(missed::tolerance(&model, &params, reach, report.input.diagonal));
         report.warnings.extend(missed::angle(&model, &made.seams, &params, args.stages.demanded_angle()));
         report.seams = seam_rows(&model, &made.seams);
         model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
@@ -95,10 +99,9 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
     }
     staged.commit()?;
     commit_report(own_report, &report)?;
-    let demanded = missed::share(args.stages.demanded_tolerance(), &report, model.units);
     if !session.common.quiet {
         session.tell_warnings(&report);
-        let mut table = if model.surfaces.is_empty() { Summary::default() } else { summary(&report, demanded) };
+        let mut table = if model.surfaces.is_empty() { Summary::default() } else { summary(&report, reach) };
         let network = &model.network;
         for row in &report.edits {
             table.row(format!("step {}", row.step), told_row(row));
@@ -120,7 +123,7 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
         table.row("model", output.display().to_string());
         table.print();
     }
-    Ok(if model.surfaces.is_empty() { Status::Done } else { verdict(&report, demanded) })
+    Ok(if model.surfaces.is_empty() { Status::Done } else { verdict(&report, reach) })
 }
 
 fn read_script(path: &Path) -> Result<Script, Failure> {

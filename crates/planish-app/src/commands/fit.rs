@@ -1,7 +1,8 @@
 //! `planish fit`: mesh and network to a model; or the surfaces of a model, and its grids where it has none.
 
+use super::missed::{self, Reach};
 use super::run::{From, Job, Made, fitted, seam_rows, summary, verdict};
-use super::{Session, commit_report, missed, pipeline_failure};
+use super::{Session, commit_report, pipeline_failure};
 use crate::args::{AllStages, Fit};
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -20,24 +21,24 @@ pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
     files::check_extension(&args.output, &["planish"])?;
     let staged = Staged::file(&args.output)?;
     let own_report = session.stage_report()?;
-    let (mut report, model) = if files::is_model(&args.input) { refit(session, args)? } else { anew(session, args)? };
+    let (mut report, model, reach) =
+        if files::is_model(&args.input) { refit(session, args)? } else { anew(session, args)? };
     let write = || planish_io::write_model(staged.file_path(), &model).map_err(|e| Failure::usage(&args.output, e));
     let ((), record) = session.step("write", write)?;
     report.stages.push(record);
     staged.commit()?;
     commit_report(own_report, &report)?;
-    let demanded = missed::share(args.stages.demanded_tolerance(), &report, model.units);
     if !session.common.quiet {
         session.tell_warnings(&report);
-        let mut table = summary(&report, demanded);
+        let mut table = summary(&report, reach);
         table.row("model", args.output.display().to_string());
         table.print();
     }
-    Ok(verdict(&report, demanded))
+    Ok(verdict(&report, reach))
 }
 
 /// A model of a mesh.
-fn anew(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
+fn anew(session: &Session, args: &Fit) -> Result<(Report, Model, Option<Reach>), Failure> {
     let (placed, read) = session.step("read", || Placed::read(&args.input))?;
     let units = session.units_of(&args.input);
     let network = files::optional_network(args.network.as_deref(), &placed.mesh)?;
@@ -56,12 +57,12 @@ fn anew(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
         truth: None,
     };
     let from = From { input: placed.input(network), shift: placed.shift, warning: placed.warning(units.symbol()) };
-    let Made { report, model, .. } = fitted(session, &job, from, vec![read])?;
-    Ok((report, model))
+    let Made { report, model, reach, .. } = fitted(session, &job, from, vec![read])?;
+    Ok((report, model, reach))
 }
 
 /// A model with the mesh, network and grids of another, and surfaces of its own; with grids of its own, if there are none.
-fn refit(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
+fn refit(session: &Session, args: &Fit) -> Result<(Report, Model, Option<Reach>), Failure> {
     if args.network.is_some() {
         return Err(Failure::usage("--network", "does not go with a model, which has its own")
             .hint("fit its mesh: `planish export MODEL.planish --surface mesh -o MESH.ply`"));
@@ -93,14 +94,14 @@ fn refit(session: &Session, args: &Fit) -> Result<(Report, Model), Failure> {
     report.stages.extend(found.stages);
     report.quality = found.quality;
     report.warnings = found.warnings;
-    let share = args.stages.demanded_tolerance().map(|tolerance| tolerance.share(scale));
-    report.warnings.extend(missed::tolerance(&model, &params, share, scale));
+    let reach = Reach::new(args.stages.demanded_tolerance(), params.fit.tolerance_of, &report, model.units);
+    report.warnings.extend(missed::tolerance(&model, &params, reach, report.input.diagonal));
     report.warnings.extend(missed::angle(&model, &found.seams, &params, args.stages.demanded_angle()));
     report.seams = seam_rows(&model, &found.seams);
     model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
     let command = if gridded { "refit" } else { "fit" };
     model.history.push(HistoryEntry { command: command.into(), parameters: model.params.clone() });
-    Ok((report, model))
+    Ok((report, model, reach))
 }
 
 /// Refuses a model whose network does not part the mesh into four-sided patches.

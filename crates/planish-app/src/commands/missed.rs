@@ -4,24 +4,55 @@ use crate::tolerance::{Scale, Tolerance};
 use planish::model::{Model, Units};
 use planish::network::CurveKind;
 use planish::pipeline::{self, PipelineParams, Warning};
-use planish::surface::{Continuity, SeamQuality, deviation_of};
+use planish::surface::{Continuity, Measure, SeamQuality, normal_deviation_of};
 use planish_io::report::{Report, count, number};
 
 /// Patches beyond this many times the number that was asked for, or below its inverse, are told.
 const PATCHES_OFF: f64 = 1.5;
 
-/// A demanded tolerance as a share of the diagonal of the input.
-pub fn share(demanded: Option<Tolerance>, report: &Report, units: Units) -> Option<f64> {
-    demanded.map(|tolerance| tolerance.share(Scale { diagonal: report.input.diagonal, units }))
+/// A demanded tolerance and what is reached, both as shares of the diagonal of the input.
+#[derive(Clone, Copy, Debug)]
+pub struct Reach {
+    pub wanted: f64,
+    pub reached: f64,
+}
+
+impl Reach {
+    /// * `of` - the distance that the tolerance bounds, in every patch
+    pub fn new(demanded: Option<Tolerance>, of: Measure, report: &Report, units: Units) -> Option<Reach> {
+        let wanted = demanded?.share(Scale { diagonal: report.input.diagonal, units });
+        let figure = |key: &str| report.figure(key).unwrap_or(0.0);
+        let reached = match of {
+            Measure::Rms => figure("surface.patch_rms_max_rel"),
+            Measure::P95 => figure("surface.patch_p95_max_rel"),
+            // Between the points of the grids, too.
+            Measure::Max => figure("surface.patch_max_rel").max(figure("surface.max_rel")),
+        };
+        Some(Reach { wanted, reached })
+    }
+
+    pub fn is_missed(self) -> bool {
+        self.reached > self.wanted
+    }
 }
 
 /// Which limit kept the surfaces from a demanded tolerance.
-/// * `share` - the tolerance, of the diagonal
-pub fn tolerance(model: &Model, params: &PipelineParams, share: Option<f64>, scale: Scale) -> Option<Warning> {
-    let wanted = share? * scale.diagonal;
-    let rms: Vec<f64> = model.surfaces.iter().zip(&model.grids).map(|(s, g)| deviation_of(s, g).rms).collect();
-    let over: Vec<usize> = (0..rms.len()).filter(|&p| rms[p] > wanted).collect();
-    let worst = *over.iter().max_by(|&&a, &&b| rms[a].total_cmp(&rms[b]))?;
+/// * `diagonal` - of the input, its units
+pub fn tolerance(model: &Model, params: &PipelineParams, reach: Option<Reach>, diagonal: f64) -> Option<Warning> {
+    let reach = reach.filter(|reach| reach.is_missed())?;
+    let (wanted, unit) = (reach.wanted * diagonal, model.units.symbol());
+    let of = params.fit.tolerance_of;
+    let found = model.surfaces.iter().zip(&model.grids).map(|(s, g)| of.among(&normal_deviation_of(s, g)));
+    let found: Vec<f64> = found.collect();
+    let over: Vec<usize> = (0..found.len()).filter(|&p| found[p] > wanted).collect();
+    let Some(&worst) = over.iter().max_by(|&&a, &&b| found[a].total_cmp(&found[b])) else {
+        let text = format!(
+            "The surfaces are up to {} {unit} from the mesh between grid points that keep the tolerance of {} {unit}: raise --density.",
+            number(reach.reached * diagonal),
+            number(wanted)
+        );
+        return Some(Warning::new("tolerance_missed", text, ""));
+    };
     let (surface, grid) = (&model.surfaces[worst], &model.grids[worst]);
     let cells = params.fit.cells_per_span;
     // As many control points as the spans that the grid has room for.
@@ -39,13 +70,13 @@ pub fn tolerance(model: &Model, params: &PipelineParams, share: Option<f64>, sca
         ),
         false => format!("it has {} x {} control points: give more with --control", surface.cols, surface.rows),
     };
-    let unit = scale.units.symbol();
     let text = format!(
-        "{} of {} patches miss the tolerance of {} {unit}, patch {worst} by most with {} {unit} RMS: {limit}.",
+        "{} of {} patches miss the tolerance of {} {unit}, patch {worst} by most with {} {unit} {}: {limit}.",
         count(over.len() as u64),
-        count(rms.len() as u64),
+        count(found.len() as u64),
         number(wanted),
-        number(rms[worst])
+        number(found[worst]),
+        of.name()
     );
     Some(Warning::new("tolerance_missed", text, format!("patch {worst}")))
 }

@@ -1,6 +1,7 @@
 //! `planish run`: everything, from a scan or a mesh to all products.
 
-use super::{Session, commit_report, missed, pipeline_failure, write_failure, write_relief, write_text};
+use super::missed::{self, Reach};
+use super::{Session, commit_report, pipeline_failure, write_failure, write_relief, write_text};
 use crate::args::Run;
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -8,7 +9,7 @@ use crate::pictures;
 use crate::placed::{self, Placed};
 use crate::products::Staged;
 use crate::summary::Summary;
-use crate::tolerance::{Scale, Tolerance};
+use crate::tolerance::Tolerance;
 use planish::DVec3;
 use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{HistoryEntry, Model, Units};
@@ -113,9 +114,8 @@ pub fn produce(
     before: Vec<StageRecord>,
 ) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
-    let demanded = job.demanded;
     let cloud = if let Input::Scan(cloud) = from.input { Some(cloud) } else { None };
-    let Made { mut report, model, scan } = fitted(session, &job, from, before)?;
+    let Made { mut report, model, scan, reach } = fitted(session, &job, from, before)?;
     report.warnings.extend(placed::moved(model.shift, "preview.glb lies"));
     let raw = match (cloud, scan) {
         (Some(cloud), Some(Scanned { points, .. })) => {
@@ -136,11 +136,10 @@ pub fn produce(
     write_text(&staged.path("report.html"), &report::html(&report, &pictures))?;
     staged.commit()?;
     commit_report(own_report, &report)?;
-    let share = missed::share(demanded, &report, model.units);
-    let status = verdict(&report, share);
+    let status = verdict(&report, reach);
     if !session.common.quiet {
         session.tell_warnings(&report);
-        let mut summary = summary(&report, share);
+        let mut summary = summary(&report, reach);
         summary.row("products", job.output.display().to_string());
         summary.row("look at", job.output.join("report.html").display().to_string());
         summary.print();
@@ -156,6 +155,8 @@ pub struct Made {
     pub model: Model,
     /// What became of a scan.
     pub scan: Option<Scanned>,
+    /// What is reached of a demanded tolerance.
+    pub reach: Option<Reach>,
 }
 
 /// Runs the pipeline on an input.
@@ -195,30 +196,24 @@ pub fn fitted(session: &Session, job: &Job, from: From, before: Vec<StageRecord>
         report.quality.extend(found.map_err(Failure::fault)?);
         report.stages.push(record);
     }
-    let scale = Scale { diagonal: report.input.diagonal, units };
-    let share = job.demanded.map(|tolerance| tolerance.share(scale));
-    report.warnings.extend(missed::tolerance(&model, &run.params, share, scale));
+    let reach = Reach::new(job.demanded, run.params.fit.tolerance_of, &report, units);
+    report.warnings.extend(missed::tolerance(&model, &run.params, reach, report.input.diagonal));
     report.warnings.extend(missed::angle(&model, &seams, &run.params, job.demanded_angle));
     report.warnings.extend(missed::patches(&model, job.wanted_patches));
     (model.units, model.shift) = (units, shift);
     model.params = serde_json::to_string(&run.params).map_err(Failure::fault)?;
     model.history.push(HistoryEntry { command: "fit".into(), parameters: model.params.clone() });
-    Ok(Made { report, model, scan: run.scan })
+    Ok(Made { report, model, scan: run.scan, reach })
 }
 
-/// Done, or a demanded tolerance is missed: that of the distance (a share of the diagonal), or that of the angle.
-pub fn verdict(report: &Report, demanded: Option<f64>) -> Status {
-    if report.warnings.iter().any(|w| w.code == missed::ANGLE) {
-        return Status::Missed;
-    }
-    match (demanded, report.figure("surface.patch_rms_max_rel")) {
-        (Some(wanted), Some(reached)) if reached > wanted => Status::Missed,
-        _ => Status::Done,
-    }
+/// Done, or a demanded tolerance is missed: that of the distance, or that of the angle.
+pub fn verdict(report: &Report, reach: Option<Reach>) -> Status {
+    let is_missed = reach.is_some_and(Reach::is_missed) || report.warnings.iter().any(|w| w.code == missed::ANGLE);
+    if is_missed { Status::Missed } else { Status::Done }
 }
 
 /// The table of a fit.
-pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
+pub fn summary(report: &Report, reach: Option<Reach>) -> Summary {
     let mut table = Summary::default();
     let (unit, diagonal) = (report.input.units.as_str(), report.input.diagonal);
     let figure = |key: &str| report.figure(key).unwrap_or(0.0);
@@ -263,10 +258,9 @@ pub fn summary(report: &Report, demanded: Option<f64>) -> Summary {
     let why: Vec<&str> = reasons.iter().map(|r| r.1.as_str()).collect();
     let why = if why.is_empty() { String::new() } else { format!(": {}", why.join("; ")) };
     table.row("verdict", format!("{}{why}", state.word().to_lowercase()));
-    if let Some(wanted) = demanded {
-        let reached = figure("surface.patch_rms_max_rel");
-        let word = if reached > wanted { "missed" } else { "kept" };
-        let lengths = [reached, wanted].map(|share| distance(share * diagonal, diagonal, unit));
+    if let Some(reach) = reach {
+        let word = if reach.is_missed() { "missed" } else { "kept" };
+        let lengths = [reach.reached, reach.wanted].map(|share| distance(share * diagonal, diagonal, unit));
         table.row("tolerance", format!("{word}: {} where {} is demanded", lengths[0], lengths[1]));
     }
     if report.figure("truth.displaced_rms").is_some() {

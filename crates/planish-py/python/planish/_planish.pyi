@@ -66,6 +66,7 @@ class _Layout(TypedDict, total=False):
 class _Grid(TypedDict, total=False):
     density: float | None  # grid points per vertex [2]
     miss: float | None  # farthest that a grid may leave a vertex, share of the diagonal [0.0015]
+    denser_rounds: int | None  # doublings of rows or columns for the tolerance of the surfaces [3]
     min_side: int | None  # least points along a side [17]
     max_side: int | None  # most points along a side [1025]
     max_points: int | None  # most points of all grids [8000000]
@@ -75,7 +76,11 @@ class _Grid(TypedDict, total=False):
 class _Fit(TypedDict, total=False):
     control: Sequence[int] | None  # control points along u and v of every patch; one of three
     per_curve: Sequence[int] | None  # control points along every curve
-    tolerance: float | None  # largest RMS over a patch, share of the diagonal
+    tolerance: float | None  # largest distance of a patch along the normal, share of the diagonal [0.001]
+    tolerance_of: Literal["rms", "p95", "max"] | None  # which distance the tolerance bounds [rms]
+    knots: Literal["fitted", "even"] | None  # where the knots of a tolerance stand [fitted]
+    control_at: Sequence[tuple[int, int, int]] | None  # patch, control points along u and along v; over all else
+    max_control: int | None  # most control points of all surfaces for a tolerance
     cells_per_span: float | None  # grid cells for each knot span at least
     fit_smoothing: float | None  # weight of smoothness
     continuity: Literal["c0", "g1", "g1_double"] | None  # how surfaces meet along smooth seams [g1]

@@ -24,11 +24,11 @@ mod side;
 mod sizes;
 
 pub use feature::curve::{FeatureGrid, Sections, relax_with_features};
-pub use feature::network::{check_features, family_of, relax_network};
+pub use feature::network::{Drawn, check_features, family_of, relax_network};
 pub use feature::{Family, FeatureCurve, FeatureError};
 pub use follow::follow;
 pub use quality::{GridQuality, measure};
-pub use resample::resample;
+pub use resample::{densify, resample};
 pub use sizes::choose_sizes;
 
 use crate::grid::chart::locate::Spot;
@@ -69,6 +69,10 @@ pub struct GridParams {
     /// 2 times along a side in each, and until all grids together have three times the points that `density` gave them.
     #[schemars(range(min = 1e-6, max = 1.0), extend("unit" = "diagonal"))]
     pub miss: f64,
+    /// Rounds in which rows or columns are doubled where the tolerance of the surfaces needs more control points than the grids
+    /// carry. None for a scan unless asked for: beyond the points of its mesh there is noise.
+    #[schemars(range(min = 0, max = 8))]
+    pub denser_rounds: usize,
     /// Least number of points along a side.
     #[schemars(range(min = 4, max = 1025))]
     pub min_side: usize,
@@ -93,6 +97,7 @@ impl Default for GridParams {
         GridParams {
             density: 2.0,
             miss: 1.5e-3,
+            denser_rounds: 3,
             min_side: 17,
             max_side: 1025,
             max_points: 8_000_000,

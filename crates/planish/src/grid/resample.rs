@@ -57,14 +57,85 @@ pub fn resample(
     params: &GridParams,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, FeatureError> {
-    let make = |which: &[usize], sizes: &[(usize, usize)], observer: &dyn Observer| {
-        if drawn.0.is_empty() && drawn.1.is_empty() {
-            let jobs: Vec<Job> = which.iter().map(|&p| (p, &patches[p], sizes[p])).collect();
-            return Ok(relax_jobs(input, &jobs, &[], params, observer)?);
-        }
-        relax_some(input, network, patches, sizes, drawn, which, params, observer)
+    let make = |which: &[usize], sizes: &[Size], observer: &dyn Observer| {
+        made(input, network, patches, sizes, drawn, which, params, observer)
     };
     refined(input, network, patches, params, &|sizes| give_sums(network, drawn, sizes), &make, observer)
+}
+
+/// Grids of some of the patches, rising, by the sizes of all.
+fn made(
+    input: &TriMesh,
+    network: &Network,
+    patches: &[PatchMesh],
+    sizes: &[Size],
+    drawn: Drawn,
+    which: &[usize],
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<Vec<Grid>, FeatureError> {
+    if drawn.0.is_empty() && drawn.1.is_empty() {
+        let jobs: Vec<Job> = which.iter().map(|&p| (p, &patches[p], sizes[p])).collect();
+        return Ok(relax_jobs(input, &jobs, &[], params, observer)?);
+    }
+    relax_some(input, network, patches, sizes, drawn, which, params, observer)
+}
+
+/// Gives twice the cells to the chords of some curves, the neediest first where not all have room: up to [`MOST_GROWTH`] times
+/// the points of `start`, `params.max_side` and `params.max_points`. False if none got more.
+///
+/// * `need` - for each curve how much it needs finer grids; 0 for not at all
+/// # Errors
+/// As [`relax_network`](super::relax_network).
+pub fn densify(
+    input: &TriMesh,
+    network: &Network,
+    patches: &[PatchMesh],
+    drawn: Drawn,
+    (grids, start): (&mut [Grid], usize),
+    need: &[f64],
+    params: &GridParams,
+    observer: &dyn Observer,
+) -> Result<bool, FeatureError> {
+    let chords = network.chords();
+    let mut most_of = vec![0.0f64; chords.len()];
+    for (&chord, &need) in chords.iter().zip(need) {
+        most_of[chord as usize] = most_of[chord as usize].max(need);
+    }
+    let [_, most] = bounds(params);
+    let budget = ((MOST_GROWTH * start as f64) as usize).min(params.max_points);
+    let before: Vec<Size> = grids.iter().map(|g| (g.cols, g.rows)).collect();
+    let sized = |least: f64| -> Result<Vec<Size>, FeatureError> {
+        let count = |count: usize, curve: u32| {
+            let need = most_of[chords[curve as usize] as usize];
+            if need >= least { (2 * count - 1).min(most).max(count) } else { count }
+        };
+        let sides = network.patches.iter().zip(&before);
+        let mut sizes: Vec<Size> =
+            sides.map(|(p, s)| (count(s.0, p.sides[0].curve), count(s.1, p.sides[1].curve))).collect();
+        give_sums(network, drawn, &mut sizes)?;
+        Ok(sizes)
+    };
+    // The most of the neediest that there is room for.
+    let mut needs: Vec<f64> = need.iter().copied().filter(|n| *n > 0.0).collect();
+    needs.sort_unstable_by(|a, b| b.total_cmp(a));
+    needs.dedup();
+    let (mut room, mut too_many) = (0, needs.len() + 1);
+    let mut sizes = before.clone();
+    while too_many - room > 1 {
+        let middle = if too_many > needs.len() { needs.len() } else { (room + too_many) / 2 };
+        let wanted = sized(needs.get(middle - 1).copied().unwrap_or(f64::INFINITY))?;
+        if total(&wanted) <= budget {
+            (room, sizes) = (middle, wanted);
+        } else {
+            too_many = middle;
+        }
+    }
+    let which: Vec<usize> = (0..grids.len()).filter(|&p| sizes[p] != before[p]).collect();
+    for (&p, grid) in which.iter().zip(made(input, network, patches, &sizes, drawn, &which, params, observer)?) {
+        grids[p] = grid;
+    }
+    Ok(!which.is_empty())
 }
 
 /// Points along u and v.

@@ -65,6 +65,18 @@ pub struct Curve {
     pub points: Vec<FacePoint>,
 }
 
+/// How a curve runs along its chord.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Along {
+    /// The chord, called by the first of its curves.
+    pub chord: u32,
+    /// True if the curve runs against that first one.
+    pub reversed: bool,
+    /// True if the chord comes back to a curve from its other end, as on a Moebius strip: what holds for it has to hold from
+    /// both ends.
+    pub both_ways: bool,
+}
+
 /// One side of a patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Side {
@@ -119,22 +131,43 @@ impl Network {
     /// For each curve its chord: curves on opposite sides of a patch belong to one chord, and all curves of
     /// a chord share their number of grid points and of control points.
     pub fn chords(&self) -> Vec<u32> {
-        let mut parent: Vec<u32> = (0..self.curves.len() as u32).collect();
-        fn root(parent: &mut [u32], mut c: u32) -> u32 {
-            while parent[c as usize] != c {
-                parent[c as usize] = parent[parent[c as usize] as usize];
-                c = parent[c as usize];
+        self.directed_chords().into_iter().map(|along| along.chord).collect()
+    }
+
+    /// For each curve its chord and how it runs along it: opposite sides of a patch run the same way, seen from the patch.
+    pub fn directed_chords(&self) -> Vec<Along> {
+        // Of each curve another of its chord, and whether it runs against that one.
+        let mut parent: Vec<(u32, bool)> = (0..self.curves.len() as u32).map(|c| (c, false)).collect();
+        fn root(parent: &mut [(u32, bool)], c: u32) -> (u32, bool) {
+            let (above, against) = parent[c as usize];
+            if above == c {
+                return (c, false);
             }
-            c
+            let (top, turned) = root(parent, above);
+            parent[c as usize] = (top, turned != against);
+            parent[c as usize]
         }
+        let mut both_ways = vec![false; self.curves.len()];
         for patch in &self.patches {
             for k in 0..2 {
-                let a = root(&mut parent, patch.sides[k].curve);
-                let b = root(&mut parent, patch.sides[k + 2].curve);
+                let [one, other] = [patch.sides[k], patch.sides[k + 2]];
+                let (a, a_turned) = root(&mut parent, one.curve);
+                let (b, b_turned) = root(&mut parent, other.curve);
+                // Both sides run counter-clockwise, so against each other.
+                let against = (one.reversed != a_turned) == (other.reversed != b_turned);
                 let (low, high) = (a.min(b), a.max(b));
-                parent[high as usize] = low;
+                if low == high {
+                    both_ways[low as usize] |= against;
+                } else {
+                    parent[high as usize] = (low, against);
+                    both_ways[low as usize] |= both_ways[high as usize];
+                }
             }
         }
-        (0..parent.len() as u32).map(|c| root(&mut parent, c)).collect()
+        let along = |c: u32| {
+            let (chord, reversed) = root(&mut parent, c);
+            Along { chord, reversed, both_ways: both_ways[chord as usize] }
+        };
+        (0..self.curves.len() as u32).map(along).collect()
     }
 }

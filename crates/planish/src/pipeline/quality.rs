@@ -12,7 +12,7 @@ use crate::network::{CurveKind, Network, PatchMesh};
 use crate::observe::{Cancelled, Observer, Part};
 use crate::relief::{self, PatchedMesh};
 use crate::surface::basis::uniform_parameters;
-use crate::surface::{self, EdgeInSeam, SeamQuality, Surface};
+use crate::surface::{self, Deviation, EdgeInSeam, SeamQuality, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -56,10 +56,14 @@ pub(super) fn measure(
     quality.insert("surface.control_points".into(), Figure::Count(control as u64));
     let one = |(s, g): (&Surface, &Grid)| {
         observer.check()?;
-        Ok(surface::deviation_of(s, g).rms)
+        Ok(surface::normal_deviation_of(s, g))
     };
-    let worst: Result<Vec<f64>, Cancelled> = model.surfaces.par_iter().zip(&model.grids).map(one).collect();
-    length(&mut quality, "surface.patch_rms_max", worst?.into_iter().fold(0.0, f64::max), diagonal);
+    let patches_off: Result<Vec<Deviation>, Cancelled> = model.surfaces.par_iter().zip(&model.grids).map(one).collect();
+    let patches_off = patches_off?;
+    let worst = |of: fn(&Deviation) -> f64| patches_off.iter().map(of).fold(0.0, f64::max);
+    length(&mut quality, "surface.patch_rms_max", worst(|d| d.rms), diagonal);
+    length(&mut quality, "surface.patch_p95_max", worst(|d| d.p95), diagonal);
+    length(&mut quality, "surface.patch_max", worst(|d| d.max), diagonal);
     let base = surface_mesh(model, observer)?;
     distances(&mut quality, "surface", &compare(&model.mesh, &base, &Part::new(observer, 0.1, 0.45))?, diagonal);
     drop(base);

@@ -154,7 +154,7 @@ fn remade(
                     return Ok(grids);
                 }
             }
-            Ok(grid::resample(mesh, network, &patches, drawn, &params.grid, o)?)
+            super::resampled(mesh, network, &patches, drawn, params, o)
         },
         |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;

@@ -14,7 +14,7 @@ use crate::mesh::sets::Sets;
 use crate::mesh::{FeatureTags, TriMesh};
 use crate::observe::{Cancelled, Observer, Part};
 use crate::sharp::{self, ScanScale};
-use crate::surface::{FitParams, Resolution};
+use crate::surface::{FitParams, KnotSpacing, Resolution};
 use glam::DVec3;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -165,11 +165,13 @@ pub fn mesh_samples(
     Ok(ScanMeshed { samples, meshed, specks, closed, lids, to_points })
 }
 
-/// A surface fitted to a scan follows its mesh to this share of the noise, within these shares of the diagonal.
-const FIT_NOISE: f64 = 0.5;
-const FIT_CLOSEST: f64 = 2e-4;
+/// A surface fitted to a scan follows its mesh along the normal to this share of the noise, within these shares of the diagonal:
+/// a quarter of what kept distances at equal parameters as near, of which most goes sideways.
+const FIT_NOISE: f64 = 0.125;
+const FIT_CLOSEST: f64 = 5e-5;
+const FIT_FARTHEST: f64 = 2.5e-4;
 /// Edges of the mesh of a scan that pass more than this share of that beside the surface are split.
-const BENT_TOLERANCE: f64 = 0.2;
+const BENT_TOLERANCE: f64 = 0.8;
 /// Smoothing at noise of a thousandth of the diagonal; it goes with the square of the noise, as in Wiener's filter. Less leaves
 /// the noise beside sharp edges, more flattens what bends there.
 const FIT_SMOOTHING: f64 = 0.05;
@@ -189,15 +191,15 @@ pub fn params_for(made: &ScanMeshed) -> PipelineParams {
     let usual = PipelineParams::default();
     let noise = made.samples.noise / made.samples.diagonal;
     let resolution = match usual.fit.resolution {
-        Resolution::Tolerance(most) => Resolution::Tolerance(fit_tolerance(&made.samples).min(most)),
+        Resolution::Tolerance(most) => Resolution::Tolerance(fit_tolerance(&made.samples).min(FIT_FARTHEST).min(most)),
         other => other,
     };
     let smoothing = (FIT_SMOOTHING * (noise / 1e-3).powi(2)).clamp(usual.fit.smoothing, 1.0);
     let vertices = made.meshed.extracted.mesh.points.len().max(1);
     let density = (GRID_POINTS / vertices as f64).min(GRID_DENSITY).max(usual.grid.density);
     PipelineParams {
-        fit: FitParams { resolution, smoothing, ..usual.fit },
-        grid: GridParams { density, ..usual.grid },
+        fit: FitParams { resolution, smoothing, knots: KnotSpacing::Even, ..usual.fit },
+        grid: GridParams { density, denser_rounds: 0, ..usual.grid },
         ..usual
     }
 }

@@ -2,70 +2,93 @@
 //!
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §4.3.2: the entries `B_i(u_k)`.
 
+use std::cmp::Ordering;
+use std::sync::Arc;
+
 /// Clamped uniform knots for `control >= 4` control points: `control + 4` numbers from 0 to 1.
 pub fn uniform_knots(control: usize) -> Vec<f64> {
     let spans = (control - 3) as f64;
     (0..control + 4).map(|i| (i.saturating_sub(3) as f64 / spans).min(1.0)).collect()
 }
 
-/// True if `knots` are what [`uniform_knots`] makes, to rounding.
-pub fn is_uniform(knots: &[f64]) -> bool {
-    knots.len() >= 8 && uniform_knots(knots.len() - 4).iter().zip(knots).all(|(a, b)| (a - b).abs() < 1e-9)
-}
+/// How many steps between 0 and 1 knots are told apart by: `1 - k` differs from the knot that it stands for by rounding.
+const KNOT_STEPS: f64 = (1u64 << 40) as f64;
 
-/// How often each inner knot of a direction stands. All stand at equal steps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Knots {
-    /// Once: two derivatives are continuous.
-    Simple,
-    /// Twice: the tangent plane is continuous, curvature need not be. What a bicubic surface needs along a seam that ends
-    /// in a corner where not four patches meet.
-    Double,
-}
+/// The knots of a direction: clamped, rising from 0 to 1, as many as control points and four more.
+///
+/// Two lists are equal if no knot differs by more than rounding.
+#[derive(Clone, Debug)]
+pub struct Knots(Arc<[f64]>);
 
 impl Knots {
-    /// The knots of `control >= 4` control points, which are even in number where knots are double: `control + 4` numbers
-    /// from 0 to 1.
-    pub fn list(self, control: usize) -> Vec<f64> {
-        match self {
-            Knots::Simple => uniform_knots(control),
-            Knots::Double => {
-                let spans = self.spans(control);
-                (0..control + 4).map(|i| ((i / 2).saturating_sub(1) as f64 / spans as f64).min(1.0)).collect()
-            }
-        }
+    /// Those of [`uniform_knots`].
+    pub fn uniform(control: usize) -> Knots {
+        Knots(uniform_knots(control).into())
     }
 
-    /// Knot spans of a direction with so many control points.
-    pub fn spans(self, control: usize) -> usize {
-        match self {
-            Knots::Simple => control - 3,
-            Knots::Double => (control - 2) / 2,
-        }
+    /// Each inner knot twice, at equal steps: the tangent plane is continuous, curvature need not be. `control` is even.
+    pub fn double(control: usize) -> Knots {
+        let spans = (control - 2) / 2;
+        Knots((0..control + 4).map(|i| ((i / 2).saturating_sub(1) as f64 / spans as f64).min(1.0)).collect())
     }
 
-    /// Which of the two these knots are, to rounding; `None` if neither.
-    pub fn of(knots: &[f64]) -> Option<Knots> {
-        let is = |kind: Knots| kind.list(knots.len() - 4).iter().zip(knots).all(|(a, b)| (a - b).abs() < 1e-9);
-        if is_uniform(knots) {
-            return Some(Knots::Simple);
-        }
-        (knots.len() >= 8 && knots.len().is_multiple_of(2) && is(Knots::Double)).then_some(Knots::Double)
+    /// Knots at `breaks`, which rise from 0 to 1; inner ones stand twice if `is_double`.
+    pub fn at(breaks: &[f64], is_double: bool) -> Knots {
+        let inner =
+            breaks[1..breaks.len() - 1].iter().flat_map(|&b| std::iter::repeat_n(b, 1 + usize::from(is_double)));
+        Knots([0.0; 4].into_iter().chain(inner).chain([1.0; 4]).collect())
     }
 
-    /// The nearest number of control points that such knots can have, one more rather than one less unless that is above
-    /// `most`.
-    pub fn possible(self, control: usize, most: usize) -> usize {
-        match self {
-            Knots::Double if control % 2 == 1 => {
-                if control < most {
-                    control + 1
-                } else {
-                    control - 1
-                }
-            }
-            _ => control,
-        }
+    /// The knots of a surface.
+    pub fn of(list: &[f64]) -> Knots {
+        Knots(list.into())
+    }
+
+    /// `control() + 4` numbers from 0 to 1.
+    pub fn list(&self) -> &[f64] {
+        &self.0
+    }
+
+    /// Control points of a direction with these knots.
+    pub fn control(&self) -> usize {
+        self.0.len() - 4
+    }
+
+    /// Where spans begin and end, from 0 to 1.
+    pub fn breaks(&self) -> Vec<f64> {
+        let mut breaks = self.0.to_vec();
+        breaks.dedup();
+        breaks
+    }
+
+    /// The same seen from the other end; the list itself where that is equal.
+    pub fn reversed(&self) -> Knots {
+        let turned = Knots(self.0.iter().rev().map(|k| 1.0 - k).collect());
+        if turned == *self { self.clone() } else { turned }
+    }
+
+    fn steps(&self) -> impl Iterator<Item = u64> {
+        self.0.iter().map(|k| (k * KNOT_STEPS).round() as u64)
+    }
+}
+
+impl PartialEq for Knots {
+    fn eq(&self, other: &Knots) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Knots {}
+
+impl PartialOrd for Knots {
+    fn partial_cmp(&self, other: &Knots) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Knots {
+    fn cmp(&self, other: &Knots) -> Ordering {
+        self.steps().cmp(other.steps())
     }
 }
 
@@ -73,6 +96,15 @@ impl Knots {
 pub fn uniform_parameters(count: usize) -> Vec<f64> {
     let last = count.saturating_sub(1).max(1) as f64;
     (0..count).map(|i| i as f64 / last).collect()
+}
+
+/// Places of samples: the breaks of `knots` and between two of them `per_span - 1` at equal steps.
+pub fn span_samples(breaks: &[f64], per_span: usize) -> Vec<f64> {
+    let inside = |w: &[f64]| {
+        let [a, b] = [w[0], w[1]];
+        (0..per_span).map(move |k| a + (b - a) * k as f64 / per_span as f64)
+    };
+    breaks.windows(2).flat_map(inside).chain([1.0]).collect()
 }
 
 /// The four basis functions that are not zero at `u` and their first and second derivatives.

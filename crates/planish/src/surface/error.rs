@@ -91,14 +91,32 @@ pub enum FitError {
         /// What it must be.
         wanted: &'static str,
     },
+    /// Control points are asked for at a patch that does not exist.
+    #[error(
+        "control points are asked for at patch {patch}, but there are {patches}, counted from 0; `planish info` lists them"
+    )]
+    NoSuchPatch {
+        /// The patch.
+        patch: usize,
+        /// Patches of the network.
+        patches: usize,
+    },
+    /// A budget of control points that no tolerance keeps.
+    #[error("{most} control points in all are too few, {least} are needed; raise the limit, or give fewer patches")]
+    Budget {
+        /// The budget.
+        most: usize,
+        /// What was needed at the widest tolerance.
+        least: usize,
+    },
     /// A surface that cannot be evaluated.
     #[error("the surface is malformed: {what}; fit it again")]
     Malformed {
         /// What is wrong.
         what: &'static str,
     },
-    /// Seams can be worked on only where the knots are uniform.
-    #[error("patch {patch} does not have clamped uniform knots; fit it again before its seams are smoothed")]
+    /// Two patches disagree on the knots along their curve.
+    #[error("patch {patch} has other knots along a side than its neighbour; fit the surfaces again")]
     Knots {
         /// The patch.
         patch: usize,

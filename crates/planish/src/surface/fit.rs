@@ -37,19 +37,24 @@ pub fn fit(points: &[DVec3], rows: usize, cols: usize, control: [usize; 2]) -> R
     if points.len() != rows * cols {
         return Err(FitError::Shape { patch: 0, rows, cols, points: points.len() });
     }
-    let (along_v, along_u) =
-        (Direction::new(rows, control[0], Knots::Simple, 0.0)?, Direction::new(cols, control[1], Knots::Simple, 0.0)?);
+    let (along_v, along_u) = (uniform(rows, control[0])?, uniform(cols, control[1])?);
     let projection = project(points, &along_u, &along_v);
     let mut net = vec![DVec3::ZERO; control[0] * control[1]];
     solve_inside(&mut net, &projection, &along_u, &along_v, 0);
     Ok(surface_of(net, &along_u, &along_v))
 }
 
+fn uniform(count: usize, control: usize) -> Result<Direction, FitError> {
+    if control < FEWEST_CONTROL {
+        return Err(FitError::TooFewControl { control });
+    }
+    Direction::new(count, &Knots::uniform(control), 0.0)
+}
+
 /// What a fit of `count` nodes by `control` control points needs in one direction.
 #[derive(Clone, Debug)]
 pub(crate) struct Direction {
-    pub knots: Vec<f64>,
-    pub kind: Knots,
+    pub knots: Knots,
     pub basis: BasisRows,
     /// Normal matrix `B^T B`.
     gram: Banded,
@@ -61,15 +66,12 @@ impl Direction {
     /// * `smoothing` - weight of the bends of the control polygon against the distances of the nodes that fall on one
     ///   control point: 0 for plain least squares; large values leave straight lines, and of a surface with given
     ///   boundary the bilinear blend of that boundary
-    pub fn new(count: usize, control: usize, kind: Knots, smoothing: f64) -> Result<Direction, FitError> {
-        if control < FEWEST_CONTROL {
-            return Err(FitError::TooFewControl { control });
-        }
+    pub fn new(count: usize, knots: &Knots, smoothing: f64) -> Result<Direction, FitError> {
+        let control = knots.control();
         if count < control {
             return Err(FitError::TooFewPoints { points: count, control });
         }
-        let knots = kind.list(control);
-        let basis = BasisRows::new(&knots, &uniform_parameters(count), 0);
+        let basis = BasisRows::new(knots.list(), &uniform_parameters(count), 0);
         let mut gram = Banded::zero(control, 3);
         for (&first, w) in basis.first.iter().zip(&basis.weights) {
             for a in 0..4 {
@@ -78,13 +80,13 @@ impl Direction {
                 }
             }
         }
-        add_bends(&mut gram, &knots, smoothing * (count - 1) as f64 / (control - 3) as f64);
+        add_bends(&mut gram, knots, smoothing * (count - 1) as f64);
         let factor = |inset: usize| {
             BandedCholesky::factor(gram.part(inset..control - inset))
                 .ok_or(FitError::Singular { points: count, control })
         };
         let factors = [factor(0)?, factor(1)?, factor(2)?];
-        Ok(Direction { knots, kind, basis, gram, factors })
+        Ok(Direction { knots: knots.clone(), basis, gram, factors })
     }
 
     pub fn control(&self) -> usize {
@@ -93,7 +95,7 @@ impl Direction {
 
     /// The same with a weight of bends.
     pub fn smoothed(&self, smoothing: f64) -> Result<Direction, FitError> {
-        Direction::new(self.basis.len(), self.control(), self.kind, smoothing)
+        Direction::new(self.basis.len(), &self.knots, smoothing)
     }
 
     /// Entry of the normal matrix.
@@ -135,46 +137,53 @@ impl Direction {
     }
 }
 
-/// Adds `weight` times the squared second differences of the control points by their Greville abscissae, scaled so
-/// that they are `1, -2, 1` inside: `B^T B` becomes the matrix of a smoothing spline. Straight lines at constant
-/// speed cost nothing.
-fn add_bends(gram: &mut Banded, knots: &[f64], weight: f64) {
+/// Adds `weight` per unit of the parameter times the squared second differences of the control points by their Greville
+/// abscissae, in steps of the knots around so that they are `1, -2, 1` inside where these are at equal steps: `B^T B` becomes
+/// the matrix of a smoothing spline. Straight lines at constant speed cost nothing.
+fn add_bends(gram: &mut Banded, knots: &Knots, weight: f64) {
     if weight == 0.0 {
         return;
     }
-    let n = gram.len();
-    let place = |i: usize| (knots[i + 1] + knots[i + 2] + knots[i + 3]) / 3.0 * (n - 3) as f64;
+    let (n, knots) = (gram.len(), knots.list());
+    let place = |i: usize| (knots[i + 1] + knots[i + 2] + knots[i + 3]) / 3.0;
     for i in 1..n - 1 {
-        let (before, after) = (1.0 / (place(i) - place(i - 1)), 1.0 / (place(i + 1) - place(i)));
+        // Mean step of the control points that the function spans.
+        let steps = (i.min(3) + (n - 1 - i).min(3) - 2) as f64;
+        let step = (knots[i + 4] - knots[i]) / steps;
+        let (before, after) = (step / (place(i) - place(i - 1)), step / (place(i + 1) - place(i)));
         let row = [before, -before - after, after];
         for a in 0..3 {
             for b in 0..=a {
-                gram.add(i - 1 + a, i - 1 + b, weight * row[a] * row[b]);
+                gram.add(i - 1 + a, i - 1 + b, weight * step * row[a] * row[b]);
             }
         }
     }
 }
 
-/// Nodes, control points and knots of a direction.
-pub(crate) type Layout = (usize, usize, Knots);
+/// Nodes and knots of a direction.
+pub(crate) type Layout = (usize, Knots);
 
 /// The directions of a whole network, factored once per layout.
 pub(crate) struct Directions(BTreeMap<Layout, Direction>);
 
 impl Directions {
+    /// Of these layouts, from both ends.
     pub fn new(layouts: impl Iterator<Item = Layout>) -> Result<Directions, FitError> {
         let mut map = BTreeMap::new();
-        for layout in layouts {
-            if let std::collections::btree_map::Entry::Vacant(slot) = map.entry(layout) {
-                slot.insert(Direction::new(layout.0, layout.1, layout.2, 0.0)?);
+        for (count, knots) in layouts {
+            for knots in [knots.reversed(), knots] {
+                if !map.contains_key(&(count, knots.clone())) {
+                    let direction = Direction::new(count, &knots, 0.0)?;
+                    map.insert((count, knots), direction);
+                }
             }
         }
         Ok(Directions(map))
     }
 
     /// The direction of one of the layouts given to `new`.
-    pub fn get(&self, layout: Layout) -> &Direction {
-        &self.0[&layout]
+    pub fn get(&self, count: usize, knots: &Knots) -> &Direction {
+        &self.0[&(count, knots.clone())]
     }
 }
 
@@ -312,7 +321,7 @@ pub(crate) fn surface_of(control: Vec<DVec3>, along_u: &Direction, along_v: &Dir
         rows: along_v.control(),
         cols: along_u.control(),
         control,
-        knots_u: along_u.knots.clone(),
-        knots_v: along_v.knots.clone(),
+        knots_u: along_u.knots.list().to_vec(),
+        knots_v: along_v.knots.list().to_vec(),
     }
 }

@@ -6,7 +6,7 @@
 //! See `docs/methods/surfaces.md`, "Folds".
 
 use super::Surface;
-use super::basis::{basis_at, uniform_parameters};
+use super::basis::{Knots, basis_at, span_samples};
 use crate::grid::Grid;
 use glam::DVec3;
 
@@ -26,8 +26,8 @@ const FLAT: f64 = 1e-6;
 /// direction are looked at. 0 for a surface that does not fold.
 pub fn folds(surface: &Surface, grid: &Grid) -> usize {
     let means = MeanNormals::new(grid, [surface.cols, surface.rows]);
-    let spans = [surface.cols - 3, surface.rows - 3];
-    let (us, vs) = (uniform_parameters(SPAN_SAMPLES * spans[0] + 1), uniform_parameters(SPAN_SAMPLES * spans[1] + 1));
+    let [us, vs] =
+        [&surface.knots_u, &surface.knots_v].map(|list| span_samples(&Knots::of(list).breaks(), SPAN_SAMPLES));
     let mut count = 0;
     for (b, &v) in vs.iter().enumerate() {
         let (j, bv) = basis_at(&surface.knots_v, v);

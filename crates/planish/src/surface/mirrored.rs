@@ -185,14 +185,9 @@ fn image(mate: &Surface, matched: &Matched, network: &Network, plane: &Plane, q:
     let swap = s.is_multiple_of(2);
     let (cols, rows) = if swap { (mate.rows, mate.cols) } else { (mate.cols, mate.rows) };
     let [turn_u, turn_v] = turned(s);
-    let knots = |of: &[f64], turned: bool| -> Vec<f64> {
-        match turned {
-            // Those at equal steps are their own images; rounding is not.
-            true => {
-                Knots::of(of).map_or_else(|| of.iter().rev().map(|x| 1.0 - x).collect(), |kind| kind.list(of.len() - 4))
-            }
-            false => of.to_vec(),
-        }
+    let knots = |of: &[f64], turned: bool| match turned {
+        true => Knots::of(of).reversed().list().to_vec(),
+        false => of.to_vec(),
     };
     let control_at = |i: usize, j: usize| control[counterpart(mate, s, i, j)];
     let (knots_a, knots_b) = (knots(&mate.knots_u, turn_u), knots(&mate.knots_v, turn_v));

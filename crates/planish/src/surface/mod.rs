@@ -2,7 +2,7 @@
 //!
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, ch. 4, 6 and 8.
 //! 1. basis and evaluation - `basis`, `evaluate`      2. one grid - `fit`, eq. 4.4
-//! 3. a network without gaps and folds - `network_fit`, `resolution`, `fold`
+//! 3. a network without gaps and folds - `params`, `network_fit`, `resolution`, `spacing`, `fold`
 //! 4. smooth seams - `seam`, §8.1      5. how good it is - `quality`, eq. 6.1
 //! 6. exact mirror images where there is a plane of symmetry - `mirrored`      7. after small edits - `retouch`
 
@@ -13,11 +13,13 @@ mod fit;
 mod fold;
 mod mirrored;
 mod network_fit;
+mod params;
 mod quality;
 mod resolution;
 mod retouch;
 mod seam;
 mod sides;
+mod spacing;
 
 pub use error::FitError;
 pub use evaluate::Jet;
@@ -25,11 +27,12 @@ pub(crate) use evaluate::RowSampler;
 pub use fit::{FEWEST_CONTROL, fit};
 pub use fold::folds;
 pub use mirrored::mirror_surfaces;
-pub use network_fit::{Continuity, FitParams, fit_network};
+pub use network_fit::{fit_network, starved};
+pub use params::{Continuity, FitParams, KnotSpacing, Measure, Resolution};
 pub use quality::{
-    Deviation, SeamAngle, SeamQuality, deviation, deviation_of, measure_seams, measure_seams_apart, seam_angles,
+    Deviation, SeamAngle, SeamQuality, deviation, deviation_of, measure_seams, measure_seams_apart,
+    normal_deviation_of, seam_angles,
 };
-pub use resolution::Resolution;
 pub use retouch::retouch;
 pub use seam::{EDGE_ANGLE_DEG, EdgeInSeam, StitchParams, edges_in_seams, stitch, stitch_near};
 pub(crate) use sides::{check, node};

@@ -7,18 +7,18 @@
 //! exact, and no patch pays for its neighbour.
 
 use super::basis::Knots;
-use super::fit::{Direction, Directions, FEWEST_CONTROL, project, solve_inside, surface_of};
+use super::fit::{Direction, Directions, project, solve_inside, surface_of};
 use super::fold::folds;
-use super::resolution::{self, Resolution};
-use super::sides::{check_grids, curve_nodes, diagonal, node, side_len};
-use super::{FitError, Surface, deviation_of};
+use super::params::{FitParams, Resolution};
+use super::quality::heights;
+use super::resolution::Plan;
+use super::sides::{check_grids, curve_nodes, node, side_len};
+use super::{FitError, Surface};
 use crate::grid::Grid;
 use crate::network::{Network, Patch};
 use crate::observe::Observer;
 use glam::DVec3;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Rounds that may raise the counts after the first choice: the fixed boundaries cost little, so that two do.
@@ -28,50 +28,20 @@ const COUNT_ROUNDS: usize = 3;
 /// the nodes weigh to a surface that is all but the blend of its boundary curves, which stay.
 pub(super) const SMOOTHING: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
 
-/// How to fit the surfaces of a network.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FitParams {
-    /// How many control points, directly or by a tolerance.
-    pub resolution: Resolution,
-    /// Fewest grid cells per knot span in each direction; a tolerance that asks for more control points is not
-    /// reached. Spans of a cell or two follow the noise of a scan and swing between its points.
-    #[schemars(range(min = 1.0, max = 1e3), extend("unit" = "cells"))]
-    pub cells_per_span: f64,
-    /// Weight of bends of the control net against the distances of the grid's points: 0 for plain least squares, but
-    /// inside patches that would fold; more leaves more of the detail to the relief. A hundredth of what the points of a
-    /// span weigh keeps control points still that few points decide, and the noise of a scan out of them.
-    #[schemars(range(min = 0.0, max = 1e4))]
-    pub smoothing: f64,
-    /// How surfaces meet along smooth seams.
-    pub continuity: Continuity,
-}
-
-/// How surfaces meet along smooth seams.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Continuity {
-    /// Without gaps; the angle is what the fit of each patch makes of it.
-    C0,
-    /// With one tangent plane along each seam, to the tolerance of the angle.
-    #[default]
-    G1,
-    /// As `g1`, with double knots in chords that end in a corner where not four patches meet: there the angle can go to nothing
-    /// with more control points, which with simple knots it cannot, but with as many control points both the angle and the
-    /// distance are larger.
-    G1Double,
-}
-
-impl Default for FitParams {
-    /// A tolerance of 1/1000 of the diagonal and four cells per span: the smooth shape; the relief has the rest.
-    fn default() -> FitParams {
-        FitParams {
-            resolution: Resolution::Tolerance(1e-3),
-            cells_per_span: 4.0,
-            smoothing: 0.01,
-            continuity: Continuity::G1,
-        }
-    }
+/// For each curve how many times the tolerance a patch misses along its chord with as many control points as the grids carry,
+/// and 0 if all keep it: where it is more, only finer grids help.
+///
+/// # Errors
+/// As [`fit_network`].
+pub fn starved(
+    network: &Network,
+    grids: &[Grid],
+    params: &FitParams,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, FitError> {
+    let nodes = check_grids(network, grids)?;
+    params.check()?;
+    Ok(Plan::new(network, grids, &nodes, params, params.allowed(grids), observer)?.excess())
 }
 
 /// Fits one surface to each grid of a network; neighbours share their boundary control points bit for bit.
@@ -89,43 +59,31 @@ pub fn fit_network(
     observer: &dyn Observer,
 ) -> Result<Vec<Surface>, FitError> {
     let nodes = check_grids(network, grids)?;
-    let cells = params.cells_per_span;
-    if !(cells >= 1.0 && cells.is_finite()) {
-        return Err(FitError::Parameter { name: "cells_per_span", value: cells, wanted: "1 or more" });
-    }
-    if !(params.smoothing >= 0.0 && params.smoothing.is_finite()) {
-        return Err(FitError::Parameter { name: "smoothing", value: params.smoothing, wanted: "0 or more" });
-    }
-    let size = diagonal(grids);
-    let spans = |n: usize| (n.saturating_sub(1) as f64 / cells) as usize;
-    let most: Vec<usize> = nodes.iter().map(|&n| (spans(n) + 3).clamp(FEWEST_CONTROL, n.max(FEWEST_CONTROL))).collect();
-    let kinds = match params.continuity {
-        Continuity::C0 | Continuity::G1 => vec![Knots::Simple; network.curves.len()],
-        Continuity::G1Double => resolution::knots(network),
-    };
-    let possible = |counts: Vec<usize>| resolution::possible(counts, &kinds, &nodes);
-    let mut counts = possible(resolution::counts(network, grids, &most, &params.resolution, size)?);
+    params.check()?;
+    let allowed = params.allowed(grids);
+    let mut plan = Plan::new(network, grids, &nodes, params, allowed, observer)?;
+    let mut knots = plan.knots();
     let mut smoothing = vec![params.smoothing; grids.len()];
-    let fit = |counts: &[usize], smoothing: &[f64]| {
-        fit_counts(network, grids, (&nodes, &kinds), counts, (params.smoothing, smoothing), observer)
+    let fit = |knots: &[Knots], smoothing: &[f64]| {
+        fit_knots(network, grids, &nodes, knots, (params.smoothing, smoothing), observer)
     };
-    let mut surfaces = fit(&counts, &smoothing)?;
-    if let &Resolution::Tolerance(fraction) = &params.resolution {
+    let mut surfaces = fit(&knots, &smoothing)?;
+    if matches!(params.resolution, Resolution::Tolerance(_)) {
         for _ in 0..COUNT_ROUNDS {
-            let over: Vec<bool> =
-                surfaces.par_iter().zip(grids).map(|(s, g)| deviation_of(s, g).rms > fraction * size).collect();
-            let mut raised = counts.clone();
-            for (patch, _) in network.patches.iter().zip(&over).filter(|(_, over)| **over) {
-                for c in patch.sides.map(|side| side.curve as usize) {
-                    raised[c] = resolution::finer(counts[c]);
-                }
-            }
-            let raised = possible(resolution::level(network, raised, Some(&most)));
-            if raised == counts {
+            let left = |(s, g): (&Surface, &Grid)| params.tolerance_of.of(&heights(s, g));
+            let over: Vec<bool> = surfaces.par_iter().zip(grids).map(|of| left(of) > allowed).collect();
+            let patches = network.patches.iter().zip(&over).filter(|(_, over)| **over);
+            if !plan.refine(patches.flat_map(|(patch, _)| patch.sides.map(|side| side.curve as usize))) {
                 break;
             }
-            counts = raised;
-            surfaces = fit(&counts, &smoothing)?;
+            let finer = plan.knots();
+            let control = |patch: &Patch| [0, 1].map(|k| finer[patch.sides[k].curve as usize].control());
+            let all: usize = network.patches.iter().map(|patch| control(patch).iter().product::<usize>()).sum();
+            if params.max_control.is_some_and(|most| all > most) {
+                break;
+            }
+            knots = finer;
+            surfaces = fit(&knots, &smoothing)?;
         }
     }
     let folded =
@@ -136,30 +94,30 @@ pub fn fit_network(
             break;
         }
         let trial: Vec<f64> = smoothing.iter().zip(&counted).map(|(&s, &n)| if n > 0 { weight } else { s }).collect();
-        let found = folded(&fit(&counts, &trial)?);
+        let found = folded(&fit(&knots, &trial)?);
         // A fold that smoothing does not at least halve is the grid's own, and the detail would be lost for nothing.
         for p in 0..grids.len() {
             if counted[p] > 0 && 2 * found[p] <= counted[p] {
                 smoothing[p] = weight;
             }
         }
-        surfaces = fit(&counts, &smoothing)?;
+        surfaces = fit(&knots, &smoothing)?;
         counted = folded(&surfaces);
     }
     Ok(surfaces)
 }
 
-/// Fits with known counts of nodes and control points along the curves, a smoothing for all curves and one for the inside
+/// Fits with known counts of nodes and knots along the curves, a smoothing for all curves and one for the inside
 /// of each patch: a folded patch does not bend the curves of its neighbours, which would fold in turn.
-fn fit_counts(
+fn fit_knots(
     network: &Network,
     grids: &[Grid],
-    (nodes, kinds): (&[usize], &[Knots]),
-    counts: &[usize],
+    nodes: &[usize],
+    knots: &[Knots],
     (curve_smoothing, smoothing): (f64, &[f64]),
     observer: &dyn Observer,
 ) -> Result<Vec<Surface>, FitError> {
-    let used = (0..nodes.len()).filter(|&c| nodes[c] > 0).map(|c| (nodes[c], counts[c], kinds[c]));
+    let used = (0..nodes.len()).filter(|&c| nodes[c] > 0).map(|c| (nodes[c], knots[c].clone()));
     let directions = Directions::new(used)?;
     let uses = network.uses();
     let curves: Vec<Result<Vec<DVec3>, FitError>> = curve_nodes(network, &uses, grids)
@@ -168,8 +126,8 @@ fn fit_counts(
         .map(|(c, nodes)| {
             Ok(match nodes.len() {
                 0 => Vec::new(),
-                n if curve_smoothing == 0.0 => fit_curve(&nodes, directions.get((n, counts[c], kinds[c]))),
-                n => fit_curve(&nodes, &directions.get((n, counts[c], kinds[c])).smoothed(curve_smoothing)?),
+                n if curve_smoothing == 0.0 => fit_curve(&nodes, directions.get(n, &knots[c])),
+                n => fit_curve(&nodes, &directions.get(n, &knots[c]).smoothed(curve_smoothing)?),
             })
         })
         .collect();
@@ -182,7 +140,7 @@ fn fit_counts(
         .zip(smoothing)
         .map(|((patch, grid), &smoothing)| {
             observer.check()?;
-            let [along_u, along_v] = patch_directions(patch, grid, &directions, counts, kinds);
+            let [along_u, along_v] = patch_directions(patch, grid, &directions, knots);
             let projection = project(&grid.points, along_u, along_v);
             let net = if smoothing > 0.0 {
                 fill(patch, &curves, &projection, &along_u.smoothed(smoothing)?, &along_v.smoothed(smoothing)?)
@@ -201,12 +159,12 @@ pub(crate) fn patch_directions<'a>(
     patch: &Patch,
     grid: &Grid,
     directions: &'a Directions,
-    counts: &[usize],
-    kinds: &[Knots],
+    knots: &[Knots],
 ) -> [&'a Direction; 2] {
     let along = |side: usize, nodes: usize| {
-        let c = patch.sides[side].curve as usize;
-        directions.get((nodes, counts[c], kinds[c]))
+        let side = patch.sides[side];
+        let knots = &knots[side.curve as usize];
+        if side.reversed { directions.get(nodes, &knots.reversed()) } else { directions.get(nodes, knots) }
     };
     [along(0, grid.cols), along(1, grid.rows)]
 }

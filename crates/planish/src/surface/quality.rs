@@ -3,9 +3,9 @@
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §6.2 eq. 6.1 (parametric distance) and
 //! §8.1.1 (normals along a seam; here their angle in degrees).
 
-use super::basis::{BasisRows, uniform_parameters};
+use super::basis::{BasisRows, span_samples, uniform_parameters};
 use super::seam::certificate::{Rim, angle_bound, gap_bound};
-use super::sides::place;
+use super::sides::{knots_along, place};
 use super::{EdgeInSeam, RowSampler, Surface};
 use crate::geom::polyline;
 use crate::grid::Grid;
@@ -48,6 +48,12 @@ pub fn deviation_of(surface: &Surface, grid: &Grid) -> Deviation {
     summary(distances(surface, grid))
 }
 
+/// Distances of the nodes of one grid from its surface along the normals of the grid: what a tolerance bounds. Sideways a
+/// surface may lie off its grid and still be on the mesh.
+pub fn normal_deviation_of(surface: &Surface, grid: &Grid) -> Deviation {
+    summary(heights(surface, grid))
+}
+
 fn summary(mut distances: Vec<f64>) -> Deviation {
     if distances.is_empty() {
         return Deviation::default();
@@ -78,6 +84,21 @@ pub(super) fn offsets(surface: &Surface, grid: &Grid) -> Vec<DVec3> {
         },
     );
     out
+}
+
+/// How far a surface is from each node of its grid along the normal.
+pub(super) fn heights(surface: &Surface, grid: &Grid) -> Vec<f64> {
+    let along = |(i, off): (usize, DVec3)| off.dot(normal(grid, i)).abs();
+    offsets(surface, grid).into_iter().enumerate().map(along).collect()
+}
+
+/// Normal of a grid at a node, by the differences of its neighbours; zero where these have no area.
+pub(super) fn normal(grid: &Grid, node: usize) -> DVec3 {
+    let (row, col) = (node / grid.cols, node % grid.cols);
+    let at = |row: usize, col: usize| grid.points[row * grid.cols + col];
+    let along = at(row, (col + 1).min(grid.cols - 1)) - at(row, col.saturating_sub(1));
+    let up = at((row + 1).min(grid.rows - 1), col) - at(row.saturating_sub(1), col);
+    along.cross(up).normalize_or_zero()
 }
 
 /// How two patches meet along one curve.
@@ -199,11 +220,12 @@ fn measure(
     uses: [(u32, u8); 2],
     edges: &[[f64; 2]],
 ) -> SeamQuality {
-    let (first, k) = (&surfaces[uses[0].0 as usize], uses[0].1);
-    let spans = if k % 2 == 0 { first.cols } else { first.rows } - 3;
-    let jets: Vec<[super::Jet; 2]> = uniform_parameters(2 * SEAM_SAMPLES.max(SPAN_SAMPLES * spans + 1) - 1)
-        .into_iter()
-        .map(|t| {
+    let breaks = knots_along(network, surfaces, uses[0]).breaks();
+    let per_span = SPAN_SAMPLES.max((SEAM_SAMPLES - 1).div_ceil(breaks.len() - 1));
+    let places = span_samples(&breaks, 2 * per_span);
+    let jets: Vec<[super::Jet; 2]> = places
+        .iter()
+        .map(|&t| {
             uses.map(|(p, k)| {
                 let side = network.patches[p as usize].sides[k as usize];
                 let (u, v) = place(k as usize, side.reversed, t);
@@ -232,13 +254,10 @@ fn measure(
         (has_normal(a) && has_normal(b)).then(|| na.cross(nb).length().atan2(na.dot(nb)).to_degrees())
     };
     let angle_max = (0..=last).filter_map(angle).fold(0.0, f64::max);
-    let first_span = 1.0 / spans as f64;
-    let [from, to] = odd_ends.map(|odd| if odd { first_span } else { 0.0 });
-    let ranges = without([from, 1.0 - to], edges);
-    let regular = |at: &usize| {
-        let t = *at as f64 / last as f64;
-        ranges.iter().any(|[from, to]| (*from..=*to).contains(&t))
-    };
+    let ends = [[0.0, breaks[1]], [1.0, breaks[breaks.len() - 2]]];
+    let [from, to] = [0, 1].map(|k| ends[k][usize::from(odd_ends[k])]);
+    let ranges = without([from, to], edges);
+    let regular = |at: &usize| ranges.iter().any(|[from, to]| (*from..=*to).contains(&places[*at]));
     let regular_angle_max = (0..=last).filter(regular).filter_map(angle).fold(0.0, f64::max);
     let rims = uses.map(|(p, k)| {
         let side = network.patches[p as usize].sides[k as usize];

@@ -6,7 +6,8 @@
 
 use super::fit::{Directions, project, surface_of};
 use super::fold::folds;
-use super::network_fit::{FitParams, SMOOTHING, fill, fit_curve, patch_directions};
+use super::network_fit::{SMOOTHING, fill, fit_curve, patch_directions};
+use super::params::FitParams;
 use super::sides::{along_curve, check, knots, side_len};
 use super::{FitError, Surface};
 use crate::grid::Grid;
@@ -22,7 +23,7 @@ use rayon::prelude::*;
 ///
 /// Returns the numbers of the patches, rising, each with its surface.
 /// # Errors
-/// Lists that do not fit the network or each other, knots that are not uniform, or the observer's wish.
+/// Lists that do not fit the network or each other, or the observer's wish.
 pub fn retouch(
     network: &Network,
     grids: &[Grid],
@@ -38,10 +39,10 @@ pub fn retouch(
     let is_new = |c: u32| curves.contains(&c);
     let which: Vec<usize> =
         (0..surfaces.len()).filter(|&p| network.patches[p].sides.iter().any(|s| is_new(s.curve))).collect();
-    let kinds = knots(network, surfaces, &which)?;
+    let knots = knots(network, surfaces, &which)?;
     let directions = Directions::new(which.iter().flat_map(|&p| &network.patches[p].sides).map(|s| {
         let c = s.curve as usize;
-        (nodes[c], counts[c], kinds[c])
+        (nodes[c], knots[c].clone())
     }))?;
     let mut boundary: Vec<Vec<DVec3>> = vec![Vec::new(); network.curves.len()];
     for &p in &which {
@@ -53,7 +54,7 @@ pub fn retouch(
             boundary[c] = if is_new(side.curve) {
                 let (points, rows, cols) = (&grids[p].points, grids[p].rows, grids[p].cols);
                 let points = along_curve(points, rows, cols, k, side.reversed, 0);
-                let direction = directions.get((nodes[c], counts[c], kinds[c]));
+                let direction = directions.get(nodes[c], &knots[c]);
                 match params.smoothing {
                     0.0 => fit_curve(&points, direction),
                     weight => fit_curve(&points, &direction.smoothed(weight)?),
@@ -69,7 +70,7 @@ pub fn retouch(
         .par_iter()
         .map(|&p| {
             let (patch, grid) = (&network.patches[p], &grids[p]);
-            let [along_u, along_v] = patch_directions(patch, grid, &directions, &counts, &kinds);
+            let [along_u, along_v] = patch_directions(patch, grid, &directions, &knots);
             let projection = project(&grid.points, along_u, along_v);
             let made = |weight: f64| -> Result<Surface, FitError> {
                 let (u, v) = (along_u.smoothed(weight)?, along_v.smoothed(weight)?);

@@ -3,7 +3,7 @@
 //! Layout of the control net as in [K98] fig. 8.2.
 
 use super::basis::Knots;
-use super::{FitError, Surface};
+use super::{FEWEST_CONTROL, FitError, Surface};
 use crate::geom::{Aabb, tolerance};
 use crate::grid::Grid;
 use crate::network::{Curve, Network};
@@ -81,19 +81,27 @@ pub(crate) fn check(
     Ok(counts)
 }
 
-/// Knots along every curve as the surfaces `which` have them; simple for curves beside none of these.
+/// Knots of a surface along a side, in the direction of the side's curve.
+pub(crate) fn knots_along(network: &Network, surfaces: &[Surface], (patch, side): (u32, u8)) -> Knots {
+    let (surface, k) = (&surfaces[patch as usize], side as usize);
+    let knots = Knots::of(if k.is_multiple_of(2) { &surface.knots_u } else { &surface.knots_v });
+    if (k >= 2) != network.patches[patch as usize].sides[k].reversed { knots.reversed() } else { knots }
+}
+
+/// Knots along every curve as the surfaces `which` have them, in the direction of the curve; those of a single span for curves
+/// beside none of these.
 pub(crate) fn knots(network: &Network, surfaces: &[Surface], which: &[usize]) -> Result<Vec<Knots>, FitError> {
-    let mut kinds = vec![None; network.curves.len()];
+    let mut found = vec![None; network.curves.len()];
     for &patch in which {
-        let along = [&surfaces[patch].knots_u, &surfaces[patch].knots_v].map(|knots| Knots::of(knots));
         for (k, side) in network.patches[patch].sides.iter().enumerate() {
-            let kind = along[k % 2].ok_or(FitError::Knots { patch })?;
-            if *kinds[side.curve as usize].get_or_insert(kind) != kind {
+            let knots = knots_along(network, surfaces, (patch as u32, k as u8));
+            let first = found[side.curve as usize].get_or_insert_with(|| knots.clone());
+            if *first != knots {
                 return Err(FitError::Knots { patch });
             }
         }
     }
-    Ok(kinds.into_iter().map(|kind| kind.unwrap_or(Knots::Simple)).collect())
+    Ok(found.into_iter().map(|knots| knots.unwrap_or_else(|| Knots::uniform(FEWEST_CONTROL))).collect())
 }
 
 /// Checks grids as [`check`] does, and that their points are finite and meet along the curves.

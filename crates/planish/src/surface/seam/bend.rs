@@ -27,7 +27,7 @@ pub(crate) struct Side {
     pub reversed: bool,
     pub rows: usize,
     pub cols: usize,
-    /// Three over the first knot span across: the derivative of a unit step between the outer two rows.
+    /// Three over the knot span across that begins at the curve: the derivative of a unit step between the outer two rows.
     pub across: f64,
 }
 

@@ -9,9 +9,9 @@ use super::miss::Misses;
 use crate::grid::Grid;
 use crate::network::{CurveKind, Network};
 use crate::surface::Surface;
-use crate::surface::basis::{Knots, uniform_parameters};
+use crate::surface::basis::uniform_parameters;
 use crate::surface::fold::MeanNormals;
-use crate::surface::sides::{along_curve, place};
+use crate::surface::sides::{along_curve, knots_along, place};
 use rayon::prelude::*;
 
 /// Angle of two grids above which they meet at an edge, degrees: that of the sharp edges of an automatic network
@@ -25,31 +25,40 @@ const KEPT: f64 = 0.5;
 
 /// Which spans of smooth seams stay sharp.
 pub(crate) struct Meets {
-    /// For each curve and knot span; none for curves that are no such seams.
-    sharp: Vec<Vec<bool>>,
+    /// For each curve the end and the state of every knot span; none for curves that are no such seams.
+    sharp: Vec<Vec<(f64, bool)>>,
 }
 
 /// A seam and its sides: patch, side and direction.
-struct Seam {
+struct Seam<'a> {
     curve: usize,
     sides: [(usize, usize, bool); 2],
-    spans: usize,
+    /// Where knot spans begin and end.
+    breaks: &'a [f64],
 }
 
-impl Seam {
-    /// All of a kind with these knot spans along the curves.
-    fn all(network: &Network, kind: CurveKind, spans: &[usize]) -> Vec<Seam> {
+impl<'a> Seam<'a> {
+    /// All of a kind with these breaks along the curves.
+    fn all(network: &Network, kind: CurveKind, breaks: &'a [Vec<f64>]) -> Vec<Seam<'a>> {
         let one = |(curve, uses): (usize, &Vec<(u32, u8)>)| {
             let &[a, b] = &uses[..] else { return None };
             let side =
                 |(p, k): (u32, u8)| (p as usize, k as usize, network.patches[p as usize].sides[k as usize].reversed);
-            (network.curves[curve].kind == kind).then(|| Seam { curve, sides: [side(a), side(b)], spans: spans[curve] })
+            (network.curves[curve].kind == kind).then(|| Seam {
+                curve,
+                sides: [side(a), side(b)],
+                breaks: &breaks[curve],
+            })
         };
         network.uses().iter().enumerate().filter_map(one).collect()
     }
 
+    fn spans(&self) -> std::ops::Range<usize> {
+        0..self.breaks.len().saturating_sub(1)
+    }
+
     fn middle(&self, span: usize) -> f64 {
-        (span as f64 + 0.5) / self.spans as f64
+        (self.breaks[span] + self.breaks[span + 1]) / 2.0
     }
 
     /// The angle between the grids in the middle of a span, radians.
@@ -75,19 +84,25 @@ impl Seam {
 }
 
 impl Meets {
-    /// * `spans` - knot spans along each curve
+    /// * `breaks` - where knot spans begin and end along each curve
     /// * `misses` - what the fit misses
-    pub fn new(network: &Network, grids: &[Grid], means: &[MeanNormals], spans: &[usize], misses: &Misses) -> Meets {
-        let of = |seam: &Seam| -> Vec<bool> {
+    pub fn new(
+        network: &Network,
+        grids: &[Grid],
+        means: &[MeanNormals],
+        breaks: &[Vec<f64>],
+        misses: &Misses,
+    ) -> Meets {
+        let of = |seam: &Seam| -> Vec<(f64, bool)> {
             let miss = seam.sides.iter().map(|&(p, ..)| misses.afford(p) / 2.0).sum::<f64>().sqrt();
             let is_sharp = |span: usize| {
                 let angle = seam.angle(means, span);
                 angle > EDGE_ANGLE_DEG.to_radians() && angle * seam.rounding(grids, means, span) > FAR * miss
             };
-            (0..seam.spans).map(is_sharp).collect()
+            seam.spans().map(|span| (seam.breaks[span + 1], is_sharp(span))).collect()
         };
-        let seams = Seam::all(network, CurveKind::Smooth, spans);
-        let found: Vec<Vec<bool>> = seams.par_iter().map(of).collect();
+        let seams = Seam::all(network, CurveKind::Smooth, breaks);
+        let found: Vec<Vec<(f64, bool)>> = seams.par_iter().map(of).collect();
         let mut sharp = vec![Vec::new(); network.curves.len()];
         seams.iter().zip(found).for_each(|(seam, found)| sharp[seam.curve] = found);
         Meets { sharp }
@@ -96,26 +111,34 @@ impl Meets {
     /// True if a smooth seam is to be smooth at the place `t` (0 to 1) along it.
     pub fn is_smooth(&self, curve: usize, t: f64) -> bool {
         let sharp = &self.sharp[curve];
-        let span = ((t * sharp.len() as f64) as usize).min(sharp.len().saturating_sub(1));
-        !sharp.get(span).copied().unwrap_or(false)
+        let at = sharp.partition_point(|(end, _)| *end <= t).min(sharp.len().saturating_sub(1));
+        !sharp.get(at).is_some_and(|(_, sharp)| *sharp)
     }
 
     /// True if a smooth seam is to be smooth somewhere within `[from, to]`.
     pub fn is_smooth_within(&self, curve: usize, [from, to]: [f64; 2]) -> bool {
         let sharp = &self.sharp[curve];
         // By the middles of spans: those that only touch the range do not count.
-        let middle = |span: usize| (span as f64 + 0.5) / sharp.len() as f64;
-        let inside = |span: usize| middle(span) > from && middle(span) < to;
-        sharp.is_empty() || sharp.iter().enumerate().any(|(span, sharp)| inside(span) && !sharp)
+        let inside = |k: usize| {
+            let begin = if k == 0 { 0.0 } else { sharp[k - 1].0 };
+            let middle = (begin + sharp[k].0) / 2.0;
+            middle > from && middle < to
+        };
+        sharp.is_empty() || (0..sharp.len()).any(|k| inside(k) && !sharp[k].1)
     }
 }
 
 /// For each patch beside curves that a person calls smooth, how far rounding these takes it from its grid.
-pub(crate) fn roundings(network: &Network, grids: &[Grid], means: &[MeanNormals], spans: &[usize]) -> Vec<Option<f64>> {
+pub(crate) fn roundings(
+    network: &Network,
+    grids: &[Grid],
+    means: &[MeanNormals],
+    breaks: &[Vec<f64>],
+) -> Vec<Option<f64>> {
     let mut found = vec![None; grids.len()];
-    for seam in Seam::all(network, CurveKind::Rounded, spans) {
+    for seam in Seam::all(network, CurveKind::Rounded, breaks) {
         let needed = |span: usize| seam.angle(means, span) * seam.rounding(grids, means, span);
-        let most = (0..seam.spans).map(needed).fold(0.0, f64::max);
+        let most = seam.spans().map(needed).fold(0.0, f64::max);
         for (p, ..) in seam.sides {
             found[p] = Some(found[p].map_or(most, |other: f64| other.max(most)));
         }
@@ -142,22 +165,17 @@ pub fn edges_in_seams(network: &Network, grids: &[Grid], surfaces: &[Surface]) -
     }
     let means: Vec<MeanNormals> =
         grids.par_iter().zip(surfaces).map(|(g, s)| MeanNormals::new(g, [s.cols, s.rows])).collect();
-    let spans = |uses: &Vec<(u32, u8)>| {
-        uses.first().map_or(1, |&(p, k)| {
-            let s = &surfaces[p as usize];
-            let (knots, count) = if k % 2 == 0 { (&s.knots_u, s.cols) } else { (&s.knots_v, s.rows) };
-            Knots::of(knots).map_or(count.max(4) - 3, |kind| kind.spans(count))
-        })
-    };
-    let spans: Vec<usize> = network.uses().iter().map(spans).collect();
+    let breaks =
+        |uses: &Vec<(u32, u8)>| uses.first().map_or_else(Vec::new, |&at| knots_along(network, surfaces, at).breaks());
+    let breaks: Vec<Vec<f64>> = network.uses().iter().map(breaks).collect();
     let of = |seam: &Seam| {
         let mut found: Vec<EdgeInSeam> = Vec::new();
-        for span in 0..seam.spans {
+        for span in seam.spans() {
             let angle = seam.angle(&means, span);
             if angle <= EDGE_ANGLE_DEG.to_radians() || kept(seam, surfaces, span) <= KEPT * angle {
                 continue;
             }
-            let [from, to] = [span, span + 1].map(|k| k as f64 / seam.spans as f64);
+            let [from, to] = [seam.breaks[span], seam.breaks[span + 1]];
             let angle_deg = angle.to_degrees();
             match found.last_mut().filter(|last| last.range[1] == from) {
                 Some(last) => (last.range[1], last.angle_deg) = (to, last.angle_deg.max(angle_deg)),
@@ -166,7 +184,7 @@ pub fn edges_in_seams(network: &Network, grids: &[Grid], surfaces: &[Surface]) -
         }
         found
     };
-    Seam::all(network, CurveKind::Smooth, &spans).par_iter().flat_map_iter(of).collect()
+    Seam::all(network, CurveKind::Smooth, &breaks).par_iter().flat_map_iter(of).collect()
 }
 
 /// Places of a span at which its surfaces are asked for their angle: both ends and the middle.
@@ -175,7 +193,7 @@ const ASKED: usize = 3;
 /// The largest angle between the surfaces along a span, radians.
 fn kept(seam: &Seam, surfaces: &[Surface], span: usize) -> f64 {
     let angle = |share: f64| {
-        let t = (span as f64 + share) / seam.spans as f64;
+        let t = seam.breaks[span] * (1.0 - share) + seam.breaks[span + 1] * share;
         let [a, b] = seam.sides.map(|(p, k, reversed)| {
             let (u, v) = place(k, reversed, t);
             surfaces[p].jet(u, v).area_vector().normalize_or_zero()

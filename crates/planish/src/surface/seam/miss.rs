@@ -2,9 +2,8 @@
 
 use crate::grid::Grid;
 use crate::surface::Surface;
-use crate::surface::quality::offsets;
+use crate::surface::quality::heights;
 use crate::surface::sides::diagonal;
-use glam::DVec3;
 use rayon::prelude::*;
 
 /// The loss is measured against a fit that misses by this share of the diagonal at least: rounding.
@@ -44,22 +43,7 @@ impl Misses {
     }
 }
 
-/// How far a surface is from each node of its grid along the normal.
-fn heights(surface: &Surface, grid: &Grid) -> Vec<f64> {
-    let along = |(i, off): (usize, DVec3)| off.dot(normal(grid, i)).abs();
-    offsets(surface, grid).into_iter().enumerate().map(along).collect()
-}
-
 /// The largest distance of a surface from its grid along the normal.
 pub(crate) fn farthest(surface: &Surface, grid: &Grid) -> f64 {
     heights(surface, grid).into_iter().fold(0.0, f64::max)
-}
-
-/// Normal of a grid at a node, by the differences of its neighbours; zero where these have no area.
-fn normal(grid: &Grid, node: usize) -> DVec3 {
-    let (row, col) = (node / grid.cols, node % grid.cols);
-    let at = |row: usize, col: usize| grid.points[row * grid.cols + col];
-    let along = at(row, (col + 1).min(grid.cols - 1)) - at(row, col.saturating_sub(1));
-    let up = at((row + 1).min(grid.rows - 1), col) - at(row.saturating_sub(1), col);
-    along.cross(up).normalize_or_zero()
 }

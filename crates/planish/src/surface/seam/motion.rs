@@ -33,8 +33,7 @@ pub(crate) fn motions(work: &Work, filled: &[Filled], curves: &[Vec<DVec3>]) -> 
         (0..work.planes.len()).map(|k| work.planes.get(k).tilts.iter().map(|_| next()).collect()).collect();
     let mut motions: Vec<Vec<Motion>> = filled.iter().map(|f| vec![FIXED; f.surface.control.len()]).collect();
     for c in (0..work.uses.len()).filter(|&c| work.is_smooth_seam(c) && !work.is_held(c)) {
-        let n = work.counts[c];
-        let knots = work.kinds[c].list(n);
+        let (n, knots) = (work.knots[c].control(), work.knots[c].list());
         for i in 1..n - 1 {
             if !work.meets.is_smooth_within(c, [knots[i], knots[i + 4]]) {
                 continue;
@@ -56,7 +55,7 @@ pub(crate) fn motions(work: &Work, filled: &[Filled], curves: &[Vec<DVec3>]) -> 
                 None => {
                     let both = work.uses[c].iter().map(|&at| {
                         let side = work.side(at);
-                        let (u, v) = place(side.side, side.reversed, greville(&knots, i));
+                        let (u, v) = place(side.side, side.reversed, greville(knots, i));
                         normal(side.patch, u, v)
                     });
                     [(next(), both.sum::<DVec3>().normalize_or(DVec3::Z)), (NONE, DVec3::ZERO)]

@@ -105,15 +105,22 @@ fn solved(
     let Some(work) = Work::new(network, grids, surfaces, stay, held)? else { return Ok(surfaces.to_vec()) };
     observer.check()?;
     let before: Vec<usize> = surfaces.par_iter().zip(grids).map(|(s, g)| folds(s, g)).collect();
+    // No place may be farther off than the farthest of the fit and, on top, the same share of it as moves have of all misses.
+    let share = ((1.0 + params.fit_loss).powi(2) - 1.0).sqrt();
+    let allowed = (1.0 + share) * work.misses.most;
     let mut curves = work.curves();
     let mut filled = work.filled(&curves, observer)?;
     for _ in 0..REVERTS {
-        let worse = |p: &usize| folds(&filled[*p].surface, &grids[*p]) > before[*p];
+        let worse = |p: &usize| {
+            let made = &filled[*p].surface;
+            let is_far = work.rounded[*p].is_none() && farthest(made, &grids[*p]) > allowed;
+            is_far || folds(made, &grids[*p]) > before[*p]
+        };
         let worse: Vec<usize> = work.free().filter(worse).collect();
         if worse.is_empty() {
             break;
         }
-        // A patch that its planes turn over keeps its curves.
+        // A patch that the planes at its corners turn over, or take far off, keeps its curves.
         for c in worse.iter().flat_map(|&p| network.patches[p].sides).map(|side| side.curve as usize) {
             // Those of patches that stay are so already.
             curves[c].clone_from(&work.fitted[c]);
@@ -121,19 +128,14 @@ fn solved(
         filled = work.filled(&curves, observer)?;
     }
     observer.progress(0.2);
-    // No place may be farther off than the farthest of the fit and, on top, the same share of it as moves have of all misses; but
-    // for what the planes at corners cost.
-    let share = ((1.0 + params.fit_loss).powi(2) - 1.0).sqrt();
-    let farthest_allowed: Vec<f64> = (0..filled.len())
-        .into_par_iter()
-        .map(|p| farthest(&filled[p].surface, &grids[p]).max((1.0 + share) * work.misses.most))
-        .collect();
+    let allowed: Vec<f64> =
+        (0..filled.len()).into_par_iter().map(|p| farthest(&filled[p].surface, &grids[p]).max(allowed)).collect();
     let mut system = System::new(&work, &filled, &curves, params);
     for easing in 0..=EASINGS {
         system.settle(observer)?;
         let made: Vec<Surface> = (0..filled.len()).into_par_iter().map(|p| system.surface(p)).collect();
         let is_worse = |&p: &usize| {
-            let is_far = work.rounded[p].is_none() && farthest(&made[p], &grids[p]) > farthest_allowed[p];
+            let is_far = work.rounded[p].is_none() && farthest(&made[p], &grids[p]) > allowed[p];
             is_far || folds(&made[p], &grids[p]) > before[p]
         };
         let worse: Vec<usize> = work.free().filter(is_worse).collect();

@@ -3,7 +3,7 @@
 use super::bend::{Side, Stand, fold_angle};
 use super::params::StitchParams;
 use super::work::Work;
-use crate::surface::basis::{BasisRows, uniform_parameters};
+use crate::surface::basis::{BasisRows, span_samples};
 use crate::surface::fold::MeanNormals;
 use crate::surface::sides::{is_smooth, place};
 use glam::DVec3;
@@ -90,9 +90,8 @@ pub(crate) fn wishes(work: &Work, curves: &[Vec<DVec3>], params: &StitchParams) 
         if uses.iter().all(|(p, _)| work.held[*p as usize]) {
             continue;
         }
-        let n = work.counts[curve];
-        let knots = work.kinds[curve].list(n);
-        let samples = uniform_parameters(SPAN_SAMPLES * work.kinds[curve].spans(n) + 1);
+        let knots = work.knots[curve].list().to_vec();
+        let samples = span_samples(&work.knots[curve].breaks(), SPAN_SAMPLES);
         let sides: Vec<Side> = uses.iter().map(|&at| work.side(at)).collect();
         let some =
             |which: &dyn Fn(f64) -> bool| -> Vec<f64> { samples.iter().copied().filter(|&t| which(t)).collect() };

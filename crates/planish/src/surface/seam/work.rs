@@ -9,7 +9,7 @@ use crate::grid::Grid;
 use crate::network::{Network, Patch};
 use crate::observe::{Cancelled, Observer};
 use crate::surface::basis::Knots;
-use crate::surface::fit::{Direction, Directions, FEWEST_CONTROL, Layout, project_net, surface_of};
+use crate::surface::fit::{Direction, Directions, Layout, project_net, surface_of};
 use crate::surface::fold::MeanNormals;
 use crate::surface::network_fit::{fill, patch_directions};
 use crate::surface::sides::{along_curve, check, check_grids, is_smooth, knots, node, side_len};
@@ -28,10 +28,9 @@ pub(crate) struct Work<'a> {
     pub surfaces: &'a [Surface],
     /// For each curve the patches on it and their sides.
     pub uses: Vec<Vec<(u32, u8)>>,
-    /// Points of the grids and control points along every curve, and its knots.
+    /// Points of the grids along every curve, and its knots.
     pub nodes: Vec<usize>,
-    pub counts: Vec<usize>,
-    pub kinds: Vec<Knots>,
+    pub knots: Vec<Knots>,
     pub directions: Directions,
     pub means: Vec<MeanNormals>,
     /// Curves as fitted, and the planes at their ends.
@@ -65,15 +64,15 @@ impl<'a> Work<'a> {
     ) -> Result<Option<Work<'a>>, FitError> {
         let nodes = check_grids(network, grids)?;
         let shapes: Vec<_> = surfaces.iter().map(|s| (s.rows, s.cols, s.control.len())).collect();
-        let counts = check(network, "surfaces", &shapes)?;
+        check(network, "surfaces", &shapes)?;
         surfaces.iter().try_for_each(Surface::check)?;
         let all: Vec<usize> = (0..surfaces.len()).collect();
-        let kinds = knots(network, surfaces, &all)?;
+        let knots = knots(network, surfaces, &all)?;
         let uses = network.uses();
         if !uses.iter().any(|uses| uses.len() == 2) {
             return Ok(None);
         }
-        let layouts = (0..nodes.len()).filter(|&c| nodes[c] > 0).map(|c| (nodes[c], counts[c], kinds[c]));
+        let layouts = (0..nodes.len()).filter(|&c| nodes[c] > 0).map(|c| (nodes[c], knots[c].clone()));
         let curve = |uses: &Vec<(u32, u8)>| {
             let held = uses.iter().find(|(p, _)| held[*p as usize]);
             held.or(uses.first()).map_or_else(Vec::new, |&(p, k)| {
@@ -86,10 +85,10 @@ impl<'a> Work<'a> {
         let means: Vec<MeanNormals> =
             grids.par_iter().zip(surfaces).map(|(g, s)| MeanNormals::new(g, [s.cols, s.rows])).collect();
         let misses = Misses::new(surfaces, grids);
-        let spans: Vec<usize> = counts.iter().zip(&kinds).map(|(&n, kind)| kind.spans(n.max(FEWEST_CONTROL))).collect();
-        let meets = Meets::new(network, grids, &means, &spans, &misses);
+        let breaks: Vec<Vec<f64>> = knots.iter().map(Knots::breaks).collect();
+        let meets = Meets::new(network, grids, &means, &breaks, &misses);
         let smooth = |c: usize, end: usize| is_smooth(&network.curves[c]) && meets.is_smooth(c, end as f64);
-        let rounded = roundings(network, grids, &means, &spans);
+        let rounded = roundings(network, grids, &means, &breaks);
         let planes = planes(network, [surfaces, before], &held, &means, &fitted, &smooth);
         let directions = Directions::new(layouts)?;
         Ok(Some(Work {
@@ -98,8 +97,7 @@ impl<'a> Work<'a> {
             surfaces,
             uses,
             nodes,
-            counts,
-            kinds,
+            knots,
             directions,
             means,
             fitted,
@@ -142,7 +140,7 @@ impl<'a> Work<'a> {
                 return self.fitted[c].clone();
             }
             let ends: [Vec<Plane>; 2] = [0, 1].map(|e| self.planes.at(c, e).cloned().collect());
-            let direction = self.directions.get((self.nodes[c], self.counts[c], self.kinds[c]));
+            let direction = self.directions.get(self.nodes[c], &self.knots[c]);
             constrain(c, &self.fitted[c], &ends, direction)
         };
         (0..self.uses.len()).into_par_iter().map(one).collect()
@@ -168,7 +166,7 @@ impl<'a> Work<'a> {
     /// The directions of a patch.
     pub fn along(&self, patch: usize) -> [&Direction; 2] {
         let (shape, grid) = (&self.network.patches[patch], &self.grids[patch]);
-        patch_directions(shape, grid, &self.directions, &self.counts, &self.kinds)
+        patch_directions(shape, grid, &self.directions, &self.knots)
     }
 
     /// A side of a patch as its curve sees it.
@@ -176,8 +174,9 @@ impl<'a> Work<'a> {
         let (patch, side) = (patch as usize, k as usize);
         let s = &self.surfaces[patch];
         let crossing = if side.is_multiple_of(2) { &s.knots_v } else { &s.knots_u };
+        let span = if side == 0 || side == 3 { crossing[4] } else { 1.0 - crossing[crossing.len() - 5] };
         let reversed = self.network.patches[patch].sides[side].reversed;
-        Side { patch, side, reversed, rows: s.rows, cols: s.cols, across: 3.0 / crossing[4] }
+        Side { patch, side, reversed, rows: s.rows, cols: s.cols, across: 3.0 / span }
     }
 }
 
@@ -204,5 +203,5 @@ pub(crate) fn follow(network: &Network, patch: usize, surface: &Surface, curves:
 }
 
 pub(crate) fn shape(work: &Work, p: usize) -> [Layout; 2] {
-    work.along(p).map(|d| (d.basis.len(), d.control(), d.kind))
+    work.along(p).map(|d| (d.basis.len(), d.knots.clone()))
 }
