@@ -1,5 +1,6 @@
 //! Coordinates of maps: far from the origin against the size of what has them, and what one of their units is.
 
+use crate::step;
 use glam::DVec3;
 use planish::Units;
 use planish::geom::Aabb;
@@ -55,7 +56,7 @@ pub fn single_step(points: &[DVec3]) -> Option<f64> {
 /// What a file tells of its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileUnits {
-    /// Its format has one unit: glTF and E57 are in metres.
+    /// Its format has one unit (glTF and E57 are in metres), or the file tells its own (STEP).
     Standard(Units),
     /// Its format does not say, but files of it nearly always have this one: LAS and LAZ.
     Usual(Units),
@@ -68,6 +69,11 @@ pub fn file_units(path: &Path) -> FileUnits {
     match path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase().as_str() {
         "glb" | "gltf" | "e57" => FileUnits::Standard(Units::M),
         "las" | "laz" => FileUnits::Usual(Units::M),
+        // It says so itself.
+        "step" | "stp" => crate::read_bytes(path)
+            .ok()
+            .and_then(|bytes| step::units(&bytes).ok())
+            .map_or(FileUnits::Unknown, FileUnits::Standard),
         _ => FileUnits::Unknown,
     }
 }

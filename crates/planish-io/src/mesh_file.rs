@@ -1,6 +1,6 @@
 //! Meshes from and to files: the format by the extension, checked against the content.
 
-use crate::{MappedMesh, Place, ReadError, WriteError, atomic, gltf, obj, ply, stl};
+use crate::{MappedMesh, Place, ReadError, WriteError, atomic, gltf, obj, ply, step, stl};
 use planish::Units;
 use planish::mesh::{FeatureTags, TriMesh};
 use std::fs::File;
@@ -20,12 +20,14 @@ pub enum MeshFormat {
     Gltf,
     /// glTF as one binary file, `.glb`.
     Glb,
+    /// Faces of CAD, `.step` or `.stp`, as triangles; read only.
+    Step,
 }
 
 impl MeshFormat {
     /// All formats that are read.
-    pub const ALL: [MeshFormat; 5] =
-        [MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Stl, MeshFormat::Gltf, MeshFormat::Glb];
+    pub const ALL: [MeshFormat; 6] =
+        [MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Stl, MeshFormat::Gltf, MeshFormat::Glb, MeshFormat::Step];
 
     /// Its extension, without the dot.
     pub fn extension(self) -> &'static str {
@@ -35,6 +37,7 @@ impl MeshFormat {
             MeshFormat::Stl => "stl",
             MeshFormat::Gltf => "gltf",
             MeshFormat::Glb => "glb",
+            MeshFormat::Step => "step",
         }
     }
 
@@ -45,12 +48,14 @@ impl MeshFormat {
             MeshFormat::Stl => "STL",
             MeshFormat::Gltf => "glTF",
             MeshFormat::Glb => "GLB",
+            MeshFormat::Step => "STEP",
         }
     }
 
     /// The format that the extension of `path` names, in capitals or not.
     pub fn of(path: &Path) -> Option<MeshFormat> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        let extension = if extension == "stp" { "step" } else { &extension };
         MeshFormat::ALL.into_iter().find(|f| f.extension() == extension)
     }
 
@@ -64,6 +69,8 @@ impl MeshFormat {
             Some(MeshFormat::Ply)
         } else if bytes.starts_with(b"glTF") {
             Some(MeshFormat::Glb)
+        } else if start.starts_with(b"ISO-10303-21;") {
+            Some(MeshFormat::Step)
         } else if start.starts_with(b"{") {
             Some(MeshFormat::Gltf)
         } else if start.starts_with(b"solid") && start.windows(5).take(1024).any(|w| w == b"facet") {
@@ -108,12 +115,12 @@ impl WriteOptions {
     }
 }
 
-/// Reads a mesh: PLY, OBJ, STL, glTF or GLB.
+/// Reads a mesh: PLY, OBJ, STL, glTF, GLB, or the faces of a STEP file as triangles.
 ///
 /// The extension names the format and the content must agree. Polygons are cut into triangles; triangles that
 /// name a vertex twice are left out; unused vertices stay. Attributes per vertex come along as
 /// [`planish::mesh::Attribute`]s. Coordinates are as in the file, without regard to its unit or axes (glTF: as
-/// its transforms give them).
+/// its transforms give them). Triangles of STEP are within 2e-5 of the diagonal of their surfaces.
 /// # Errors
 /// Everything that [`ReadError`] lists. No file makes it panic or take much more memory than its own size.
 pub fn read_mesh(path: impl AsRef<Path>) -> Result<TriMesh, ReadError> {
@@ -147,6 +154,7 @@ fn read_with_edges(path: &Path) -> Result<(TriMesh, Vec<[u32; 2]>), ReadError> {
         MeshFormat::Obj => obj::read(&bytes),
         MeshFormat::Stl => stl::read(&bytes),
         MeshFormat::Gltf | MeshFormat::Glb => gltf::read(&bytes, path.parent().unwrap_or(Path::new(""))),
+        MeshFormat::Step => step::read(&bytes),
     };
     Ok((mesh?, Vec::new()))
 }
@@ -263,7 +271,7 @@ pub(crate) fn bytes_of(path: &Path) -> std::io::Result<Vec<u8>> {
 
 /// Refuses content that carries another format's mark, or lacks the mark of its own.
 fn check(expected: MeshFormat, found: Option<MeshFormat>) -> Result<(), ReadError> {
-    use MeshFormat::{Glb, Gltf, Obj, Ply, Stl};
+    use MeshFormat::{Glb, Gltf, Obj, Ply, Step, Stl};
     match (expected, found) {
         // GLB under the name .gltf and the reverse are read alike.
         (Gltf | Glb, Some(Gltf | Glb)) => Ok(()),
@@ -272,12 +280,12 @@ fn check(expected: MeshFormat, found: Option<MeshFormat>) -> Result<(), ReadErro
             found: found.name(),
             hint: format!("rename it to .{}", found.extension()),
         }),
-        (Ply | Gltf | Glb, None) => Err(ReadError::WrongFormat {
+        (Ply | Gltf | Glb | Step, None) => Err(ReadError::WrongFormat {
             expected: expected.name(),
             found: "something else",
             hint: format!("name a mesh file: {}", known(&MeshFormat::ALL)),
         }),
-        (Ply | Obj | Stl | Gltf | Glb, _) => Ok(()),
+        (Ply | Obj | Stl | Gltf | Glb | Step, _) => Ok(()),
     }
 }
 

@@ -188,6 +188,13 @@ fn damaged_meshes_are_read_or_refused() {
     // The text of a GLB is a glTF without its buffer.
     let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
     fuzz("gltf", &[glb[20..20 + length].to_vec()], read);
+    let (network, surfaces) = common::ball(5, DVec3::ZERO);
+    let input =
+        planish_io::StepInput { network: &network, surfaces: &surfaces, units: Units::Mm, name: "a", time: None };
+    let splines = written("a.step", |p| {
+        planish_io::write_step(p, &input).unwrap();
+    });
+    fuzz("step", &[splines, common::step_text::can(true).text().into()], read);
 }
 
 #[test]

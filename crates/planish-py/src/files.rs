@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Reads a file by its extension, as the commands do:
 ///
 /// * a scan (.e57 .las .laz .pcd .xyz .txt .csv .asc .pts .npz .conf, .ply without faces, .npy of rows): Cloud
-/// * a mesh (.ply .obj .stl .glb .gltf): Mesh
+/// * a mesh (.ply .obj .stl .glb .gltf, .step .stp as triangles): Mesh
 /// * a volume (.nrrd, .npy with three axes): Volume
 /// * a script of solids or a milling job (.toml): Field
 /// * a project (.planish): Model

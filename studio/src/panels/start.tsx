@@ -5,7 +5,7 @@ import * as store from '../model/store';
 import { SAMPLES, TEXT } from '../model/texts';
 
 const words = TEXT.start;
-const FILES = '.planish,.ply,.obj,.stl,.glb,.gltf,.e57,.las,.laz,.pcd,.xyz,.txt,.csv,.asc,.pts,.npy,.npz';
+const FILES = '.planish,.ply,.obj,.stl,.glb,.gltf,.step,.stp,.e57,.las,.laz,.pcd,.xyz,.txt,.csv,.asc,.pts,.npy,.npz';
 
 export function Start({ app }: { app: App }) {
   const input = useRef<HTMLInputElement>(null);

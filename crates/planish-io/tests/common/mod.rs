@@ -1,6 +1,8 @@
 //! Meshes, networks and folders that the tests of this crate share.
 #![allow(dead_code, missing_docs)]
 
+pub mod step_text;
+
 use planish::DVec3;
 use planish::mesh::{Attribute, TriMesh};
 use std::path::PathBuf;
