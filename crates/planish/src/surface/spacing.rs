@@ -18,6 +18,8 @@ const ORDER: f64 = 4.0;
 /// How far the length of a span may be corrected by what it leaves: twice as long or half. Beyond that the fourth power is
 /// no guide.
 const MOST_STRETCH: f64 = 2.0;
+/// Spans of a tolerance at least: the seams on both sides move two rows of control points each, and one is left between them.
+const FEWEST_SPANS: usize = 2;
 /// How much longer a span may be than another, of the way between them: neighbours of which one is more than twice as long as
 /// the other swing beside a bend.
 const GROWTH: f64 = 1.0;
@@ -96,7 +98,8 @@ impl Chord {
         };
         let mut spaced = Spaced { dense, spans: 1, most: self.most(), double: self.double, excess: 0.0, asked: None };
         // Doubled until one does, then halved between.
-        let (mut low, mut high) = (0, 1);
+        let fewest = FEWEST_SPANS.min(spaced.most);
+        let (mut low, mut high) = (fewest - 1, fewest);
         loop {
             spaced.spans = high;
             let excess = fits.excess(&spaced)?;
@@ -113,12 +116,12 @@ impl Chord {
             return Ok(best);
         }
         // Spans that were halved beside a bend may be longer once those at the bend are short.
-        while best.spans > 1 {
+        while best.spans > fewest {
             let spaced = Spaced { dense: fits.dense(&best.breaks())?, spans: best.spans - 1, ..best.clone() };
             if fits.excess(&spaced)? > 1.0 {
                 break;
             }
-            best = fits.least(spaced, 0, best.spans - 1)?;
+            best = fits.least(spaced, fewest - 1, best.spans - 1)?;
         }
         Ok(best)
     }

@@ -110,20 +110,26 @@ fn solved(
     let allowed = (1.0 + share) * work.misses.most;
     let mut curves = work.curves();
     let mut filled = work.filled(&curves, observer)?;
+    // What a person wants rounded goes as far off as that takes.
+    let is_rounded = |c: usize| work.uses[c].iter().any(|&(p, _)| work.rounded[p as usize].is_some());
     for _ in 0..REVERTS {
-        let worse = |p: &usize| {
-            let made = &filled[*p].surface;
-            let is_far = work.rounded[*p].is_none() && farthest(made, &grids[*p]) > allowed;
-            is_far || folds(made, &grids[*p]) > before[*p]
-        };
-        let worse: Vec<usize> = work.free().filter(worse).collect();
-        if worse.is_empty() {
-            break;
-        }
+        let is_folded = |p: usize| folds(&filled[p].surface, &grids[p]) > before[p];
+        let is_far = |p: usize| farthest(&filled[p].surface, &grids[p]) > allowed;
+        let worse: Vec<(usize, bool)> =
+            work.free().map(|p| (p, is_folded(p))).filter(|&(p, folded)| folded || is_far(p)).collect();
+        let mut is_done = true;
         // A patch that the planes at its corners turn over, or take far off, keeps its curves.
-        for c in worse.iter().flat_map(|&p| network.patches[p].sides).map(|side| side.curve as usize) {
-            // Those of patches that stay are so already.
-            curves[c].clone_from(&work.fitted[c]);
+        for (p, folded) in worse {
+            for c in network.patches[p].sides.map(|side| side.curve as usize) {
+                if (folded || !is_rounded(c)) && curves[c] != work.fitted[c] {
+                    // Those of patches that stay are so already.
+                    curves[c].clone_from(&work.fitted[c]);
+                    is_done = false;
+                }
+            }
+        }
+        if is_done {
+            break;
         }
         filled = work.filled(&curves, observer)?;
     }
