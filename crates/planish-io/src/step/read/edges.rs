@@ -1,7 +1,7 @@
 //! Edges of a STEP file as polylines, the same for both faces on them.
 
 use super::entities::Entities;
-use super::exchange::{Value, fault};
+use super::exchange::fault;
 use super::shape::Curve;
 use crate::{Place, ReadError};
 use glam::DVec3;
@@ -116,10 +116,7 @@ impl Points {
         let record = entities.file.record(id)?;
         let reference = |k: usize| record.reference(record.of("EDGE_CURVE", k)?);
         let ends = [self.vertex(entities, reference(1)?)?, self.vertex(entities, reference(2)?)?];
-        let is_forward = match record.of("EDGE_CURVE", 4)? {
-            Value::Word("F") => false,
-            _ => true,
-        };
+        let is_forward = record.flag(record.of("EDGE_CURVE", 4)?)?;
         let curve = entities.curve(reference(3)?)?;
         let places = ends.map(|e| self.all[e as usize]);
         let between = between(&curve, places, is_forward, ends[0] == ends[1], fineness);
