@@ -85,6 +85,8 @@ enum Kind {
     Real(Range),
     Word(Vec<String>),
     Wholes,
+    /// Patches, each with two numbers of control points.
+    PerPatch,
 }
 
 #[derive(Clone, Copy, Default)]
@@ -220,8 +222,14 @@ impl Field {
             (Kind::Word(_), _) => wrong("a word"),
             (Kind::Wholes, Value::Array(items)) if items.iter().all(|i| i.is_u64()) => Ok(()),
             (Kind::Wholes, _) => wrong("a list of whole numbers"),
+            (Kind::PerPatch, Value::Array(items)) if items.iter().all(is_triple) => Ok(()),
+            (Kind::PerPatch, _) => wrong("a list of (patch, control points along u, along v)"),
         }
     }
+}
+
+fn is_triple(value: &Value) -> bool {
+    value.as_array().is_some_and(|three| three.len() == 3 && three.iter().all(Value::is_u64))
 }
 
 /// The keywords of each stage.
@@ -296,6 +304,7 @@ fn kind_of(property: &Value, schema: &Value) -> Option<Kind> {
         "boolean" => Some(Kind::Flag),
         "integer" => Some(Kind::Whole(range)),
         "number" => Some(Kind::Real(range)),
+        "array" if property["per_patch"] == true => Some(Kind::PerPatch),
         "array" if property["items"]["type"] == "integer" => Some(Kind::Wholes),
         _ => None,
     }

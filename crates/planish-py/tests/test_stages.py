@@ -263,3 +263,12 @@ def test_a_model_moved_by_its_control_points_keeps_its_relief(model: planish.Mod
     assert np.allclose(after.points, before.points + away, atol=1e-12)
     with pytest.raises(ValueError, match="1 are given"):
         model.deform(model.surfaces[:1])
+
+
+def test_a_patch_gets_the_control_points_that_are_asked_for_by_its_number(box: planish.Mesh) -> None:
+    model = box.fit(patches=6, control_at=[(0, 8, 6)])
+    assert model.surfaces[0].control.shape == (6, 8, 3)
+    with pytest.raises(planish.FitError, match="patch 99"):
+        box.fit(patches=6, control_at=[(99, 8, 8)])
+    with pytest.raises(TypeError, match=r"control_at=\[\[0,8\]\]"):
+        box.fit(patches=6, control_at=[(0, 8)])  # type: ignore[list-item]

@@ -245,6 +245,9 @@ fn a_patch_gets_the_control_points_that_are_asked_for_at_it() {
     let params = FitParams { control_at: vec![[6, 13, 9]], ..control(6, 6) };
     let error = surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap_err();
     assert_eq!(error, FitError::NoSuchPatch { patch: 6, patches: 6 });
+    let params = FitParams { control_at: vec![[0, usize::MAX, 9]], ..control(6, 6) };
+    let error = surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap_err();
+    assert!(matches!(error, FitError::Parameter { name: "control_at", .. }), "{error}");
 }
 
 #[test]

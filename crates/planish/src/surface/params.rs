@@ -7,6 +7,9 @@ use crate::grid::Grid;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Most control points along a curve.
+const MOST_CONTROL: usize = 8193;
+
 /// How to fit the surfaces of a network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -75,6 +78,10 @@ impl FitParams {
         let wrong = |name, value, wanted| Err(FitError::Parameter { name, value, wanted });
         match self.resolution {
             Resolution::Tolerance(share) if !(share > 0.0 && share.is_finite()) => wrong("tolerance", share, "above 0"),
+            _ if self.control_at.iter().any(|[_, u, v]| *u.max(v) > MOST_CONTROL) => {
+                let most = self.control_at.iter().map(|[_, u, v]| *u.max(v)).fold(0, usize::max);
+                wrong("control_at", most as f64, "8193 or less along each direction")
+            }
             _ if !(cells >= 1.0 && cells.is_finite()) => wrong("cells_per_span", cells, "1 or more"),
             _ if !(smoothing >= 0.0 && smoothing.is_finite()) => wrong("smoothing", smoothing, "0 or more"),
             _ => Ok(()),
