@@ -5,6 +5,8 @@
 //! Spans that leave too much are halved until none does. From what is left in each span follows how long a cubic may be
 //! there, since its error goes with the fourth power of its length; knots at equal steps of that measure equalise the error
 //! (de Boor 1973, *Good approximation by splines with variable knots*), and their number is the least that keeps the tolerance.
+//! The measure is taken again on the knots that are found, as long as that takes fewer. No span is longer than another and the way
+//! to it, and there are two at least.
 
 use super::FitError;
 use super::basis::Knots;

@@ -12,7 +12,7 @@ const MOST_HALVINGS: usize = 14;
 /// Points of all faces at most: a mesh of them takes half a gigabyte.
 const MOST_POINTS: usize = 8_000_000;
 /// Share of the period of a closed curve within which two parameters are one.
-const SAME: f64 = 1e-9;
+const SAME_PARAMETER: f64 = 1e-9;
 
 /// How near triangles are to what they stand for.
 #[derive(Clone, Copy, Debug)]
@@ -143,7 +143,7 @@ fn between(curve: &Curve, places: [DVec3; 2], is_forward: bool, is_whole: bool, 
     }
     match period {
         Some(_) if is_whole => end = start + (to - from),
-        Some(period) if end - start <= SAME * period => end += period,
+        Some(period) if end - start <= SAME_PARAMETER * period => end += period,
         None if is_whole => (start, end) = (from, to),
         _ => {}
     }
@@ -152,10 +152,12 @@ fn between(curve: &Curve, places: [DVec3; 2], is_forward: bool, is_whole: bool, 
     if let Some(period) = period {
         breaks.extend(curve.breaks().iter().map(|b| b + period));
     }
-    let inside = |b: &f64| *b > start.min(end) + SAME * (to - from) && *b < start.max(end) - SAME * (to - from);
+    let inside = |b: &f64| {
+        *b > start.min(end) + SAME_PARAMETER * (to - from) && *b < start.max(end) - SAME_PARAMETER * (to - from)
+    };
     let mut stops: Vec<f64> = breaks.into_iter().filter(inside).collect();
     stops.sort_by(f64::total_cmp);
-    stops.dedup_by(|a, b| (*a - *b).abs() <= SAME * (to - from));
+    stops.dedup_by(|a, b| (*a - *b).abs() <= SAME_PARAMETER * (to - from));
     if end < start {
         stops.reverse();
     }

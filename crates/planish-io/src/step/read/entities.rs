@@ -1,15 +1,13 @@
 //! Curves, surfaces, placements and units of a STEP file from its records.
 
 use super::exchange::{Exchange, Record, Value, fault};
-use super::shape::{Curve, Frame, Surface};
+use super::shape::{CLOSED, Curve, Frame, Surface};
 use super::spline::{Basis, SplineCurve, SplineSurface};
 use crate::{Place, ReadError};
 use glam::{DMat3, DVec3, DVec4};
 
 /// Curves on curves at most: trimmed, on surfaces.
 const MOST_BASES: usize = 8;
-/// Distance of the rows of a closed surface's first and last control points, of its size.
-const CLOSED: f64 = 1e-9;
 
 /// That a file has what is not read.
 pub(super) fn unread(id: u64, name: &str) -> ReadError {

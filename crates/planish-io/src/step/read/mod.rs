@@ -32,7 +32,7 @@ use trim::{Limits, Node};
 /// Largest distance of the triangles from their surfaces, as a share of the diagonal.
 const SURFACE_TOLERANCE: f64 = 2e-5;
 /// Largest turn from one triangle to the next along a bend, radians: 15 degrees.
-const TURN: f64 = 0.2618;
+const TURN: f64 = std::f64::consts::PI / 12.0;
 /// Distance within which places of a file are one, as a share of the diagonal.
 const SAME_PLACE: f64 = 1e-7;
 

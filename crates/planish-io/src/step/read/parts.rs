@@ -7,7 +7,7 @@ use super::entities::Entities;
 use super::exchange::{Value, fault};
 use super::shape::Frame;
 use crate::{Place, ReadError};
-use glam::{DAffine3, DMat3};
+use glam::DAffine3;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Parts in parts at most.
@@ -141,11 +141,7 @@ impl Assembly {
 /// What brings one placement onto another.
 fn between(entities: &Entities, from: u64, to: u64) -> Result<DAffine3, ReadError> {
     let affine = |frame: Frame| DAffine3::from_mat3_translation(frame.axes, frame.origin);
-    let turned = |frame: Frame| {
-        let back: DMat3 = frame.axes.transpose();
-        DAffine3::from_mat3_translation(back, -(back * frame.origin))
-    };
-    Ok(affine(entities.frame(to)?) * turned(entities.frame(from)?))
+    Ok(affine(entities.frame(to)?) * affine(entities.frame(from)?).inverse())
 }
 
 /// Adds the shells of an item of a representation; items of other kinds have none.

@@ -95,8 +95,8 @@ impl Curve {
     }
 }
 
-/// Distance of the ends of a closed curve, of its size.
-const CLOSED: f64 = 1e-9;
+/// Distance of the ends of a closed curve, or of the sides of a surface closed along it, of its size.
+pub(super) const CLOSED: f64 = 1e-9;
 /// Places of a span from which the nearest one is looked for.
 const SEEDS: usize = 4;
 /// Steps of the golden section: to a part in 1e11 of two seeds.

@@ -10,7 +10,7 @@ use super::shape::Surface;
 use crate::ReadError;
 
 /// Share of a period within which two parameters are one.
-const SAME: f64 = 1e-6;
+const SAME_PARAMETER: f64 = 1e-6;
 
 /// A point of a ring: its parameters, and the point of the mesh.
 pub(super) type Node = ([f64; 2], u32);
@@ -105,7 +105,7 @@ fn walk(surface: &Surface, ring: &[u32], points: &Points, tolerance: f64) -> Opt
                 // The face is on the left: along a high v towards lower u, along a high u towards higher v.
                 let sign = if is_high == (axis == 0) { -1.0 } else { 1.0 };
                 let turn = (sign * (uv[axis] - at[axis])).rem_euclid(period);
-                let is_all = turn < SAME * period || turn > (1.0 - SAME) * period;
+                let is_all = turn < SAME_PARAMETER * period || turn > (1.0 - SAME_PARAMETER) * period;
                 next[axis] = at[axis] + sign * if is_all { period } else { turn };
             }
             let mut along = at;

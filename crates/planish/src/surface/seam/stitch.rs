@@ -40,8 +40,7 @@ const REVERTS: usize = 3;
 /// for that. A network without seams comes back as it is.
 ///
 /// # Errors
-/// Lists that do not fit the network or each other, knots that are neither simple nor double at equal steps, or the observer's
-/// wish.
+/// Lists that do not fit the network or each other, knots that differ along a chord, or the observer's wish.
 ///
 /// Source: [K98] §8.1.3.
 pub fn stitch(
