@@ -330,7 +330,7 @@ fn draft(
     observer: &dyn Observer,
 ) -> Result<Option<(Refined, Complex)>, LayoutError> {
     let adjacency = Adjacency::new(&work.mesh);
-    let work_sharp = carry(&work, &adjacency, sharp);
+    let work_sharp = carry(&work, sharp);
     let ground = partition::Ground::new(&work.mesh, &adjacency, &work_sharp);
     let mut cells = (params.patches as f64 / 2.0).max(1.0);
     // A cell becomes two patches or so, and needles reach over any number of sides.
@@ -376,10 +376,10 @@ fn draw(
             _ => None,
         })
         .collect();
-    let (finer, from) = refine::split(work, |a, b| short.contains(&[a, b]));
+    let (finer, from) = refine::split(work, &work.edges(|_, ends| short.contains(&ends)));
     let label: Vec<u32> = from.iter().map(|&f| label[f as usize]).collect();
     let adjacency = Adjacency::new(&finer.mesh);
-    let finer_sharp = carry(&finer, &adjacency, sharp);
+    let finer_sharp = carry(&finer, sharp);
     let ground = partition::Ground::new(&finer.mesh, &adjacency, &finer_sharp);
     let complex = outline::outline(&ground, &label, count, &corners(&ground, given, reach));
     (finer, complex)
@@ -393,20 +393,8 @@ fn corners(ground: &partition::Ground, given: &[bool], reach: f64) -> Vec<bool> 
 }
 
 /// The sharp half-edges of the working mesh: the pieces of those of the input.
-fn carry(work: &Refined, adjacency: &Adjacency, sharp: &[bool]) -> Vec<bool> {
-    let mut carried = vec![false; adjacency.opposite.len()];
-    for (f, (face, corners)) in work.parent.iter().enumerate() {
-        for k in 0..3 {
-            let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            // On the input edge opposite corner i both ends have weight zero there (exactly: halves of zeros).
-            for i in 0..3 {
-                if a[i] == 0.0 && b[i] == 0.0 && sharp[3 * *face as usize + (i + 1) % 3] {
-                    carried[3 * f + k] = true;
-                }
-            }
-        }
-    }
-    carried
+fn carry(work: &Refined, sharp: &[bool]) -> Vec<bool> {
+    work.edges(|h, _| work.edge_of(h).is_some_and(|of| sharp[of as usize]))
 }
 
 /// The complex as a network on the input mesh.

@@ -20,7 +20,7 @@ use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::Network;
 use crate::observe::Observer;
 use glam::DVec3;
-use std::collections::HashSet;
+use std::f64::consts::SQRT_2;
 
 /// Longest edge of the refined mesh in edges of the proxy: short enough to choose from.
 const FINE: f64 = 0.6;
@@ -186,36 +186,59 @@ fn refined(
     refine::split_faces(&mut work, |f| bound(&tagged, f));
     let adjacency = Adjacency::new(&work.mesh);
     let tagged = tags(&work, &adjacency, sharp);
-    let mut on_line = vec![false; work.mesh.points.len()];
-    let mut edges: HashSet<[u32; 2]> = HashSet::new();
-    for h in (0..tagged.len() as u32).filter(|&h| tagged[h as usize]) {
-        let (a, b) = (work.mesh.origin(h), work.mesh.origin(next(h)));
-        edges.insert([a.min(b), a.max(b)]);
-        on_line[a as usize] = true;
-        on_line[b as usize] = true;
-    }
-    work = refine::split(&work, |a, b| on_line[a as usize] && on_line[b as usize] && !edges.contains(&[a, b])).0;
+    let on_line = ends(&work.mesh, &tagged);
+    let joins = work.edges(|h, [a, b]| on_line[a as usize] && on_line[b as usize] && !tagged[h as usize]);
+    work = refine::split(&work, &joins).0;
     for _ in 0..SPLIT_ROUNDS {
-        let points = &work.mesh.points;
-        let long = |a: u32, b: u32| {
-            let (a, b) = (points[a as usize], points[b as usize]);
-            a.distance(b) > longest(a.midpoint(b))
-        };
-        if refine::count(&work, long) > most(&work.mesh) {
+        let chosen = long(&work, &longest);
+        if refine::count(&work, &chosen) > most(&work.mesh) {
             break;
         }
-        let (finer, from) = refine::split(&work, long);
+        let (finer, from) = refine::split(&work, &chosen);
         if from.len() == work.parent.len() {
             break;
         }
         work = finer;
+        let tagged = tags(&work, &Adjacency::new(&work.mesh), sharp);
+        let on_line = ends(&work.mesh, &tagged);
+        refine::turn_inner(&mut work, &on_line);
     }
     work
 }
 
+/// The vertices at the ends of some half-edges.
+fn ends(mesh: &TriMesh, chosen: &[bool]) -> Vec<bool> {
+    let mut ends = vec![false; mesh.points.len()];
+    for h in (0..chosen.len() as u32).filter(|&h| chosen[h as usize]) {
+        ends[mesh.origin(h) as usize] = true;
+        ends[mesh.origin(next(h)) as usize] = true;
+    }
+    ends
+}
+
+/// The half-edges that are to be split: those longer than `longest` at their middle. Edges inside faces of the input may be
+/// as long as the diagonal of a square of such, and wait where a needle is being cut along its long sides: splitting its
+/// diagonals too would leave twice as many triangles each time.
+fn long(work: &Refined, longest: impl Fn(DVec3) -> f64) -> Vec<bool> {
+    let length = |h: u32| {
+        let (a, b) = (work.mesh.points[work.mesh.origin(h) as usize], work.mesh.points[work.mesh.origin(next(h)) as usize]);
+        a.distance(b) / longest(a.midpoint(b))
+    };
+    let adjacency = Adjacency::new(&work.mesh);
+    let is_needle = |f: u32| {
+        let mut sides = 3 * f..3 * f + 3;
+        sides.clone().any(|h| length(h) <= 1.0) && sides.any(|h| work.edge_of(h).is_some() && length(h) > 1.0)
+    };
+    let needle: Vec<bool> = (0..work.mesh.triangles.len() as u32).map(is_needle).collect();
+    work.edges(|h, _| match (work.edge_of(h), adjacency.opposite[h as usize]) {
+        (Some(_), _) | (None, NONE) => length(h) > 1.0,
+        (None, o) => length(h) > SQRT_2 && !needle[h as usize / 3] && !needle[o as usize / 3],
+    })
+}
+
 /// The half-edges of the refined mesh on sharp lines and on the boundary.
 fn tags(work: &Refined, adjacency: &Adjacency, sharp: &[bool]) -> Vec<bool> {
-    let mut tagged = carry(work, adjacency, sharp);
+    let mut tagged = carry(work, sharp);
     for (h, &o) in adjacency.opposite.iter().enumerate() {
         if o == NONE {
             tagged[h] = true;

@@ -2,11 +2,22 @@
 //!
 //! See `docs/methods/layout.md`, step 1.
 
+use crate::geom::predicates::orient2d;
+use crate::mesh::change::{Changing, Flip};
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
+use glam::DVec2;
 use std::collections::HashMap;
 
 /// Rounds of splitting; each halves an edge, so this reaches a 4096th of the longest edge.
 const SPLIT_ROUNDS: usize = 12;
+
+/// Sweeps over the edges inside faces of the input, of which each turns those that are worse than the other diagonal. Few are
+/// needed between two rounds of splitting; faces without area might never end.
+const MAX_TURN_SWEEPS: usize = 32;
+
+/// The cotangents of the angles opposite to an edge must sum to less than this for it to be turned; below zero, so that
+/// four points on a circle stay as they are.
+const TURN_BELOW: f64 = -1e-3;
 
 /// The refined mesh with the way back.
 pub(in crate::layout) struct Refined {
@@ -21,15 +32,14 @@ pub(in crate::layout) struct Refined {
 pub(in crate::layout) fn refine(mesh: &TriMesh, longest: f64, fixed: &[bool], most: usize) -> Refined {
     let mut work = Refined::new(mesh);
     for round in 0..SPLIT_ROUNDS {
-        let points = &work.mesh.points;
-        let chosen = |a: u32, b: u32| {
+        let chosen = work.edges(|h, [a, b]| {
             let narrow = round == 0 && fixed[a as usize] && fixed[b as usize];
-            narrow || points[a as usize].distance(points[b as usize]) > longest
-        };
-        if round > 0 && count(&work, chosen) > most {
+            narrow || work.mesh.edge_length(h) > longest
+        });
+        if round > 0 && count(&work, &chosen) > most {
             break;
         }
-        let (finer, from) = split(&work, chosen);
+        let (finer, from) = split(&work, &chosen);
         if from.len() == work.parent.len() {
             break;
         }
@@ -39,17 +49,13 @@ pub(in crate::layout) fn refine(mesh: &TriMesh, longest: f64, fixed: &[bool], mo
 }
 
 /// Triangles that [`split`] would leave.
-pub(super) fn count(work: &Refined, chosen: impl Fn(u32, u32) -> bool) -> usize {
-    let split = |t: &[u32; 3], k: usize| {
-        let (a, b) = (t[k], t[(k + 1) % 3]);
-        usize::from(chosen(a.min(b), a.max(b)))
-    };
-    work.mesh.triangles.iter().map(|t| 1 + (0..3).map(|k| split(t, k)).sum::<usize>()).sum()
+pub(super) fn count(work: &Refined, chosen: &[bool]) -> usize {
+    work.mesh.triangles.len() + chosen.iter().filter(|c| **c).count()
 }
 
-/// Splits the edges between the vertices that `chosen` accepts (lower vertex first) at their middle. Returns the
-/// finer mesh and for each of its faces the face that it is a part of.
-pub(in crate::layout) fn split(work: &Refined, chosen: impl Fn(u32, u32) -> bool) -> (Refined, Vec<u32>) {
+/// Splits the edges of the half-edges `chosen`, which are so from both sides, at their middle. Returns the finer mesh and for
+/// each of its faces the face that it is a part of.
+pub(in crate::layout) fn split(work: &Refined, chosen: &[bool]) -> (Refined, Vec<u32>) {
     let adjacency = Adjacency::new(&work.mesh);
     let mut middle: HashMap<u32, u32> = HashMap::new();
     let mut points = work.mesh.points.clone();
@@ -58,7 +64,7 @@ pub(in crate::layout) fn split(work: &Refined, chosen: impl Fn(u32, u32) -> bool
         let (a, b) = (work.mesh.origin(h), work.mesh.origin(next(h)));
         // From the lower vertex, so that the place does not depend on the face.
         let (a, b) = (a.min(b), a.max(b));
-        if (o == NONE || h < o) && chosen(a, b) {
+        if (o == NONE || h < o) && chosen[h as usize] {
             let m = points.len() as u32;
             points.push(points[a as usize].midpoint(points[b as usize]));
             middle.insert(h, m);
@@ -102,6 +108,60 @@ pub(in crate::layout) fn split(work: &Refined, chosen: impl Fn(u32, u32) -> bool
     (Refined { mesh: TriMesh::new(points, triangles), parent }, from)
 }
 
+/// Turns edges inside faces of the input where that makes the angles opposite to them smaller (Lawson 1977): the surface
+/// stays as it is. None comes to join two vertices that are `on_line`.
+pub(super) fn turn_inner(work: &mut Refined, on_line: &[bool]) {
+    let mut changing = Changing::new(&work.mesh.triangles, work.mesh.points.len(), &[]);
+    let inputs = work.parent.iter().map(|p| p.0 as usize + 1).max().unwrap_or(0);
+    let mut pieces = vec![0u32; inputs];
+    work.parent.iter().for_each(|p| pieces[p.0 as usize] += 1);
+    let parted: Vec<u32> =
+        (0..changing.len()).filter(|&t| pieces[work.parent[t as usize].0 as usize] > 1).collect();
+    for _ in 0..MAX_TURN_SWEEPS {
+        let mut is_done = true;
+        for &t in &parted {
+            for k in 0..3 {
+                let free = |flip: &Flip| !flip.tips.iter().all(|&v| on_line[v as usize]);
+                let Some(flip) = changing.flip_of(t, k).filter(free) else { continue };
+                let Some(corners) = turned(work, &changing, &flip) else { continue };
+                flip.triangles.iter().zip(corners).for_each(|(&f, corners)| work.parent[f as usize].1 = corners);
+                changing.flip(&flip);
+                is_done = false;
+            }
+        }
+        if is_done {
+            break;
+        }
+    }
+    work.mesh.triangles = changing.into_triangles();
+}
+
+/// The corners of both triangles in their face of the input once an edge is turned; `None` if it is on an edge of that face,
+/// or no worse than the one in its place.
+fn turned(work: &Refined, changing: &Changing, flip: &Flip) -> Option<[[[f64; 3]; 3]; 2]> {
+    let [f, g] = flip.triangles;
+    if work.parent[f as usize].0 != work.parent[g as usize].0 {
+        return None;
+    }
+    let at = |v: u32| work.mesh.points[v as usize];
+    let [a, b] = flip.edge.map(at);
+    let cotangent = |tip: u32| (a - at(tip)).dot(b - at(tip)) / (a - at(tip)).cross(b - at(tip)).length();
+    // Not a number for faces without area, which stay.
+    let is_worse = flip.tips.into_iter().map(cotangent).sum::<f64>() < TURN_BELOW;
+    let place = |v: u32| {
+        let t = if changing.corners(f).contains(&v) { f } else { g };
+        let k = changing.corners(t).iter().position(|&x| x == v).expect("a corner of one of both");
+        work.parent[t as usize].1[k]
+    };
+    // Two weights of three are coordinates in the face, exact on its edges.
+    let is_left = |corners: [[f64; 3]; 3]| {
+        let [a, b, c] = corners.map(|weights| DVec2::new(weights[1], weights[2]));
+        orient2d(a, b, c) > 0.0
+    };
+    let corners = flip.corners.map(|names| names.map(place));
+    (is_worse && corners.into_iter().all(is_left)).then_some(corners)
+}
+
 /// Splits the faces that `chosen` accepts into three at their middle.
 pub(super) fn split_faces(work: &mut Refined, chosen: impl Fn(u32) -> bool) {
     for f in (0..work.parent.len()).filter(|&f| chosen(f as u32)) {
@@ -131,6 +191,23 @@ impl Refined {
             mesh: TriMesh::new(mesh.points.clone(), mesh.triangles.clone()),
             parent: (0..mesh.triangles.len() as u32).map(|f| (f, unit)).collect(),
         }
+    }
+
+    /// For each half-edge whether `chosen` accepts it; it is given the ends too, the lower vertex first.
+    pub fn edges(&self, chosen: impl Fn(u32, [u32; 2]) -> bool) -> Vec<bool> {
+        let ends = |h: u32| {
+            let (a, b) = (self.mesh.origin(h), self.mesh.origin(next(h)));
+            [a.min(b), a.max(b)]
+        };
+        (0..3 * self.mesh.triangles.len() as u32).map(|h| chosen(h, ends(h))).collect()
+    }
+
+    /// The half-edge of the input that a half-edge is a piece of, if it is on an edge of the input.
+    pub fn edge_of(&self, h: u32) -> Option<u32> {
+        let (face, corners) = self.parent[h as usize / 3];
+        let (a, b) = (corners[h as usize % 3], corners[next(h) as usize % 3]);
+        // On the edge opposite to corner i both ends have weight zero there (exactly: halves of zeros).
+        (0..3).find(|&i| a[i] == 0.0 && b[i] == 0.0).map(|i| 3 * face + (i as u32 + 1) % 3)
     }
 
     /// The place of barycentric `bary` in refined face `f`, as a face point of the input mesh.
