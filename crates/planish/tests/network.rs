@@ -2,7 +2,7 @@
 
 mod common;
 
-use planish::layout::{Known, LayoutError, LayoutParams, layout};
+use planish::layout::{Known, LayoutError, LayoutParams, Method, layout};
 use planish::mend::close_holes;
 use planish::mesh::{Adjacency, FacePoint, FeatureTags, TriMesh, diagnose, sharp_edges};
 use planish::network::{Corner, Curve, CurveKind, ImprintError, Network, Patch, Side, imprint};
@@ -179,6 +179,16 @@ fn a_mesh_of_two_triangles_has_a_layout_of_one_patch() {
     let network = layout(&mesh, Known::default(), &params(1), &Silent).expect("a square has a layout").network;
     let patches = imprint(&mesh, &network, &Silent).expect("disks");
     assert!((1..=4).contains(&patches.len()), "{} patches", patches.len());
+}
+
+#[test]
+fn a_cylinder_of_2044_needles_has_a_network_along_its_form_of_30_patches_at_most() {
+    let mesh = shapes::faceted_cylinder(3.0, 10.0, 512);
+    let laid = layout(&mesh, Known::default(), &LayoutParams::default(), &Silent).unwrap();
+    assert!(matches!(laid.method, Method::Field { .. }), "{:?}", laid.method);
+    assert!(laid.network.patches.len() <= 30, "{}", laid.network.patches.len());
+    let rims = 2.0 * 512.0 * 6.0 * (std::f64::consts::PI / 512.0).sin();
+    assert!((length(&mesh, &laid.network, CurveKind::Feature) / rims - 1.0).abs() < 1e-9);
 }
 
 #[test]

@@ -77,6 +77,29 @@ pub fn cylinder(radius: f64, height: f64, around: usize) -> TriMesh {
     mesh
 }
 
+/// The same cylinder as programs for CAD write it: vertices on its rims only, `around` on each, two needles of the wall
+/// between neighbours, and caps of needles from side to side.
+pub fn faceted_cylinder(radius: f64, height: f64, around: usize) -> TriMesh {
+    let n = around as u32;
+    let on = |i: u32, z: f64| {
+        let (sin, cos) = (TAU * f64::from(i) / f64::from(n)).sin_cos();
+        DVec3::new(radius * cos, radius * sin, z)
+    };
+    let points = [0.0, height].iter().flat_map(|&z| (0..n).map(move |i| on(i, z))).collect();
+    let wall = (0..n).flat_map(|i| {
+        let j = (i + 1) % n;
+        [[i, j, n + j], [i, n + j, n + i]]
+    });
+    // From the first vertex to and fro: its neighbours, theirs, and so on.
+    let cap = (0..n - 2).map(|t| {
+        let (low, high) = (t.div_ceil(2), n - 1 - t / 2);
+        if t % 2 == 0 { [low, low + 1, high] } else { [low, high - 1, high] }
+    });
+    let bottom = cap.clone().map(|[a, b, c]| [a, c, b]);
+    let top = cap.map(|t| t.map(|v| n + v));
+    TriMesh::new(points, wall.chain(bottom).chain(top).collect())
+}
+
 /// A box centred at the origin; each face a grid of `n x n` squares, cut into two triangles each.
 pub fn cuboid(size: DVec3, n: usize) -> TriMesh {
     let cells = [(0, 0, 0)];
@@ -311,6 +334,9 @@ mod tests {
             assert_eq!(count(&mesh), (euler, 0));
             assert!((volume(&mesh) / exact - 1.0).abs() < 0.02, "{} of {exact}", volume(&mesh));
         }
+        assert_eq!(count(&faceted_cylinder(2.0, 3.0, 64)), (2, 0));
+        let exact = 3.0 * 32.0 * 4.0 * (TAU / 64.0).sin();
+        assert!((volume(&faceted_cylinder(2.0, 3.0, 64)) / exact - 1.0).abs() < 1e-12);
         assert_eq!(count(&double_torus(8)), (-2, 0));
         assert!(volume(&double_torus(8)) > 1.0);
         assert_eq!(count(&two_spheres(3)), (4, 0));

@@ -115,8 +115,7 @@ pub(super) fn turn_inner(work: &mut Refined, on_line: &[bool]) {
     let inputs = work.parent.iter().map(|p| p.0 as usize + 1).max().unwrap_or(0);
     let mut pieces = vec![0u32; inputs];
     work.parent.iter().for_each(|p| pieces[p.0 as usize] += 1);
-    let parted: Vec<u32> =
-        (0..changing.len()).filter(|&t| pieces[work.parent[t as usize].0 as usize] > 1).collect();
+    let parted: Vec<u32> = (0..changing.len()).filter(|&t| pieces[work.parent[t as usize].0 as usize] > 1).collect();
     for _ in 0..MAX_TURN_SWEEPS {
         let mut is_done = true;
         for &t in &parted {
