@@ -6,6 +6,7 @@
 //! opposite to them smaller (Lawson 1977). Every step is kept, so that what is drawn on the coarse mesh can be carried
 //! back ([`super::strands`]).
 
+use super::refine::has_greater_angles;
 use super::strands::{Star, Step, unfolded};
 use crate::geom::predicates::orient2d;
 use crate::mesh::{NONE, TriMesh};
@@ -47,10 +48,6 @@ const LEAST_FACE_SHAPES: [f64; 3] = [0.45, 0.3, 0.15];
 
 /// A face of less than this, lower than what lines may leave out, is a sliver.
 const SLIVER_SHAPE: f64 = LEAST_FACE_SHAPES[2];
-
-/// The cotangents of the angles opposite to a diagonal must sum to less than this for it to be turned; below zero, so that
-/// four points on a circle stay as they are.
-const TURN_BELOW: f64 = -1e-3;
 
 /// Vertices taken out between two looks at the observer: some milliseconds.
 const LOOK_EVERY: usize = 4096;
@@ -436,8 +433,7 @@ impl<'a> Melt<'a> {
         let j = self.triangles[g as usize].iter().position(|&x| x == b)?;
         let d = self.triangles[g as usize][(j + 2) % 3];
         let [p, q, r, s] = [a, d, b, c].map(|v| self.at(v));
-        let cotangent = |at: DVec3| (p - at).dot(r - at) / (p - at).cross(r - at).length();
-        if cotangent(q) + cotangent(s) >= TURN_BELOW || self.on_line(c) && self.on_line(d) {
+        if !has_greater_angles([p, r], [q, s]) || self.on_line(c) && self.on_line(d) {
             return None;
         }
         let thin = |v: u32| !self.on_line(v) && self.around[v as usize].len() <= 4;

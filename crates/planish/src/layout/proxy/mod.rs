@@ -2,7 +2,7 @@
 //! layout needs, each with the way back.
 //!
 //! A *proxy* is an even mesh of some thousand triangles. The input is refined first ([`refine`]): edges much longer than
-//! wanted are split, and so is what a map cannot use: edges between two vertices of lines that are no line themselves,
+//! wanted are split, needles across, and so is what a map cannot use: edges between two vertices of lines that are no line themselves,
 //! for both ends are bound; triangles with two edges on lines, for their corner has nothing to bend. Then vertices are
 //! taken out one by one ([`melt`]). Curves drawn on the proxy are carried back through the same steps ([`strands`]).
 

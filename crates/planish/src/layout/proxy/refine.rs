@@ -5,7 +5,7 @@
 use crate::geom::predicates::orient2d;
 use crate::mesh::change::{Changing, Flip};
 use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use std::collections::HashMap;
 
 /// Rounds of splitting; each halves an edge, so this reaches a 4096th of the longest edge.
@@ -143,10 +143,7 @@ fn turned(work: &Refined, changing: &Changing, flip: &Flip) -> Option<[[[f64; 3]
         return None;
     }
     let at = |v: u32| work.mesh.points[v as usize];
-    let [a, b] = flip.edge.map(at);
-    let cotangent = |tip: u32| (a - at(tip)).dot(b - at(tip)) / (a - at(tip)).cross(b - at(tip)).length();
-    // Not a number for faces without area, which stay.
-    let is_worse = flip.tips.into_iter().map(cotangent).sum::<f64>() < TURN_BELOW;
+    let is_worse = has_greater_angles(flip.edge.map(at), flip.tips.map(at));
     let place = |v: u32| {
         let t = if changing.corners(f).contains(&v) { f } else { g };
         let k = changing.corners(t).iter().position(|&x| x == v).expect("a corner of one of both");
@@ -161,6 +158,13 @@ fn turned(work: &Refined, changing: &Changing, flip: &Flip) -> Option<[[[f64; 3]
     (is_worse && corners.into_iter().all(is_left)).then_some(corners)
 }
 
+/// True if the angles opposite to an edge, at the tips of its triangles, are greater together than those of the edge between
+/// the tips would be; false where a triangle has no area.
+pub(super) fn has_greater_angles([a, b]: [DVec3; 2], tips: [DVec3; 2]) -> bool {
+    let cotangent = |tip: DVec3| (a - tip).dot(b - tip) / (a - tip).cross(b - tip).length();
+    cotangent(tips[0]) + cotangent(tips[1]) < TURN_BELOW
+}
+
 /// Splits the faces that `chosen` accepts into three at their middle.
 pub(super) fn split_faces(work: &mut Refined, chosen: impl Fn(u32) -> bool) {
     for f in (0..work.parent.len()).filter(|&f| chosen(f as u32)) {
@@ -168,7 +172,7 @@ pub(super) fn split_faces(work: &mut Refined, chosen: impl Fn(u32) -> bool) {
         let tri = work.mesh.triangles[f];
         let m = work.mesh.points.len() as u32;
         let middle = std::array::from_fn(|i| (bary[0][i] + bary[1][i] + bary[2][i]) / 3.0);
-        work.mesh.points.push(work.mesh.corners(f).into_iter().sum::<glam::DVec3>() / 3.0);
+        work.mesh.points.push(work.mesh.corners(f).into_iter().sum::<DVec3>() / 3.0);
         for k in 0..3 {
             let (triangle, corners) = ([tri[k], tri[(k + 1) % 3], m], [bary[k], bary[(k + 1) % 3], middle]);
             if k == 0 {
