@@ -2,6 +2,7 @@
 
 mod common;
 
+use planish::geom::{polyline, random};
 use planish::layout::{Known, LayoutError, LayoutParams, Method, layout};
 use planish::mend::close_holes;
 use planish::mesh::{Adjacency, FacePoint, FeatureTags, TriMesh, diagnose, sharp_edges};
@@ -129,6 +130,34 @@ fn near_their_nodes_the_curves_of_a_torus_meet_at_90_degrees_within_12_in_the_me
     let off = angles.iter().map(|a| (a - 90.0).abs()).sum::<f64>() / angles.len() as f64;
     let least = angles.iter().fold(f64::INFINITY, |a, &b| a.min(b));
     assert!(off < 12.0 && least > 40.0, "{off} degrees off, least {least}");
+}
+
+/// A flat square of 2 x 60 x 60 triangles whose inner vertices are moved by up to .45 of a side, each by its own.
+fn jittered_sheet() -> TriMesh {
+    const CELLS: usize = 60;
+    shapes::sheet(CELLS, CELLS, false, false, |u, v| {
+        let (i, j) = ((u * CELLS as f64).round(), (v * CELLS as f64).round());
+        let is_inner = [i, j].iter().all(|&k| k > 0.0 && k < CELLS as f64);
+        let off = |axis: u64| 0.9 * (random::unit(axis, (j as usize * (CELLS + 1) + i as usize) as u64) - 0.5);
+        let moved = if is_inner { DVec3::new(off(1), off(2), 0.0) } else { DVec3::ZERO };
+        DVec3::new(i, j, 0.0) + moved
+    })
+}
+
+#[test]
+fn curves_on_a_flat_sheet_of_poor_triangles_turn_by_less_than_30_degrees_in_the_mean_over_16_steps() {
+    let mesh = jittered_sheet();
+    let network = layout(&mesh, Known::default(), &params(16), &Silent).expect("a sheet has a layout").network;
+    let turn = |curve: &Curve| {
+        let points: Vec<DVec3> = curve.points.iter().map(|p| p.position(&mesh)).collect();
+        let length = polyline::length(points.iter().copied());
+        let places: Vec<DVec3> = (0..=16).map(|k| polyline::at_length(&points, length * f64::from(k) / 16.0)).collect();
+        let steps: Vec<DVec3> = places.windows(2).map(|w| w[1] - w[0]).collect();
+        steps.windows(2).map(|w| w[0].angle_between(w[1]).to_degrees()).sum::<f64>()
+    };
+    let turns: Vec<f64> = network.curves.iter().filter(|c| c.kind.is_smooth()).map(turn).collect();
+    let mean = turns.iter().sum::<f64>() / turns.len() as f64;
+    assert!(turns.len() >= 16 && mean < 30.0, "{} curves turn by {mean} degrees", turns.len());
 }
 
 #[test]

@@ -9,7 +9,7 @@
 //! Where a step cannot do its work the next gentler one is tried ([`Attempt`]); what was left out is told.
 
 use super::embed::{self, EmbedError};
-use super::fan;
+use super::fair;
 use super::fitness;
 use super::integers::{self, IntegerMap, QuantizeError, Scale};
 use super::map::{self, Charts, Effort};
@@ -414,7 +414,7 @@ impl Aligned {
         let (fine, fine_adjacency) = self.proxy.fine();
         let mut bench = Bench::new(fine, fine_adjacency, complex).ok_or(AlignError::Misplaced)?;
         improve::straighten(&mut bench, observer).map_err(|_| Cancelled)?;
-        fan::spread(&mut bench);
+        fair::fair(&mut bench);
         let cones = self.charts.index.iter().filter(|i| **i != 0).count();
         let Draft { good_part, deviation_deg, .. } = draft;
         Ok(Laid { network: self.proxy.network(&bench.complex), cones, deviation_deg, good_part })

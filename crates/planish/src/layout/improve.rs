@@ -20,7 +20,7 @@ const LEAST_GAIN: f64 = 0.2;
 const GAIN_GROWTH: f64 = 1.25;
 
 /// The same for drawing anew, where nothing undoes it.
-const LEAST_SETTLING: f64 = 0.02;
+pub(super) const LEAST_SETTLING: f64 = 0.02;
 
 /// Rounds of changing the connectivity; most meshes settle earlier.
 const CHANGE_ROUNDS: usize = 20;
@@ -210,7 +210,7 @@ pub(super) fn star_change(complex: &Complex, star: &[u32]) -> Option<Change> {
 }
 
 /// The change that redraws arc `a`.
-fn arc_change(complex: &Complex, a: u32) -> Option<Change> {
+pub(super) fn arc_change(complex: &Complex, a: u32) -> Option<Change> {
     let arc = complex.arc(2 * a);
     if !arc.kind.is_smooth() || arc.cells[0] == arc.cells[1] {
         return None;

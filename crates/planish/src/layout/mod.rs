@@ -6,7 +6,7 @@
 //! 4. nodes, arcs and connectivity are improved by changes inside the union of a few cells, each drawn in a one-to-one
 //!    map of that union ([`recut`]), so that nothing ever crosses or gets lost; this happens on a coarser mesh of the
 //!    same surface, and the arcs are carried back ([`proxy::coarse`]);
-//! 5. near every node its arcs are spread to even angles ([`fan`]).
+//! 5. arcs are made fair and leave their nodes at even angles ([`fair`]).
 //!
 //! The papers have no automatic layout; the method with its energy is in `docs/methods/layout.md`, the choice of maps in
 //! `docs/decisions/0005-spade-and-convex-maps.md`.
@@ -14,7 +14,7 @@
 mod aligned;
 mod complex;
 mod embed;
-mod fan;
+mod fair;
 mod fill;
 mod fitness;
 mod improve;
@@ -253,7 +253,7 @@ fn partitioned(
                 } else {
                     make_good(&mut bench, side, patches, params, observer)?;
                 }
-                fan::spread(&mut bench);
+                fair::fair(&mut bench);
                 observer.progress(1.0);
                 return Ok((network(&work, &work_adjacency, &bench.complex), fitness::good_part(&bench)));
             }

@@ -266,15 +266,6 @@ impl Embedding {
         (0..complex.cells.len() as u32).into_par_iter().map(shape).collect()
     }
 
-    /// The vertices of the cut mesh along a half-arc.
-    pub fn chain(&self, half: u32) -> Vec<u32> {
-        let mut chain = self.cut.chains[half as usize / 2].clone();
-        if half % 2 == 1 {
-            chain.reverse();
-        }
-        chain
-    }
-
     /// The vertices inside a disk that are vertices of the working mesh: places for a node.
     pub fn free_vertices(&self, disk: &Disk) -> Vec<u32> {
         let mut on_boundary = vec![false; disk.vertices.len()];
