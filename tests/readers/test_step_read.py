@@ -128,6 +128,8 @@ SPLINES = ["part of a cylinder", "cone", "ball", "torus", "fillets", "holes acro
 
 
 def write(shape, path, unit="MM"):
+    # The unit of the shape is the library's for all files: other tests set it.
+    static(Interface_Static, "SetCVal")("xstep.cascade.unit", "MM")
     static(Interface_Static, "SetCVal")("write.step.unit", unit)
     static(Interface_Static, "SetIVal")("write.step.assembly", 1)
     writer = STEPControl_Writer()
