@@ -6,7 +6,7 @@
 //! their `D` is taken against directions that part the sectors around the node evenly. The curve is brought back to the
 //! closest places of the two cells beside the arc, so that arcs do not cross. See `docs/methods/layout.md`, step 8.
 
-use super::complex::Complex;
+use super::complex::{Arc, Complex};
 use super::improve::{LEAST_SETTLING, arc_change};
 use super::recut::{Bench, Change};
 use crate::geom::{Bvh, Triangles, polyline};
@@ -16,7 +16,6 @@ use crate::mesh::disjoint::disjoint;
 use crate::network::imprint::Place;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 /// Steps of a curve: eight for each quarter of its length, the shortest bend that keeps some of its height.
@@ -25,7 +24,7 @@ const CURVE_STEPS: usize = 32;
 /// Steps from a node to the place that tells the direction of an arc: half of such a bend.
 const DIRECTION_STEPS: usize = 4;
 
-/// How far an arc may be turned at its node, radians.
+/// How far an arc may be turned at its node, radians; chosen: a little more than half of a right angle.
 const GREATEST_TURN: f64 = 0.9;
 
 /// Places at even steps along a curve, ends included.
@@ -40,12 +39,15 @@ pub(super) fn fair(bench: &mut Bench) {
         let (now, later) = disjoint(planned, |(_, change)| change.cells.clone(), Some);
         let draw = |(a, change): &(u32, Change)| Some((*a, draw(bench, change, curves[*a as usize].as_ref()?)?));
         let drawn: Vec<(u32, Vec<Place>)> = now.par_iter().filter_map(draw).collect();
-        let before: Vec<(u32, Vec<Place>)> =
+        let mut back: Vec<(u32, Vec<Place>)> =
             drawn.iter().map(|(a, _)| (*a, bench.complex.arc(2 * a).chain.clone())).collect();
-        let costs = costs(bench);
+        let before = costs(bench);
         bench.commit(drawn, put);
-        let worse = worse_arcs(&bench.complex, &costs, &self::costs(bench));
-        let back = before.into_iter().filter(|(a, _)| worse.contains(a)).collect();
+        let now = costs(bench);
+        let rise = |a: u32| -> f64 {
+            bench.complex.arc(2 * a).cells.iter().map(|&c| now[c as usize] - before[c as usize]).sum()
+        };
+        back.retain(|(a, _)| rise(*a) > LEAST_SETTLING);
         bench.commit(back, put);
         waiting = later.into_iter().map(|x| x.0).collect();
     }
@@ -65,25 +67,11 @@ fn costs(bench: &Bench) -> Vec<f64> {
     shapes.iter().map(|s| s.as_ref().map_or(0.0, |s| s.cost(mean))).collect()
 }
 
-/// The arcs whose two cells cost more than before, by what is worth drawing anew for.
-fn worse_arcs(complex: &Complex, before: &[f64], now: &[f64]) -> BTreeSet<u32> {
-    let rise = |a: &u32| {
-        complex
-            .arc(2 * a)
-            .cells
-            .iter()
-            .filter(|&&c| c != NONE)
-            .map(|&c| now[c as usize] - before[c as usize])
-            .sum::<f64>()
-    };
-    complex.live_arcs().filter(|a| rise(a) > LEAST_SETTLING).collect()
-}
-
 /// The curve that each smooth arc should be.
 fn curves(bench: &Bench) -> Vec<Option<Samples>> {
     let complex = &bench.complex;
     let is_smooth = |a: usize| complex.arcs[a].as_ref().is_some_and(|arc| arc.kind.is_smooth());
-    let sampled = |arc: &super::complex::Arc| {
+    let sampled = |arc: &Arc| {
         let points: Vec<DVec3> = arc.chain.iter().map(|p| p.position(bench.mesh)).collect();
         sampled(&points)
     };
