@@ -20,7 +20,7 @@ use crate::mesh::TriMesh;
 use crate::network::Network;
 use crate::network::field::{self, FieldParams};
 use crate::observe::{Cancelled, Observer};
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 /// Triangles of the proxy: the seamless maps of the measured meshes were made on 5 000 to 6 000 (two fifths of a second).
 const PROXY_TRIANGLES: usize = 6_000;
@@ -40,9 +40,6 @@ const TYPICAL_PATCHES: f64 = 100.0;
 
 /// Rounds of making the proxy finer where cones are tight; each halves its edges there.
 const REFINEMENTS: usize = 2;
-
-/// What cannot be brought to its whole numbers at once is brought to those of so many times as many squares before.
-const VIA: usize = 4;
 
 /// Rounds of making it finer where there was no room for a map, its whole numbers or its squares.
 const FINER_ROUNDS: usize = 1;
@@ -361,20 +358,10 @@ impl Aligned {
         observer: &dyn Observer,
     ) -> Result<Draft<'_>, AlignError> {
         let Proxy { mesh, adjacency, lines, .. } = &self.proxy;
-        let carry = |from: &[[DVec2; 3]], to: &IntegerMap| {
-            map::smooth_integers(mesh, adjacency, lines, &self.charts, (from, &to.uv), observer)
-        };
         let cramped = |faces: Vec<u32>| AlignError::Cramped { places: self.middles(&faces) };
-        let mapped = match carry(&self.mapped.map.uv, whole)? {
-            Ok(mapped) => mapped,
-            Err(_) => {
-                // There may be a way by numbers that are nearer to the map.
-                let finer = self.quantized(Scale::Squares(VIA * whole.squares), observer)?;
-                let finer = carry(&self.mapped.map.uv, &finer)?.map_err(cramped)?;
-                self.unfolded(&finer)?;
-                carry(&finer.map.uv, whole)?.map_err(cramped)?
-            }
-        };
+        let from = &self.mapped.map.uv;
+        let mapped = map::smooth_integers(mesh, adjacency, lines, &self.charts, (from, &whole.uv), observer)?;
+        let mapped = mapped.map_err(cramped)?;
         self.unfolded(&mapped)?;
         let complex = embed::embed(mesh, adjacency, lines, &mapped.map).map_err(|e| match e {
             EmbedError::Crowded { face } => AlignError::Cramped { places: self.middles(&[face]) },

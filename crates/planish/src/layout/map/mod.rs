@@ -38,7 +38,7 @@ const LATTICE_BITS: i32 = 40;
 
 /// Softness of the barrier at the start of an attempt to untangle a map, against determinants of 1: what one does not
 /// untangle another mostly does.
-const SOFTNESS: [f64; 3] = [0.1, 1.0, 0.01];
+const SOFTNESS: [f64; 2] = [0.1, 0.01];
 
 /// A map of a mesh to the plane, triangle by triangle.
 ///

@@ -44,6 +44,10 @@ pub(super) fn untangle(
     for _ in 0..UNTANGLING_ROUNDS {
         let before = maps.barrier(&x, softness).0;
         let after = descend(maps, laplacian, free, softness, observer)?;
+        // Where no step was taken a harder barrier takes none either.
+        if softness > 0.0 && after >= before {
+            break;
+        }
         x = maps.seams.coordinates(free);
         least = maps.least_guarded(&x);
         if maps.is_spent() {
