@@ -36,8 +36,8 @@ use std::f64::consts::FRAC_PI_2;
 /// Steps of the lattice that a certified map lies on, in parts of its size: eight digits are left for sums.
 const LATTICE_BITS: i32 = 40;
 
-/// Softness of the barrier at the start of an attempt to untangle a map, against determinants of 1: what one does not
-/// untangle another mostly does.
+/// Softness of the barrier at the start of an attempt to untangle a map, against determinants of 1: what the first does
+/// not untangle the second may.
 const SOFTNESS: [f64; 2] = [0.1, 0.01];
 
 /// A map of a mesh to the plane, triangle by triangle.

@@ -44,7 +44,7 @@ pub(super) fn untangle(
     for _ in 0..UNTANGLING_ROUNDS {
         let before = maps.barrier(&x, softness).0;
         let after = descend(maps, laplacian, free, softness, observer)?;
-        // Where no step was taken a harder barrier takes none either.
+        // Where no step was taken the harder barriers of later rounds took none either, on all maps that were looked at.
         if softness > 0.0 && after >= before {
             break;
         }
