@@ -3,8 +3,9 @@
 
 use faer::linalg::solvers::SolveCore;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
-use faer::sparse::{SparseColMat, Triplet};
+use faer::sparse::{Argsort, Pair, SparseColMat, SymbolicSparseColMat, Triplet};
 use faer::{Conj, MatMut, Side};
+use std::sync::Arc;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
@@ -45,10 +46,17 @@ impl SparseCholesky {
         faer::set_global_parallelism(faer::Par::Seq);
         let entries: Vec<Triplet<usize, usize, f64>> = lower.iter().map(|&(r, c, v)| Triplet::new(r, c, v)).collect();
         let matrix = SparseColMat::try_new_from_triplets(n, n, &entries).map_err(|_| SparseError::Shape { n })?;
-        let symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower).map_err(|_| SparseError::Shape { n })?;
-        let factor = Llt::try_new_with_symbolic(symbolic, matrix.as_ref(), Side::Lower)
-            .map_err(|_| SparseError::NotPositive { n })?;
-        Ok(SparseCholesky { n, factor })
+        let order = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower).map_err(|_| SparseError::Shape { n })?;
+        SparseCholesky::of(n, &matrix, order)
+    }
+
+    fn of(
+        n: usize,
+        matrix: &SparseColMat<usize, f64>,
+        order: SymbolicLlt<usize>,
+    ) -> Result<SparseCholesky, SparseError> {
+        let factor = Llt::try_new_with_symbolic(order, matrix.as_ref(), Side::Lower);
+        Ok(SparseCholesky { n, factor: factor.map_err(|_| SparseError::NotPositive { n })? })
     }
 
     /// As [`SparseCholesky::factor`], but gives up with `None` as soon as `cancelled` says so. A large matrix is
@@ -60,22 +68,7 @@ impl SparseCholesky {
         lower: Vec<(usize, usize, f64)>,
         cancelled: &dyn Fn() -> bool,
     ) -> Option<Result<SparseCholesky, SparseError>> {
-        if n < WATCHED_SIZE {
-            return (!cancelled()).then(|| SparseCholesky::factor(n, &lower));
-        }
-        let (send, receive) = std::sync::mpsc::channel();
-        std::thread::spawn(move || {
-            // The receiver is gone after cancelling; nobody then wants the factor.
-            let _ = send.send(SparseCholesky::factor(n, &lower));
-        });
-        loop {
-            match receive.recv_timeout(WATCH_EVERY) {
-                Ok(result) => return Some(result),
-                Err(RecvTimeoutError::Timeout) if cancelled() => return None,
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return Some(Err(SparseError::NotPositive { n })),
-            }
-        }
+        watched(n, cancelled, move || SparseCholesky::factor(n, &lower))
     }
 
     /// Solves in place for `rhs.len() / n` right-hand sides stored one after the other.
@@ -83,6 +76,71 @@ impl SparseCholesky {
         assert_eq!(rhs.len() % self.n.max(1), 0, "right-hand sides of {} unknowns", self.n);
         let columns = rhs.len() / self.n.max(1);
         self.factor.solve_in_place_with_conj(Conj::No, MatMut::from_column_major_slice_mut(rhs, self.n, columns));
+    }
+}
+
+/// Where the entries of matrices lie, and the order of elimination: worked out once for all matrices that have them at the
+/// same places.
+pub struct SparsePattern {
+    n: usize,
+    places: SymbolicSparseColMat<usize>,
+    /// From entries as they are given to those places.
+    sorted: Argsort<usize>,
+    order: SymbolicLlt<usize>,
+}
+
+impl SparsePattern {
+    /// Of `n x n` matrices with entries at `lower` (`row >= column`); what is listed twice is summed.
+    /// # Errors
+    /// If an index is out of range.
+    pub fn new(n: usize, lower: impl Iterator<Item = (usize, usize)>) -> Result<SparsePattern, SparseError> {
+        let places: Vec<Pair<usize, usize>> = lower.map(|(r, c)| Pair::new(r, c)).collect();
+        let shape = |_| SparseError::Shape { n };
+        let (places, sorted) = SymbolicSparseColMat::try_new_from_indices(n, n, &places).map_err(shape)?;
+        let order = SymbolicLlt::try_new(places.as_ref(), Side::Lower).map_err(|_| SparseError::Shape { n })?;
+        Ok(SparsePattern { n, places, sorted, order })
+    }
+
+    /// Factors the matrix with these values, in the order in which the places were listed, and gives up with `None` as
+    /// [`SparseCholesky::factor_watched`].
+    /// # Errors
+    /// If there are more or fewer values than places, or the matrix is not positive definite.
+    pub fn factor_watched(
+        self: &Arc<SparsePattern>,
+        values: Vec<f64>,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Option<Result<SparseCholesky, SparseError>> {
+        let (n, pattern) = (self.n, self.clone());
+        watched(n, cancelled, move || {
+            // Two threads make faer's sparse factorisation several times slower.
+            faer::set_global_parallelism(faer::Par::Seq);
+            let matrix = SparseColMat::new_from_argsort(pattern.places.clone(), &pattern.sorted, &values);
+            SparseCholesky::of(n, &matrix.map_err(|_| SparseError::Shape { n })?, pattern.order.clone())
+        })
+    }
+}
+
+/// What `factor` makes of a matrix of `n` unknowns, or `None` as soon as `cancelled` says so.
+fn watched(
+    n: usize,
+    cancelled: &dyn Fn() -> bool,
+    factor: impl FnOnce() -> Result<SparseCholesky, SparseError> + Send + 'static,
+) -> Option<Result<SparseCholesky, SparseError>> {
+    if n < WATCHED_SIZE {
+        return (!cancelled()).then(factor);
+    }
+    let (send, receive) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        // The receiver is gone after cancelling; nobody then wants the factor.
+        let _ = send.send(factor());
+    });
+    loop {
+        match receive.recv_timeout(WATCH_EVERY) {
+            Ok(result) => return Some(result),
+            Err(RecvTimeoutError::Timeout) if cancelled() => return None,
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return Some(Err(SparseError::NotPositive { n })),
+        }
     }
 }
 
@@ -101,6 +159,22 @@ mod tests {
         }
         let r = [4.0 * x[3] + x[4] - 4.0, x[3] + 3.0 * x[4] + x[5] - 1.0, x[4] + 5.0 * x[5]];
         assert!(r.iter().all(|r| r.abs() < 1e-14));
+    }
+
+    #[test]
+    fn one_pattern_serves_two_matrices_and_sums_what_is_listed_twice() {
+        let places = [(0, 0), (1, 1), (1, 0), (0, 0)];
+        let pattern = Arc::new(SparsePattern::new(2, places.into_iter()).unwrap());
+        for (values, x) in [([1.0, 3.0, 1.0, 3.0], [7.0, 9.0]), ([2.0, 5.0, -1.0, 0.0], [1.0, 2.0])] {
+            let factor = pattern.factor_watched(values.to_vec(), &|| false).unwrap().unwrap();
+            let [a, b, c] = [values[0] + values[3], values[1], values[2]];
+            let mut rhs = [a * x[0] + c * x[1], c * x[0] + b * x[1]];
+            factor.solve(&mut rhs);
+            assert!(rhs.iter().zip(x).all(|(got, want)| (got - want).abs() < 1e-14));
+        }
+        assert!(pattern.factor_watched(vec![1.0; 3], &|| false).unwrap().is_err());
+        assert!(pattern.factor_watched(vec![1.0; 4], &|| true).is_none());
+        assert!(SparsePattern::new(2, [(2, 0)].into_iter()).is_err());
     }
 
     #[test]

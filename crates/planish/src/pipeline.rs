@@ -510,6 +510,7 @@ fn surfaces_through(
         // What crosses the plane is its own image only with knots that are.
         fit.knots = KnotSpacing::Even;
     }
+    let stitch = StitchParams { smoothing: fit.smoothing, ..params.stitch.clone() };
     let mut fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &fit, o), control)?;
     // Seams are smoothed between images already, and what that takes from their symmetry is given back.
     symmetric(true, &mut fitted);
@@ -517,7 +518,7 @@ fn surfaces_through(
         "seams",
         |o| match params.fit.continuity {
             Continuity::C0 => Ok(fitted.clone()),
-            Continuity::G1 | Continuity::G1Double => surface::stitch(network, grids, &fitted, &params.stitch, o),
+            Continuity::G1 | Continuity::G1Double => surface::stitch(network, grids, &fitted, &stitch, o),
         },
         |_| [("curves", network.curves.len())],
     )?;

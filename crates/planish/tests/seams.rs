@@ -226,6 +226,61 @@ fn seams_of_every_direction_and_valence_keep_their_bound() {
     }
 }
 
+#[test]
+fn moves_that_cost_their_bends_bend_a_fifth_as_much_and_seams_keep_the_tolerance_in_the_rms() {
+    // Waves of .4 % of the size, shorter than a knot span.
+    let rough = |p: DVec3| {
+        let b = blob(p);
+        let wave = |a: f64| ((b.x * 91.7 + b.y * 57.3 + b.z * 77.1 + a) * 13.0).sin();
+        b + 0.004 * DVec3::new(wave(0.0), wave(1.7), wave(2.9))
+    };
+    let work = cube(41, CurveKind::Smooth, rough);
+    let fit = FitParams { smoothing: 0.01, ..params(10, Continuity::G1) };
+    let found = [0.0, 0.01].map(|smoothing| {
+        let [before, after] = both(&work, &fit, &StitchParams { smoothing, ..StitchParams::default() });
+        let bends: f64 = before.iter().zip(&after).map(|(b, a)| bends(b, a)).sum();
+        (bends, angles(&work, &after))
+    });
+    assert!(found[1].0 < 0.2 * found[0].0, "{found:?}");
+    assert!(found[1].1[0] < 0.05, "{found:?}");
+}
+
+#[test]
+fn patches_that_lost_more_than_their_share_do_not_take_the_smoothness_of_others() {
+    // A wavy sheet of 8 x 2 patches; rough waves rise in its last two columns.
+    let rough = |x: f64, y: f64| 0.1 * (12.0 * x).sin() * (10.8 * y).cos() * (x - 6.0).max(0.0).powi(2);
+    let height = |x: f64, y: f64| 0.05 * (8.0 * x + 0.3).sin() * (6.4 * y).cos() + rough(x, y);
+    let work = sheet(8, 2, [false, false], [33, 33], |x, y| DVec3::new(x, y, height(x, y)));
+    let is_away = |s: &SeamQuality| {
+        let beside = work.network.patches.iter().enumerate();
+        beside.filter(|(_, p)| p.sides.iter().any(|side| side.curve == s.curve)).all(|(p, _)| p % 8 < 5)
+    };
+    let stitch = StitchParams { fit_loss: 0.01, ..StitchParams::default() };
+    let most = both(&work, &params(8, Continuity::G1), &stitch).map(|surfaces| {
+        let away = seams(&work, &surfaces).into_iter().filter(is_away);
+        away.map(|s| s.angle_max_deg).fold(0.0, f64::max)
+    });
+    assert!(most[0] > 2.0 && most[1] <= 0.05, "{most:?} degrees");
+}
+
+/// Sum of the squares of the second differences of what control points moved, along rows and columns.
+fn bends(before: &Surface, after: &Surface) -> f64 {
+    let (m, n) = (before.cols, before.rows);
+    let moved = |i: usize, j: usize| after.at(i, j) - before.at(i, j);
+    let mut sum = 0.0;
+    for j in 0..n {
+        for i in 0..m {
+            if i > 0 && i + 1 < m {
+                sum += (moved(i - 1, j) - 2.0 * moved(i, j) + moved(i + 1, j)).length_squared();
+            }
+            if j > 0 && j + 1 < n {
+                sum += (moved(i, j - 1) - 2.0 * moved(i, j) + moved(i, j + 1)).length_squared();
+            }
+        }
+    }
+    sum
+}
+
 /// Two wavy sheets that meet along `x = 1` at an angle of `2 atan(slope)`, along a seam that is called smooth.
 fn hidden_edge(slope: f64) -> Patchwork {
     let wave = |x: f64, y: f64| 0.02 * (11.0 * x).sin() * (9.0 * y).cos();

@@ -8,4 +8,4 @@ pub(crate) mod small_cholesky;
 pub use banded_cholesky::{Banded, BandedCholesky};
 pub use dense::solve_dense;
 pub(crate) use eigen3::eigen3;
-pub use planish_sparse::{SparseCholesky, SparseError};
+pub use planish_sparse::{SparseCholesky, SparseError, SparsePattern};

@@ -169,11 +169,16 @@ pub(crate) struct Directions(BTreeMap<Layout, Direction>);
 impl Directions {
     /// Of these layouts, from both ends.
     pub fn new(layouts: impl Iterator<Item = Layout>) -> Result<Directions, FitError> {
+        Directions::smoothed(layouts, 0.0)
+    }
+
+    /// The same with a weight of bends.
+    pub fn smoothed(layouts: impl Iterator<Item = Layout>, smoothing: f64) -> Result<Directions, FitError> {
         let mut map = BTreeMap::new();
         for (count, knots) in layouts {
             for knots in [knots.reversed(), knots] {
                 if !map.contains_key(&(count, knots.clone())) {
-                    let direction = Direction::new(count, &knots, 0.0)?;
+                    let direction = Direction::new(count, &knots, smoothing)?;
                     map.insert((count, knots), direction);
                 }
             }

@@ -17,6 +17,11 @@ pub struct StitchParams {
     /// Share by which the RMS and the largest distance of the fit may grow for the seams' sake.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub fit_loss: f64,
+    /// Weight of the bends of moves beside their squares: that which the fit had for its own
+    /// ([`crate::surface::FitParams::smoothing`]). Without it seams are left with waves beside them on what spans do not follow.
+    #[serde(skip)]
+    #[schemars(skip)]
+    pub smoothing: f64,
     /// Read from models of earlier versions, and not used.
     #[serde(skip_serializing)]
     #[schemars(skip)]
@@ -26,7 +31,7 @@ pub struct StitchParams {
 impl Default for StitchParams {
     /// .05 degrees, which reflections do not show; a degree for sharp seams; a tenth.
     fn default() -> StitchParams {
-        StitchParams { angle_tolerance: 0.05, sharp_tolerance: 1.0, fit_loss: 0.1, stiffness: None }
+        StitchParams { angle_tolerance: 0.05, sharp_tolerance: 1.0, fit_loss: 0.1, smoothing: 0.0, stiffness: None }
     }
 }
 

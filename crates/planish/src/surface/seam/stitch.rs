@@ -101,7 +101,9 @@ fn solved(
         let (found, wanted) = (held.len(), network.patches.len());
         return Err(FitError::Count { what: "surfaces", found, wanted });
     }
-    let Some(work) = Work::new(network, grids, surfaces, stay, held)? else { return Ok(surfaces.to_vec()) };
+    let Some(work) = Work::new(network, grids, surfaces, stay, held, params.smoothing)? else {
+        return Ok(surfaces.to_vec());
+    };
     observer.check()?;
     let before: Vec<usize> = surfaces.par_iter().zip(grids).map(|(s, g)| folds(s, g)).collect();
     // No place may be farther off than the farthest of the fit and, on top, the same share of it as moves have of all misses.
@@ -135,7 +137,7 @@ fn solved(
     observer.progress(0.2);
     let allowed: Vec<f64> =
         (0..filled.len()).into_par_iter().map(|p| farthest(&filled[p].surface, &grids[p]).max(allowed)).collect();
-    let mut system = System::new(&work, &filled, &curves, params);
+    let mut system = System::new(&work, &filled, &curves, params)?;
     for easing in 0..=EASINGS {
         system.settle(observer)?;
         let made: Vec<Surface> = (0..filled.len()).into_par_iter().map(|p| system.surface(p)).collect();
@@ -145,11 +147,10 @@ fn solved(
         };
         let worse: Vec<usize> = work.free().filter(is_worse).collect();
         observer.progress(0.2 + 0.8 * (easing + 1) as f64 / (EASINGS + 1) as f64);
-        if worse.is_empty() || easing == EASINGS {
+        if worse.is_empty() || easing == EASINGS || !system.ease(&worse) {
             observer.progress(1.0);
             return Ok(made);
         }
-        system.ease(&worse);
     }
     unreachable!("the last easing returns")
 }

@@ -3,10 +3,10 @@
 /// Normal equations of a few unknowns.
 pub(crate) struct Sums {
     /// The unknowns, rising.
-    pub unknowns: Vec<usize>,
-    /// Lower triangle of a square matrix, row-major.
-    pub matrix: Vec<f64>,
-    pub rhs: Vec<f64>,
+    unknowns: Vec<usize>,
+    /// Lower triangle, row after row.
+    pub lower: Vec<f64>,
+    rhs: Vec<f64>,
 }
 
 impl Sums {
@@ -14,7 +14,7 @@ impl Sums {
         unknowns.sort_unstable();
         unknowns.dedup();
         let n = unknowns.len();
-        Sums { unknowns, matrix: vec![0.0; n * n], rhs: vec![0.0; n] }
+        Sums { unknowns, lower: vec![0.0; n * (n + 1) / 2], rhs: vec![0.0; n] }
     }
 
     /// The number of an unknown among these.
@@ -22,17 +22,23 @@ impl Sums {
         self.unknowns.partition_point(|&u| u < unknown)
     }
 
+    /// Adds at a row and a column (ranks, the column at most the row).
     pub fn add(&mut self, row: usize, column: usize, value: f64) {
-        self.matrix[row * self.rhs.len() + column] += value;
+        self.lower[row * (row + 1) / 2 + column] += value;
     }
 
-    pub fn done(self) -> Terms {
-        let n = self.rhs.len();
-        let lower = (0..n).flat_map(|a| (0..=a).map(move |b| (a, b)));
-        let lower = lower.map(|(a, b)| (self.unknowns[a], self.unknowns[b], self.matrix[a * n + b])).collect();
-        (lower, self.unknowns.iter().copied().zip(self.rhs.iter().copied()).collect())
+    /// Adds on the right side, at a rank.
+    pub fn add_right(&mut self, row: usize, value: f64) {
+        self.rhs[row] += value;
+    }
+
+    /// Row and column of every entry of `lower`, as unknowns.
+    pub fn places(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.unknowns.iter().enumerate().flat_map(|(rank, &a)| self.unknowns[..=rank].iter().map(move |&b| (a, b)))
+    }
+
+    /// The right side by unknowns.
+    pub fn right(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.unknowns.iter().copied().zip(self.rhs.iter().copied())
     }
 }
-
-/// What a part adds to the normal equations: lower triangle and right side.
-pub(crate) type Terms = (Vec<(usize, usize, f64)>, Vec<(usize, f64)>);

@@ -1,14 +1,16 @@
 //! The system: what moves cost the fit and what is left of the angles, minimised together by Gauss-Newton.
 
+use super::bend::Side;
 use super::motion::{Motion, holds, motions, terms};
 use super::params::StitchParams;
 use super::ring::Condensed;
-use super::sums::{Sums, Terms};
-use super::wish::{FIRST_WEIGHT, Turn, Wish, wishes};
+use super::sums::Sums;
+use super::wish::{FIRST_WEIGHT, Wish, wishes};
 use super::work::{Filled, Work, shape};
-use crate::linalg::SparseCholesky;
+use crate::linalg::SparsePattern;
 use crate::observe::{Cancelled, Observer};
 use crate::surface::fit::{solve_inside, surface_of};
+use crate::surface::sides::side_len;
 use crate::surface::{FitError, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -49,12 +51,19 @@ pub(crate) struct System<'a> {
     /// For each patch the squared move that it can afford, times its nodes.
     afford: Vec<f64>,
     share: f64,
-    /// For each unknown one over the square of the move that is as long as the way to the next row of control points.
-    holds: Vec<f64>,
+    /// Where the entries of the normal equations lie: holds, patches and seams, one after the other.
+    pattern: Arc<SparsePattern>,
+    /// Those of holds and patches, which stay as they are.
+    fit_values: Vec<f64>,
 }
 
 impl<'a> System<'a> {
-    pub fn new(work: &'a Work<'a>, filled: &'a [Filled], curves: &[Vec<DVec3>], params: &StitchParams) -> System<'a> {
+    pub fn new(
+        work: &'a Work<'a>,
+        filled: &'a [Filled],
+        curves: &[Vec<DVec3>],
+        params: &StitchParams,
+    ) -> Result<System<'a>, FitError> {
         let shapes: BTreeMap<_, _> = (0..filled.len()).map(|p| (shape(work, p), p)).collect();
         let one = |(shape, p): (_, usize)| {
             let [along_u, along_v] = work.along(p);
@@ -64,11 +73,18 @@ impl<'a> System<'a> {
         let condensed: Vec<Arc<Condensed>> = (0..filled.len()).map(|p| condensed[&shape(work, p)].clone()).collect();
         let (unknowns, motions) = motions(work, filled, curves);
         let nets = filled.iter().map(|f| f.surface.control.clone()).collect();
-        let afford = (0..filled.len()).map(|p| work.afford(p)).collect();
+        let afford: Vec<f64> = (0..filled.len()).map(|p| work.afford(p)).collect();
         let share = (1.0 + params.fit_loss).powi(2) - 1.0;
-        let holds = holds(filled, unknowns, &motions);
+        let fits: Vec<Sums> =
+            (0..filled.len()).into_par_iter().map(|p| fit_sums(&condensed[p], &motions[p], afford[p])).collect();
         let wishes = wishes(work, curves, params);
-        System { work, filled, condensed, unknowns, motions, wishes, nets, afford, share, holds }
+        let turned: Vec<Sums> = wishes.iter().map(|wish| turned(wish, &motions)).collect();
+        let places = (0..unknowns).map(|k| (k, k)).chain(fits.iter().chain(&turned).flat_map(Sums::places));
+        let pattern = SparsePattern::new(unknowns, places).map_err(|_| FitError::Unsolvable { unknowns })?;
+        let holds = holds(filled, unknowns, &motions).into_iter().map(|hold| HOLD * hold);
+        let fit_values = holds.chain(fits.iter().flat_map(|sums| sums.lower.iter().copied())).collect();
+        let pattern = Arc::new(pattern);
+        Ok(System { work, filled, condensed, unknowns, motions, wishes, nets, afford, share, pattern, fit_values })
     }
 
     /// Moves of the outer control points of a patch.
@@ -87,17 +103,23 @@ impl<'a> System<'a> {
         if !self.counts(p) {
             return 0.0;
         }
-        let condensed = &self.condensed[p];
-        let moves = self.moves(p);
-        let row = |r: usize| moves[r].dot(condensed.row(r).iter().zip(&moves).map(|(k, m)| *m * *k).sum());
-        (0..moves.len()).map(row).sum::<f64>() / self.afford[p]
+        let [along_u, along_v] = self.work.along(p);
+        let from = &self.filled[p].surface.control;
+        let none = vec![DVec3::ZERO; from.len()];
+        let mut moves: Vec<DVec3> = self.nets[p].iter().zip(from).map(|(to, from)| *to - *from).collect();
+        solve_inside(&mut moves, &none, along_u, along_v, 2);
+        self.work.loss(p, &moves) / self.afford[p]
+    }
+
+    fn costs(&self) -> Vec<f64> {
+        (0..self.nets.len()).into_par_iter().map(|p| self.cost(p)).collect()
     }
 
     /// Squared move of the whole over what it can afford.
-    fn spent(&self) -> f64 {
-        let costs: Vec<f64> = (0..self.nets.len()).into_par_iter().map(|p| self.cost(p) * self.afford[p]).collect();
+    fn spent(&self, costs: &[f64]) -> f64 {
         let afford: f64 = (0..self.nets.len()).filter(|&p| self.counts(p)).map(|p| self.afford[p]).sum();
-        if afford > 0.0 { costs.iter().sum::<f64>() / afford } else { 0.0 }
+        let lost: f64 = costs.iter().zip(&self.afford).map(|(cost, afford)| cost * afford).sum();
+        if afford > 0.0 { lost / afford } else { 0.0 }
     }
 
     /// Solves until all seams meet the tolerance or none can be raised further.
@@ -112,22 +134,16 @@ impl<'a> System<'a> {
                 wish.aims = wish.own.is_empty() && wish.angles(&self.nets, &self.work.means).0 > AIMED;
             }
             self.step(observer)?;
-            let costs: Vec<f64> = (0..self.nets.len()).into_par_iter().map(|p| self.cost(p)).collect();
+            let costs = self.costs();
             let found: Vec<(f64, f64)> =
                 self.wishes.par_iter().map(|w| w.angles(&self.nets, &self.work.means)).collect();
             let mut raised = false;
-            let spent = self.spent() >= self.share;
+            let spent = self.spent(&costs) >= self.share;
             for (wish, (most, squares)) in self.wishes.iter_mut().zip(found) {
                 let rms = (squares / wish.samples.len() as f64).sqrt();
                 let missed = most > wish.tolerance || rms > RMS_SHARE * wish.tolerance;
                 // A seam that turns far may fold its patches over; it does not get more than they can afford.
-                let bound = if spent {
-                    0.0
-                } else if wish.aims {
-                    self.share
-                } else {
-                    LOCAL * self.share
-                };
+                let bound = if spent || wish.aims { self.share } else { LOCAL * self.share };
                 let helps = wish.weight < 1.0 || most.max(rms) < HELPS * wish.last;
                 if missed && helps && wish.weight < wish.ceiling && wish.sides.iter().all(|s| costs[s.patch] < bound) {
                     wish.weight = (wish.weight * RAISE).min(wish.ceiling);
@@ -140,13 +156,15 @@ impl<'a> System<'a> {
                 break;
             }
         }
-        // The last raises may have cost more than there was.
+        // The last raises may have cost more than there was: patches that lost more than their share give some back.
         for _ in 0..ROUNDS {
-            if self.spent() <= self.share {
+            let costs = self.costs();
+            if self.spent(&costs) <= self.share {
                 break;
             }
             observer.check()?;
-            for wish in &mut self.wishes {
+            let share = self.share;
+            for wish in self.wishes.iter_mut().filter(|w| w.sides.iter().any(|s| costs[s.patch] > share)) {
                 wish.weight /= RAISE.sqrt();
             }
             self.step(observer)?;
@@ -156,21 +174,16 @@ impl<'a> System<'a> {
 
     /// One round of Gauss-Newton.
     fn step(&mut self, observer: &dyn Observer) -> Result<(), FitError> {
-        let patches: Vec<Terms> = (0..self.nets.len()).into_par_iter().map(|p| self.fit_terms(p)).collect();
-        let seams: Vec<Terms> = self.wishes.par_iter().map(|w| self.seam_terms(w)).collect();
-        let mut lower = Vec::new();
+        let forces: Vec<_> = (0..self.nets.len()).into_par_iter().map(|p| self.fit_forces(p)).collect();
+        let seams: Vec<Sums> = self.wishes.par_iter().map(|w| self.seam_sums(w)).collect();
         let mut rhs = vec![0.0; self.unknowns];
-        for (k, hold) in self.holds.iter().enumerate() {
-            lower.push((k, k, HOLD * hold));
+        for (k, force) in forces.into_iter().flatten().chain(seams.iter().flat_map(Sums::right)) {
+            rhs[k] += force;
         }
-        for (matrix, side) in patches.into_iter().chain(seams) {
-            lower.extend(matrix);
-            side.into_iter().for_each(|(k, value)| rhs[k] += value);
-        }
-        let unknowns = self.unknowns;
-        let factor = SparseCholesky::factor_watched(unknowns, lower, &|| observer.cancelled()).ok_or(Cancelled)?;
-        let factor = factor.map_err(|_| FitError::Unsolvable { unknowns })?;
-        factor.solve(&mut rhs);
+        let seams = seams.iter().flat_map(|sums| &sums.lower);
+        let values = self.fit_values.iter().chain(seams).copied().collect();
+        let factor = self.pattern.factor_watched(values, &|| observer.cancelled()).ok_or(Cancelled)?;
+        factor.map_err(|_| FitError::Unsolvable { unknowns: self.unknowns })?.solve(&mut rhs);
         for (net, motions) in self.nets.iter_mut().zip(&self.motions) {
             for (place, motion) in net.iter_mut().zip(motions) {
                 *place = terms(motion).fold(*place, |at, (k, way)| at + way * rhs[k]);
@@ -179,76 +192,57 @@ impl<'a> System<'a> {
         Ok(())
     }
 
-    /// The part of the normal equations that one patch adds.
-    fn fit_terms(&self, p: usize) -> Terms {
-        let (condensed, motions) = (&self.condensed[p], &self.motions[p]);
-        let all = condensed.outer.iter().flat_map(|&c| terms(&motions[c])).map(|(k, _)| k);
-        let mut sums = Sums::new(all.collect());
-        let ranked: Vec<Vec<(usize, DVec3)>> = condensed
-            .outer
-            .iter()
-            .map(|&c| terms(&motions[c]).map(|(k, way)| (sums.rank(k), way / self.afford[p].sqrt())).collect())
-            .collect();
-        let moves: Vec<DVec3> = self.moves(p).into_iter().map(|m| m / self.afford[p].sqrt()).collect();
-        let mut row = Vec::new();
-        for (r, own) in ranked.iter().enumerate().filter(|(_, own)| !own.is_empty()) {
-            row.clear();
-            row.extend_from_slice(condensed.row(r));
-            let force: DVec3 = moves.iter().zip(&row).map(|(m, k)| *m * *k).sum();
-            for &(a, way) in own {
-                sums.rhs[a] -= way.dot(force);
-                for (others, k) in ranked.iter().zip(&row) {
-                    for &(b, other) in others.iter().filter(|(b, _)| *b <= a) {
-                        sums.add(a, b, k * way.dot(other));
-                    }
-                }
-            }
-        }
-        sums.done()
+    /// What the fit of a patch adds to the right side.
+    fn fit_forces(&self, p: usize) -> Vec<(usize, f64)> {
+        let (condensed, moves) = (&self.condensed[p], self.moves(p));
+        let row = |(r, &c): (usize, &usize)| {
+            let mut terms = terms(&self.motions[p][c]).peekable();
+            let weighed = condensed.row(r).iter().zip(&moves).map(|(k, m)| *m * *k);
+            let force = terms.peek().map_or(DVec3::ZERO, |_| weighed.sum::<DVec3>() / self.afford[p]);
+            terms.map(move |(k, way)| (k, -way.dot(force)))
+        };
+        condensed.outer.iter().enumerate().flat_map(row).collect()
     }
 
-    fn seam_terms(&self, wish: &Wish) -> Terms {
+    /// What the angles along a seam add.
+    fn seam_sums(&self, wish: &Wish) -> Sums {
+        let mut sums = turned(wish, &self.motions);
         let scale = wish.weight / 2.0 / (wish.samples.len() as f64 * wish.tolerance.powi(2));
         let turns = |s: usize| match wish.aims {
             true => wish.aims(&self.nets, &self.work.means, s),
             false => wish.turn(&self.nets, &self.work.means, s).into_iter().collect(),
         };
-        let turns: Vec<Turn> = match scale > 0.0 {
-            true => (0..wish.samples.len()).flat_map(turns).filter(|t| t.trust > 0.0).collect(),
-            false => Vec::new(),
-        };
-        let rows: Vec<Vec<(usize, f64)>> = turns
-            .iter()
-            .map(|turn| {
-                let parts = turn.gradient.iter();
-                parts
-                    .flat_map(|&(p, c, gradient)| {
-                        terms(&self.motions[p][c]).map(move |(k, way)| (k, gradient.dot(way)))
-                    })
-                    .collect()
-            })
-            .collect();
-        let mut sums = Sums::new(rows.iter().flatten().map(|&(k, _)| k).collect());
-        for (turn, row) in turns.iter().zip(&rows) {
+        for turn in (0..wish.samples.len()).flat_map(turns).filter(|t| scale > 0.0 && t.trust > 0.0) {
             let weight = scale * turn.trust;
-            let row: Vec<(usize, f64)> = row.iter().map(|&(k, x)| (sums.rank(k), x)).collect();
+            let moved = turn
+                .gradient
+                .iter()
+                .flat_map(|&(p, c, gradient)| terms(&self.motions[p][c]).map(move |(k, way)| (k, gradient.dot(way))));
+            let row: Vec<(usize, f64)> = moved.map(|(k, x)| (sums.rank(k), x)).collect();
             for &(a, x) in &row {
-                sums.rhs[a] -= weight * x * turn.angle;
+                sums.add_right(a, -weight * x * turn.angle);
                 row.iter().filter(|(b, _)| *b <= a).for_each(|&(b, y)| sums.add(a, b, weight * x * y));
             }
         }
-        sums.done()
+        sums
     }
 
-    /// Lowers the weights around some patches, and starts there anew.
-    pub fn ease(&mut self, patches: &[usize]) {
+    /// Lowers the weights around some patches, and starts anew; false if these are as low as they get.
+    pub fn ease(&mut self, patches: &[usize]) -> bool {
+        let mut lowered = false;
         for wish in self.wishes.iter_mut().filter(|w| w.sides.iter().any(|s| patches.contains(&s.patch))) {
-            wish.ceiling = (wish.weight.min(1.0) * EASE).max(LEAST_WEIGHT);
+            let ceiling = (wish.weight.min(1.0) * EASE).max(LEAST_WEIGHT);
+            lowered |= ceiling < wish.ceiling;
+            wish.ceiling = ceiling;
+        }
+        if !lowered {
+            return false;
         }
         for wish in &mut self.wishes {
             (wish.weight, wish.last) = (FIRST_WEIGHT.min(wish.ceiling), f64::INFINITY);
         }
         self.nets = self.filled.iter().map(|f| f.surface.control.clone()).collect();
+        true
     }
 
     /// The surface of a patch with its inside fitted again.
@@ -261,4 +255,35 @@ impl<'a> System<'a> {
         solve_inside(&mut net, &self.filled[p].projection, along_u, along_v, 2);
         surface_of(net, along_u, along_v)
     }
+}
+
+/// What the squared moves of a patch add, over what it can afford.
+fn fit_sums(condensed: &Condensed, motions: &[Motion], afford: f64) -> Sums {
+    let moved = |&c: &usize| terms(&motions[c]);
+    let mut sums = Sums::new(condensed.outer.iter().flat_map(moved).map(|(k, _)| k).collect());
+    let ranked: Vec<Vec<(usize, DVec3)>> = condensed
+        .outer
+        .iter()
+        .map(|c| moved(c).map(|(k, way)| (sums.rank(k), way / afford.sqrt())).collect())
+        .collect();
+    for (r, own) in ranked.iter().enumerate() {
+        for &(a, way) in own {
+            for (others, k) in ranked.iter().zip(condensed.row(r)) {
+                for &(b, other) in others.iter().filter(|(b, _)| *b <= a) {
+                    sums.add(a, b, k * way.dot(other));
+                }
+            }
+        }
+    }
+    sums
+}
+
+/// Sums, empty yet, of all that turns the planes beside a seam.
+fn turned(wish: &Wish, motions: &[Vec<Motion>]) -> Sums {
+    let rows = |side: &Side| -> Vec<usize> {
+        let along = 0..side_len(side.rows, side.cols, side.side);
+        let nodes = along.flat_map(|i| [side.node(i, 0), side.node(i, 1)]);
+        nodes.flat_map(|c| terms(&motions[side.patch][c])).map(|(k, _)| k).collect()
+    };
+    Sums::new(wish.sides.iter().flat_map(rows).collect())
 }

@@ -31,7 +31,9 @@ pub(crate) struct Work<'a> {
     /// Points of the grids along every curve, and its knots.
     pub nodes: Vec<usize>,
     pub knots: Vec<Knots>,
+    /// With the bends of moves, and without.
     pub directions: Directions,
+    plain: Directions,
     pub means: Vec<MeanNormals>,
     /// Curves as fitted, and the planes at their ends.
     pub fitted: Vec<Vec<DVec3>>,
@@ -55,12 +57,14 @@ pub(crate) struct Filled {
 impl<'a> Work<'a> {
     /// `None` if no two patches meet.
     /// * `before`, `held` - smoothed surfaces and which of them stay; as many as patches
+    /// * `smoothing` - weight of the bends of moves
     pub fn new(
         network: &'a Network,
         grids: &'a [Grid],
         surfaces: &'a [Surface],
         before: &'a [Surface],
         held: Vec<bool>,
+        smoothing: f64,
     ) -> Result<Option<Work<'a>>, FitError> {
         let nodes = check_grids(network, grids)?;
         let shapes: Vec<_> = surfaces.iter().map(|s| (s.rows, s.cols, s.control.len())).collect();
@@ -90,7 +94,7 @@ impl<'a> Work<'a> {
         let smooth = |c: usize, end: usize| is_smooth(&network.curves[c]) && meets.is_smooth(c, end as f64);
         let rounded = roundings(network, grids, &means, &breaks);
         let planes = planes(network, [surfaces, before], &held, &means, &fitted, &smooth);
-        let directions = Directions::new(layouts)?;
+        let [directions, plain] = [smoothing, 0.0].map(|weight| Directions::smoothed(layouts.clone(), weight));
         Ok(Some(Work {
             network,
             grids,
@@ -98,7 +102,8 @@ impl<'a> Work<'a> {
             uses,
             nodes,
             knots,
-            directions,
+            directions: directions?,
+            plain: plain?,
             means,
             fitted,
             planes,
@@ -167,6 +172,13 @@ impl<'a> Work<'a> {
     pub fn along(&self, patch: usize) -> [&Direction; 2] {
         let (shape, grid) = (&self.network.patches[patch], &self.grids[patch]);
         patch_directions(shape, grid, &self.directions, &self.knots)
+    }
+
+    /// What moves of all control points of a patch cost its fit: the sum of the squares of what its nodes move.
+    pub fn loss(&self, patch: usize, moves: &[DVec3]) -> f64 {
+        let (shape, grid) = (&self.network.patches[patch], &self.grids[patch]);
+        let [along_u, along_v] = patch_directions(shape, grid, &self.plain, &self.knots);
+        project_net(moves, along_u, along_v).iter().zip(moves).map(|(a, b)| a.dot(*b)).sum()
     }
 
     /// A side of a patch as its curve sees it.
