@@ -174,20 +174,9 @@ fn broken_maps_are_told_in_one_line_with_a_hint() {
     told("patch_0000.exr: ");
     std::fs::write(at("patch_0000.exr"), "no image at all").unwrap();
     told("patch_0000.exr: ");
-    let odd = |edit: &dyn Fn(&mut PatchMap)| {
-        let mut all = all.clone();
-        edit(&mut all[1]);
-        write_maps(
-            folder.path(),
-            &all,
-            &[],
-            &packed(&all, &params),
-            &pair.surfaces,
-            &options(params.clone(), MapFile::Exr),
-        )
-        .unwrap();
-    };
-    odd(&|m| m.values[5] = f32::NAN);
+    // As another program may have left it.
+    let pixel = |x: usize, y: usize| if [x, y] == [1, 8] { (0.0, f32::NAN, 0.0) } else { (0.0, 0.0, 0.0) };
+    exr::prelude::write_rgb_file(at("patch_0001.exr"), 17, 9, pixel).unwrap();
     told("pixel 1, 8 is NaN, not a finite number");
     let text = std::fs::read_to_string(at("relief.json")).unwrap();
     for (from, to, words) in [
@@ -210,6 +199,26 @@ fn broken_maps_are_told_in_one_line_with_a_hint() {
     let heights = made(&pair, &scalar);
     write_maps(folder.path(), &heights, &[], &sheet, &pair.surfaces, &options(params.clone(), MapFile::Exr)).unwrap();
     told("it has 1 channel, not 3");
+}
+
+#[test]
+fn displacements_beyond_numbers_of_32_bits_are_not_written() {
+    let mut pair = pair();
+    let folder = folder();
+    let params = MapParams::default();
+    let write = |pair: &Pair| {
+        let all = made(pair, &params);
+        let options = options(params.clone(), MapFile::Exr);
+        write_maps(folder.path().join("o"), &all, &[], &packed(&all, &params), &pair.surfaces, &options)
+    };
+    pair.reliefs[1].vectors[7] *= 1e300;
+    let text = write(&pair).unwrap_err().to_string();
+    assert!(text.contains("(patch 1)") && text.contains(" - hint: ") && !folder.path().join("o").exists(), "{text}");
+    // The largest that there are have a length that is told all the same.
+    pair.reliefs[1].vectors[7] = DVec3::new(1e38, 0.0, 0.0);
+    write(&pair).unwrap();
+    let largest = read_maps(folder.path().join("o")).unwrap().sidecar.largest;
+    assert!((largest / 1e38 - 1.0).abs() < 1e-6, "{largest}");
 }
 
 #[test]

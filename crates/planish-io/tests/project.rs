@@ -266,6 +266,16 @@ fn newer_schema_other_programs_truncated_and_damaged_files_are_refused_with_a_hi
     sql("UPDATE mesh SET triangles = points", "(array 1)");
     sql("DROP TABLE grid", "the database is damaged or in use");
     sql("UPDATE network SET json = replace(json, '\"curve\":0', '\"curve\":77')", "names a curve that is not there");
+    for knot in [-1.0, 0.1, 3.0, f64::NAN] {
+        let mut model = model(4);
+        model.surfaces[3].knots_u[5] = knot;
+        write_model(folder.path().join("d.planish"), &model).unwrap();
+        let message = read_model(folder.path().join("d.planish")).map(|_| knot).unwrap_err().to_string();
+        assert!(
+            message.contains("its knots are not clamped and rising from 0 to 1") && message.contains("(surface 3)"),
+            "{message}"
+        );
+    }
     assert!(matches!(read_model(folder.path()), Err(ProjectError::Io(_))));
     assert!(matches!(read_model(folder.path().join("none")), Err(ProjectError::Io(_))));
 }

@@ -114,7 +114,8 @@ fn image_name(sheet: &Sheet, image: usize, file: MapFile, attribute: Option<&str
 /// * `attributes` - maps of vertex attributes with their names, of the same shapes
 ///
 /// # Errors
-/// `WriteError::Nothing` without maps; `WriteError::Inconsistent` if maps and sheet do not fit; those of writing.
+/// `WriteError::Nothing` without maps; `WriteError::Inconsistent` if maps and sheet do not fit; `WriteError::Value` for numbers that
+/// are not finite; those of writing.
 pub fn write_maps(
     folder: impl AsRef<Path>,
     maps: &[PatchMap],
@@ -130,6 +131,14 @@ pub fn write_maps(
     if maps.len() != sheet.spots.len() {
         let what = format!("{} maps for {} places", maps.len(), sheet.spots.len());
         return Err(WriteError::Inconsistent { what, place: Place::Item("patch", maps.len()) });
+    }
+    if let Some(patch) = maps.iter().position(|m| !m.values.iter().all(|x| x.is_finite())) {
+        let (value, place) = ("a displacement beyond numbers of 32 bits".to_owned(), Place::Item("patch", patch));
+        return Err(WriteError::Value {
+            value,
+            place,
+            hint: "fit the network again, or scale the model to other units",
+        });
     }
     std::fs::create_dir_all(folder)?;
     let coding = Coding::new(Some(options.params.kind), maps, options.file, options.max_error);
@@ -153,7 +162,7 @@ pub fn write_maps(
         height: m.rows,
     };
     let length = |m: &PatchMap| {
-        m.values.chunks_exact(m.channels).map(|t| t.iter().map(|x| x * x).sum::<f32>()).fold(0.0, f32::max)
+        m.values.chunks_exact(m.channels).map(|t| t.iter().map(|&x| f64::from(x).powi(2)).sum()).fold(0.0, f64::max)
     };
     let sidecar = Sidecar {
         planish_relief,
@@ -166,7 +175,7 @@ pub fn write_maps(
         scale_metres: coding.scale * options.units.metres(),
         upside_down: options.upside_down,
         uv: "(u (n - 1) + 0.5) / n".into(),
-        largest: maps.iter().map(length).fold(0.0, f32::max).sqrt() as f64,
+        largest: maps.iter().map(length).fold(0.0, f64::max).sqrt(),
         max_error: options.max_error,
         wiring: options.wiring.clone(),
         surfaces: surfaces_sum(surfaces),

@@ -167,11 +167,9 @@ pub(super) fn read(connection: &Connection, version: u32, bytes: u64) -> Result<
     }
     for (p, rows, cols, [control, u, v]) in sized(connection, "SELECT * FROM surface ORDER BY patch", 3)? {
         let control = arrays.points(control, Some(rows * cols))?;
-        let (knots_u, knots_v) = (arrays.f64(u)?, arrays.f64(v)?);
-        if knots_u.len() != cols + 4 || knots_v.len() != rows + 4 {
-            return Err(damaged("knots and control points do not agree".into(), "surface", p));
-        }
-        model.surfaces.push(Surface { rows, cols, control, knots_u, knots_v });
+        let surface = Surface { rows, cols, control, knots_u: arrays.f64(u)?, knots_v: arrays.f64(v)? };
+        surface.check().map_err(|e| damaged(e.to_string(), "surface", p))?;
+        model.surfaces.push(surface);
     }
     for (_, rows, cols, [vectors, ..]) in sized(connection, "SELECT * FROM relief ORDER BY patch", 1)? {
         model.reliefs.push(Relief { rows, cols, vectors: arrays.points(vectors, Some(rows * cols))? });
