@@ -90,15 +90,22 @@ pub struct SparsePattern {
 }
 
 impl SparsePattern {
-    /// Of `n x n` matrices with entries at `lower` (`row >= column`); what is listed twice is summed.
+    /// Of `n x n` matrices with entries at `lower` (`row >= column`); what is listed twice is summed. Gives up with `None` as
+    /// [`SparseCholesky::factor_watched`].
     /// # Errors
     /// If an index is out of range.
-    pub fn new(n: usize, lower: impl Iterator<Item = (usize, usize)>) -> Result<SparsePattern, SparseError> {
-        let places: Vec<Pair<usize, usize>> = lower.map(|(r, c)| Pair::new(r, c)).collect();
-        let shape = |_| SparseError::Shape { n };
-        let (places, sorted) = SymbolicSparseColMat::try_new_from_indices(n, n, &places).map_err(shape)?;
-        let order = SymbolicLlt::try_new(places.as_ref(), Side::Lower).map_err(|_| SparseError::Shape { n })?;
-        Ok(SparsePattern { n, places, sorted, order })
+    pub fn watched(
+        n: usize,
+        lower: Vec<(usize, usize)>,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Option<Result<SparsePattern, SparseError>> {
+        watched(n, cancelled, move || {
+            let places: Vec<Pair<usize, usize>> = lower.into_iter().map(|(r, c)| Pair::new(r, c)).collect();
+            let found = SymbolicSparseColMat::try_new_from_indices(n, n, &places);
+            let (places, sorted) = found.map_err(|_| SparseError::Shape { n })?;
+            let order = SymbolicLlt::try_new(places.as_ref(), Side::Lower).map_err(|_| SparseError::Shape { n })?;
+            Ok(SparsePattern { n, places, sorted, order })
+        })
     }
 
     /// Factors the matrix with these values, in the order in which the places were listed, and gives up with `None` as
@@ -120,19 +127,19 @@ impl SparsePattern {
     }
 }
 
-/// What `factor` makes of a matrix of `n` unknowns, or `None` as soon as `cancelled` says so.
-fn watched(
+/// What `work` on a matrix of `n` unknowns comes to, or `None` as soon as `cancelled` says so.
+fn watched<T: Send + 'static>(
     n: usize,
     cancelled: &dyn Fn() -> bool,
-    factor: impl FnOnce() -> Result<SparseCholesky, SparseError> + Send + 'static,
-) -> Option<Result<SparseCholesky, SparseError>> {
+    work: impl FnOnce() -> Result<T, SparseError> + Send + 'static,
+) -> Option<Result<T, SparseError>> {
     if n < WATCHED_SIZE {
-        return (!cancelled()).then(factor);
+        return (!cancelled()).then(work);
     }
     let (send, receive) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
-        // The receiver is gone after cancelling; nobody then wants the factor.
-        let _ = send.send(factor());
+        // The receiver is gone after cancelling; nobody then wants the result.
+        let _ = send.send(work());
     });
     loop {
         match receive.recv_timeout(WATCH_EVERY) {
@@ -164,7 +171,7 @@ mod tests {
     #[test]
     fn one_pattern_serves_two_matrices_and_sums_what_is_listed_twice() {
         let places = [(0, 0), (1, 1), (1, 0), (0, 0)];
-        let pattern = Arc::new(SparsePattern::new(2, places.into_iter()).unwrap());
+        let pattern = Arc::new(SparsePattern::watched(2, places.to_vec(), &|| false).unwrap().unwrap());
         for (values, x) in [([1.0, 3.0, 1.0, 3.0], [7.0, 9.0]), ([2.0, 5.0, -1.0, 0.0], [1.0, 2.0])] {
             let factor = pattern.factor_watched(values.to_vec(), &|| false).unwrap().unwrap();
             let [a, b, c] = [values[0] + values[3], values[1], values[2]];
@@ -174,7 +181,7 @@ mod tests {
         }
         assert!(pattern.factor_watched(vec![1.0; 3], &|| false).unwrap().is_err());
         assert!(pattern.factor_watched(vec![1.0; 4], &|| true).is_none());
-        assert!(SparsePattern::new(2, [(2, 0)].into_iter()).is_err());
+        assert!(SparsePattern::watched(2, vec![(2, 0)], &|| false).unwrap().is_err());
     }
 
     #[test]

@@ -137,7 +137,7 @@ fn solved(
     observer.progress(0.2);
     let allowed: Vec<f64> =
         (0..filled.len()).into_par_iter().map(|p| farthest(&filled[p].surface, &grids[p]).max(allowed)).collect();
-    let mut system = System::new(&work, &filled, &curves, params)?;
+    let mut system = System::new(&work, &filled, &curves, params, observer)?;
     for easing in 0..=EASINGS {
         system.settle(observer)?;
         let made: Vec<Surface> = (0..filled.len()).into_par_iter().map(|p| system.surface(p)).collect();

@@ -63,6 +63,7 @@ impl<'a> System<'a> {
         filled: &'a [Filled],
         curves: &[Vec<DVec3>],
         params: &StitchParams,
+        observer: &dyn Observer,
     ) -> Result<System<'a>, FitError> {
         let shapes: BTreeMap<_, _> = (0..filled.len()).map(|p| (shape(work, p), p)).collect();
         let one = |(shape, p): (_, usize)| {
@@ -80,10 +81,10 @@ impl<'a> System<'a> {
         let wishes = wishes(work, curves, params);
         let turned: Vec<Sums> = wishes.iter().map(|wish| turned(wish, &motions)).collect();
         let places = (0..unknowns).map(|k| (k, k)).chain(fits.iter().chain(&turned).flat_map(Sums::places));
-        let pattern = SparsePattern::new(unknowns, places).map_err(|_| FitError::Unsolvable { unknowns })?;
+        let pattern = SparsePattern::watched(unknowns, places.collect(), &|| observer.cancelled()).ok_or(Cancelled)?;
+        let pattern = Arc::new(pattern.map_err(|_| FitError::Unsolvable { unknowns })?);
         let holds = holds(filled, unknowns, &motions).into_iter().map(|hold| HOLD * hold);
         let fit_values = holds.chain(fits.iter().flat_map(|sums| sums.lower.iter().copied())).collect();
-        let pattern = Arc::new(pattern);
         Ok(System { work, filled, condensed, unknowns, motions, wishes, nets, afford, share, pattern, fit_values })
     }
 
