@@ -83,6 +83,8 @@ impl SparseCholesky {
 /// same places.
 pub struct SparsePattern {
     n: usize,
+    /// Entries as they are given.
+    entries: usize,
     places: SymbolicSparseColMat<usize>,
     /// From entries as they are given to those places.
     sorted: Argsort<usize>,
@@ -100,11 +102,12 @@ impl SparsePattern {
         cancelled: &dyn Fn() -> bool,
     ) -> Option<Result<SparsePattern, SparseError>> {
         watched(n, cancelled, move || {
+            let entries = lower.len();
             let places: Vec<Pair<usize, usize>> = lower.into_iter().map(|(r, c)| Pair::new(r, c)).collect();
             let found = SymbolicSparseColMat::try_new_from_indices(n, n, &places);
             let (places, sorted) = found.map_err(|_| SparseError::Shape { n })?;
             let order = SymbolicLlt::try_new(places.as_ref(), Side::Lower).map_err(|_| SparseError::Shape { n })?;
-            Ok(SparsePattern { n, places, sorted, order })
+            Ok(SparsePattern { n, entries, places, sorted, order })
         })
     }
 
@@ -119,6 +122,9 @@ impl SparsePattern {
     ) -> Option<Result<SparseCholesky, SparseError>> {
         let (n, pattern) = (self.n, self.clone());
         watched(n, cancelled, move || {
+            if values.len() != pattern.entries {
+                return Err(SparseError::Shape { n });
+            }
             // Two threads make faer's sparse factorisation several times slower.
             faer::set_global_parallelism(faer::Par::Seq);
             let matrix = SparseColMat::new_from_argsort(pattern.places.clone(), &pattern.sorted, &values);
