@@ -42,8 +42,6 @@ impl SparseCholesky {
     /// # Errors
     /// If an index is out of range or the matrix is not positive definite.
     pub fn factor(n: usize, lower: &[(usize, usize, f64)]) -> Result<SparseCholesky, SparseError> {
-        // Two threads make faer's sparse factorisation several times slower.
-        faer::set_global_parallelism(faer::Par::Seq);
         let entries: Vec<Triplet<usize, usize, f64>> = lower.iter().map(|&(r, c, v)| Triplet::new(r, c, v)).collect();
         let matrix = SparseColMat::try_new_from_triplets(n, n, &entries).map_err(|_| SparseError::Shape { n })?;
         let order = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower).map_err(|_| SparseError::Shape { n })?;
@@ -55,6 +53,8 @@ impl SparseCholesky {
         matrix: &SparseColMat<usize, f64>,
         order: SymbolicLlt<usize>,
     ) -> Result<SparseCholesky, SparseError> {
+        // Two threads make faer's sparse factorisation several times slower.
+        faer::set_global_parallelism(faer::Par::Seq);
         let factor = Llt::try_new_with_symbolic(order, matrix.as_ref(), Side::Lower);
         Ok(SparseCholesky { n, factor: factor.map_err(|_| SparseError::NotPositive { n })? })
     }
@@ -125,8 +125,6 @@ impl SparsePattern {
             if values.len() != pattern.entries {
                 return Err(SparseError::Shape { n });
             }
-            // Two threads make faer's sparse factorisation several times slower.
-            faer::set_global_parallelism(faer::Par::Seq);
             let matrix = SparseColMat::new_from_argsort(pattern.places.clone(), &pattern.sorted, &values);
             SparseCholesky::of(n, &matrix.map_err(|_| SparseError::Shape { n })?, pattern.order.clone())
         })

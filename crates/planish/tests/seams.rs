@@ -228,13 +228,7 @@ fn seams_of_every_direction_and_valence_keep_their_bound() {
 
 #[test]
 fn moves_that_cost_their_bends_bend_a_fifth_as_much_and_seams_keep_the_tolerance_in_the_rms() {
-    // Waves of .4 % of the size, shorter than a knot span.
-    let rough = |p: DVec3| {
-        let b = blob(p);
-        let wave = |a: f64| ((b.x * 91.7 + b.y * 57.3 + b.z * 77.1 + a) * 13.0).sin();
-        b + 0.004 * DVec3::new(wave(0.0), wave(1.7), wave(2.9))
-    };
-    let work = cube(41, CurveKind::Smooth, rough);
+    let work = cube(41, CurveKind::Smooth, rough_blob);
     let fit = FitParams { smoothing: 0.01, ..params(10, Continuity::G1) };
     let found = [0.0, 0.01].map(|smoothing| {
         let [before, after] = both(&work, &fit, &StitchParams { smoothing, ..StitchParams::default() });

@@ -407,13 +407,7 @@ fn stitched_seams_of_regular_networks_are_smooth_within_a_thousandth_of_a_degree
 
 #[test]
 fn seams_of_a_rough_scan_become_smooth_and_cost_the_fit_half_of_its_accuracy_at_most() {
-    // Waves of 0.4 % of the size, shorter than a knot span.
-    let rough = |p: DVec3| {
-        let b = blob(p);
-        let wave = |a: f64| ((b.x * 91.7 + b.y * 57.3 + b.z * 77.1 + a) * 13.0).sin();
-        b + 0.004 * DVec3::new(wave(0.0), wave(1.7), wave(2.9))
-    };
-    let work = cube(41, CurveKind::Smooth, rough);
+    let work = cube(41, CurveKind::Smooth, rough_blob);
     let params = StitchParams { fit_loss: 0.6, ..StitchParams::default() };
     for m in [6, 8, 10] {
         let (before, after) = stitched_for(&work, m, params.clone());

@@ -133,7 +133,7 @@ pub fn write_maps(
         return Err(WriteError::Inconsistent { what, place: Place::Item("patch", maps.len()) });
     }
     if let Some(patch) = maps.iter().position(|m| !m.values.iter().all(|x| x.is_finite())) {
-        let (value, place) = ("a displacement beyond numbers of 32 bits".to_owned(), Place::Item("patch", patch));
+        let (value, place) = ("a number that is not finite in 32 bits".to_owned(), Place::Item("patch", patch));
         return Err(WriteError::Value {
             value,
             place,

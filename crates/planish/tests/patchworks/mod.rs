@@ -116,6 +116,13 @@ pub fn blob(p: DVec3) -> DVec3 {
     s * DVec3::new(1.3, 1.0, 0.8) * bump
 }
 
+/// The same with waves of .4 % of its size, shorter than a knot span.
+pub fn rough_blob(p: DVec3) -> DVec3 {
+    let b = blob(p);
+    let wave = |a: f64| ((b.x * 91.7 + b.y * 57.3 + b.z * 77.1 + a) * 13.0).sin();
+    b + 0.004 * DVec3::new(wave(0.0), wave(1.7), wave(2.9))
+}
+
 /// A rectangle of `across x up` patches over `[0, across] x [0, up]`, moved by `shape`; closed in a direction if
 /// `wrap` says so. Every patch has `nodes` of [cols, rows].
 pub fn sheet(

@@ -9,10 +9,11 @@
 //! sum over patches  (RMS of the move / loss)^2  +  sum over seams  weight (RMS angle / tolerance)^2
 //! ```
 //!
-//! The angle is linearised (Gauss-Newton) and the weight of a seam is raised while it misses the tolerance and its
-//! patches can afford it. Seams on edges that were not found stay sharp unless a person calls them smooth (`meet`). Control
-//! points next to a corner move as one plane. Departs from [K98], which moves every control point of a seam onto the line between its neighbours: around corners of
-//! other than four patches that cannot be.
+//! The bends of moves cost as they do in the fit, or seams would have waves beside them. The angle is linearised
+//! (Gauss-Newton) and the weight of a seam is raised while it misses the tolerance and its patches can afford it. Seams on
+//! edges that were not found stay sharp unless a person calls them smooth (`meet`). Control points next to a corner move as
+//! one plane. Departs from [K98], which moves every control point of a seam onto the line between its neighbours: around
+//! corners of other than four patches that cannot be.
 
 use super::miss::farthest;
 use super::params::StitchParams;

@@ -1,7 +1,7 @@
 //! The system: what moves cost the fit and what is left of the angles, minimised together by Gauss-Newton.
 
 use super::bend::Side;
-use super::motion::{Motion, holds, motions, terms};
+use super::motion::{FIXED, Motion, holds, motions, terms};
 use super::params::StitchParams;
 use super::ring::Condensed;
 use super::sums::Sums;
@@ -195,14 +195,14 @@ impl<'a> System<'a> {
 
     /// What the fit of a patch adds to the right side.
     fn fit_forces(&self, p: usize) -> Vec<(usize, f64)> {
-        let (condensed, moves) = (&self.condensed[p], self.moves(p));
+        let (condensed, motions, moves) = (&self.condensed[p], &self.motions[p], self.moves(p));
+        let free = condensed.outer.iter().enumerate().filter(|(_, c)| motions[**c] != FIXED);
         let row = |(r, &c): (usize, &usize)| {
-            let mut terms = terms(&self.motions[p][c]).peekable();
             let weighed = condensed.row(r).iter().zip(&moves).map(|(k, m)| *m * *k);
-            let force = terms.peek().map_or(DVec3::ZERO, |_| weighed.sum::<DVec3>() / self.afford[p]);
-            terms.map(move |(k, way)| (k, -way.dot(force)))
+            let force = weighed.sum::<DVec3>() / self.afford[p];
+            terms(&motions[c]).map(move |(k, way)| (k, -way.dot(force)))
         };
-        condensed.outer.iter().enumerate().flat_map(row).collect()
+        free.flat_map(row).collect()
     }
 
     /// What the angles along a seam add.
