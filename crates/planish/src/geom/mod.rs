@@ -2,6 +2,7 @@
 
 mod aabb;
 mod bvh;
+pub mod cut;
 mod face_point;
 pub mod graph;
 mod kd_tree;

@@ -180,6 +180,26 @@ impl Changing {
         change
     }
 
+    /// Leads the line along edge `k` of triangle `t` by way of the tip over it, and flips the edge; `None` if that would join
+    /// vertices a second time.
+    pub fn part_line(&mut self, t: u32, k: usize) -> Option<Change> {
+        let corners = self.get(t)?;
+        let [a, b, c] = [0, 1, 2].map(|i| corners[(k + i) % 3]);
+        let was_line = self.lines.remove(&lesser_first(a, b));
+        let Some(flip) = self.flip_of(t, k).filter(|_| was_line) else {
+            self.lines.extend(was_line.then(|| lesser_first(a, b)));
+            return None;
+        };
+        let mut change = self.flip(&flip);
+        change.removed.push(lesser_first(a, b));
+        for edge in [lesser_first(a, c), lesser_first(b, c)] {
+            if self.lines.insert(edge) {
+                change.added.push(edge);
+            }
+        }
+        Some(change)
+    }
+
     /// Splits edge `k` of triangle `t` by a new vertex, whose index is the result: one more than the greatest so far. The
     /// halves with the starts of the edge's half-edges keep the names of the triangles.
     pub fn split(&mut self, t: u32, k: usize) -> (u32, Change) {

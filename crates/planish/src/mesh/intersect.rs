@@ -5,7 +5,7 @@
 //!
 //! Exact signs as in `geom::predicates`; `docs/decisions/0006-certified-cells.md` says why zero is promised.
 
-use super::TriMesh;
+use super::{Adjacency, NONE, TriMesh};
 use crate::geom::predicates::triangles_meet;
 use crate::observe::{Cancelled, Observer, Silent};
 use glam::DVec3;
@@ -21,6 +21,21 @@ pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
         Ok(pairs) => pairs,
         Err(Cancelled) => unreachable!("nobody cancels"),
     }
+}
+
+/// Neighbours whose normals are farther apart, degrees, are folded back on one another.
+const FOLDED_BACK_DEG: f64 = 175.0;
+
+/// The half-edges, one of each edge, whose two triangles are folded back on one another: their normals are more than 175 degrees apart.
+/// Exact signs pass a triangle that was turned over beside its neighbour, within their plane.
+pub fn folded_back(mesh: &TriMesh, adjacency: &Adjacency) -> Vec<u32> {
+    let normals: Vec<DVec3> = (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.normal(t)).collect();
+    let limit = FOLDED_BACK_DEG.to_radians().cos();
+    let is_folded = |&h: &u32| {
+        let o = adjacency.opposite[h as usize];
+        o != NONE && h < o && normals[h as usize / 3].dot(normals[o as usize / 3]) < limit
+    };
+    (0..adjacency.opposite.len() as u32).filter(is_folded).collect()
 }
 
 /// As [`self_intersections`], of pairs of which one is `active`, where an observer may stop it.
@@ -145,5 +160,12 @@ mod tests {
         assert!(pairs.len() > 60, "{}", pairs.len());
         let count = sphere.triangles.len() as u32;
         assert!(pairs.iter().all(|[a, b]| *a < count && *b >= count));
+    }
+
+    #[test]
+    fn a_face_turned_over_onto_its_neighbour_is_folded_back_once() {
+        let points = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.3, 0.4)].map(|(x, y)| DVec3::new(x, y, 0.0));
+        let mesh = TriMesh::new(points.to_vec(), vec![[0, 1, 2], [2, 1, 3]]);
+        assert_eq!(folded_back(&mesh, &Adjacency::new(&mesh)).len(), 1);
     }
 }

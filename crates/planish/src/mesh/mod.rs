@@ -20,7 +20,7 @@ pub use compare::{CompareError, CompareParams, Comparison, compare, compare_samp
 pub use decimate::{DecimateError, DecimateParams, DecimateTarget, Decimated, decimate};
 pub use diagnose::{DEGENERATE_AREA, Diagnosis, diagnose};
 pub use features::{boundary_loops, components, sharp_edges};
-pub use intersect::self_intersections;
+pub use intersect::{folded_back, self_intersections};
 pub use smooth::{SmoothError, SmoothParams, Smoothed, smooth};
 pub use soup::check;
 pub use tags::{FEATURE, FeatureKind, FeatureTags};

@@ -147,9 +147,13 @@ pub fn mesh_samples(
     let contour::Extracted { mesh, tags, .. } = &mut meshed.extracted;
     let cell = meshed.lattice.step.x;
     observer.progress(0.9);
-    sharp::mend_lines(mesh, tags, observer)?;
     let scale = ScanScale { noise: samples.noise, spacing: samples.spacing, cell };
+    if !params.contour.plain {
+        sharp::find_lines(mesh, tags, &scale, params.contour.sharp.acos(), observer)?;
+    }
+    sharp::tidy_lines(mesh, tags, &scale, observer)?;
     sharp::fair_lines(mesh, tags, &scale, observer)?;
+    sharp::tidy_lines(mesh, tags, &scale, observer)?;
     observer.progress(0.95);
     sharp::split_bent(mesh, tags, BENT_TOLERANCE * fit_tolerance(&samples) * samples.diagonal, observer)?;
     tags.mark(mesh);

@@ -2,11 +2,11 @@
 //!
 //! Noise hides a few edges of a line, or shifts it by an edge. A gap costs more than its length: a line with a loose end is
 //! taken for surface detail, or two patches run into one another there. Four greedy repairs, each to its fixed point:
-//! `docs/methods/sharp.md`, step 1.
+//! `docs/methods/layout.md`, step 1.
 
 use crate::geom::graph::{Reached, Search};
 use crate::mesh::disjoint::disjoint;
-use crate::mesh::{Adjacency, FeatureTags, NONE, TriMesh, next, path, previous};
+use crate::mesh::{Adjacency, NONE, TriMesh, next, path, previous};
 use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -34,22 +34,6 @@ const SPIKE_ANGLE: f64 = 80.0 / 180.0 * std::f64::consts::PI;
 /// if that costs less than this share of the way: less than at the corner of a face of 20 degrees, whose own edges are bent.
 const JOG: usize = 3;
 const JOG_COST: f64 = 0.35;
-
-/// Greatest length around a spike of a tagged line, mean edges.
-const SPIKE: f64 = 6.0;
-
-/// Bridges the gaps of the tagged lines of a mesh, and cuts their spurs, spikes and jogs. Returns how many gaps were bridged.
-/// # Errors
-/// [`Cancelled`]; the tags are then as they were.
-pub fn mend_lines(mesh: &TriMesh, tags: &mut FeatureTags, observer: &dyn Observer) -> Result<usize, Cancelled> {
-    let adjacency = Adjacency::new(mesh);
-    let mut sharp = tags.on(mesh);
-    sharp.iter_mut().zip(&adjacency.opposite).for_each(|(s, &o)| *s &= o != NONE);
-    let bridged = bridge_gaps(mesh, &adjacency, &mut sharp, observer)?;
-    cut_spikes(mesh, &adjacency, SPIKE * mesh.mean_edge(), &mut sharp);
-    *tags = tags.with_edges((0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| ends(mesh, h)));
-    Ok(bridged)
-}
 
 /// The last part of a line with a loose end.
 struct End {
@@ -223,12 +207,6 @@ fn bridge(
     Some(Bridge { cost, vertices: search.reached.chain(target) })
 }
 
-/// The vertices of a half-edge, the lesser first.
-fn ends(mesh: &TriMesh, h: u32) -> [u32; 2] {
-    let (a, b) = (mesh.origin(h), mesh.origin(next(h)));
-    [a.min(b), a.max(b)]
-}
-
 /// How much the surface bends at an edge: the sine of the angle there, 1 beyond a right angle.
 fn bend(mesh: &TriMesh, adjacency: &Adjacency, h: u32) -> f64 {
     let o = adjacency.opposite[h as usize];
@@ -336,7 +314,6 @@ fn cut_jogs(mesh: &TriMesh, adjacency: &Adjacency, longest: f64, sharp: &mut [bo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::FeatureKind;
     use crate::synthetic::shapes;
 
     const CELLS: usize = 60;
@@ -431,14 +408,5 @@ mod tests {
         assert_eq!(count(&sharp), 26 + 1 + 2 + 1 + 26, "what is longer than asked for stays");
         cut_spikes(&mesh, &adjacency, 0.2, &mut sharp);
         assert_eq!(count(&sharp), 24 + 2 + 26);
-    }
-
-    #[test]
-    fn tags_with_a_step_of_one_edge_come_out_as_one_line() {
-        let (mesh, _, sharp) = lines(&[&row(30, 5, 30), &row(31, 30, 55)]);
-        let edges = (0..sharp.len() as u32).filter(|&h| sharp[h as usize]).map(|h| ends(&mesh, h));
-        let mut tags = FeatureTags::from_edges(mesh.points.len(), edges);
-        assert_eq!(mend_lines(&mesh, &mut tags, &crate::Silent).unwrap(), 1);
-        assert_eq!(tags.vertices.iter().filter(|&&k| k == FeatureKind::Corner).count(), 2);
     }
 }

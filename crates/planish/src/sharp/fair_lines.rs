@@ -301,7 +301,7 @@ fn tidy(
     let mut faulty: Vec<u32> = all.filter(|&t| fault(t, mesh.corners(t as usize)) != Fault::None).collect();
     for _ in 0..MERGE_ROUNDS {
         observer.check()?;
-        faulty = merging.round(&faulty, fault, LONGEST_MERGED_CELLS * wishes.cell, observer)?;
+        faulty = merging.round(&faulty, fault, LONGEST_MERGED_CELLS * wishes.cell, 0.0, observer)?;
     }
     let merged = merging.mesh;
     let mut t = 0;

@@ -238,6 +238,14 @@ impl Estimate {
         Plane { normal, off: -self.terms[0] * upright, variance: self.variance[0] * upright * upright }
     }
 
+    /// The height at a place of the polynomial's plane, in its unit of length, and the unit normal there.
+    pub fn beside(&self, x: f64, y: f64, axes: [DVec3; 3]) -> (f64, DVec3) {
+        let c = &self.terms;
+        let (across, along) = (c[1] + 2.0 * c[4] * x + c[5] * y, c[2] + 2.0 * c[3] * y + c[5] * x);
+        let normal = (axes[2] - axes[0] * across - axes[1] * along).normalize();
+        (c[0] + c[1] * x + c[2] * y + c[3] * y * y + c[4] * x * x + c[5] * x * y, normal)
+    }
+
     /// True if a less precise estimate differs by no more than its noise.
     fn agrees(&self, coarse: &Estimate) -> bool {
         (0..3).all(|k| {

@@ -12,6 +12,9 @@ use std::collections::BTreeSet;
 
 /// Height of a triangle over its longest edge that is enough.
 const GOOD_SHAPE: f64 = 0.1;
+/// What is lower than that keeps so much of it: to merge vertices that are next to each other changes what is around by next
+/// to nothing, but not by nothing.
+const KEPT_SHAPE: f64 = 0.8;
 
 /// How bad a triangle is.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -43,11 +46,13 @@ impl<'a> Merging<'a> {
     /// Returns triangles that may be faulty still; empty if nothing changed.
     /// * `fault` - of a triangle with these corners
     /// * `longest` - vertices are merged over edges that are at most so long
+    /// * `low` - a line may be led by way of a vertex that is nearer to it than this
     pub fn round(
         &mut self,
         faulty: &[u32],
         fault: impl Fn(u32, [DVec3; 3]) -> Fault,
         longest: f64,
+        low: f64,
         observer: &dyn Observer,
     ) -> Result<Vec<u32>, Cancelled> {
         let mut taken = Taken::default();
@@ -62,6 +67,7 @@ impl<'a> Merging<'a> {
                 continue;
             }
             let change = self.merge_any(corners, &fault, longest).or_else(|| self.flip_any(t, corners, &fault));
+            let change = change.or_else(|| self.part_any(t, low, &fault));
             if let Some(change) = change {
                 taken.add(&around);
                 changes.push(change);
@@ -131,8 +137,10 @@ impl<'a> Merging<'a> {
         let keeps_lines = match beside[..] {
             [] => self.kinds[v as usize] != FeatureKind::Corner,
             [a, b] => {
+                // A line around a triangle that goes is led along its third edge, unless one runs there.
+                let is_free = |x: &u32| !beside.contains(x) || !self.mesh.is_line(w, *x);
                 let is_along = a == w || b == w;
-                self.kinds[v as usize] != FeatureKind::Corner && is_along && !both.iter().any(|x| beside.contains(x))
+                self.kinds[v as usize] != FeatureKind::Corner && is_along && both.iter().all(is_free)
             }
             _ => false,
         };
@@ -140,24 +148,52 @@ impl<'a> Merging<'a> {
         is_inner && keeps_lines && own.len() + other.len() > 7 && self.mesh.is_collapsible(v, w)
     }
 
-    /// True if there are fewer faults when `v` becomes `w`, and nothing is turned.
+    /// True if there are fewer faults when `v` becomes `w`, nothing comes to be turned, and what is at fault still is no thinner.
     fn helps(&self, v: u32, w: u32, fault: &impl Fn(u32, [DVec3; 3]) -> Fault) -> bool {
         let (mut before, mut after) = (0, 0);
         for &t in self.mesh.star(v) {
             let corners = self.mesh.corners(t);
             let at = self.places(corners);
-            before += fault(t, at) as usize;
+            let was = fault(t, at);
+            before += was as usize;
             if corners.contains(&w) {
                 continue;
             }
             let then = self.places(corners.map(|x| if x == v { w } else { x }));
             let left = fault(t, then);
-            if left == Fault::Turned || shape(then) < shape(at).min(GOOD_SHAPE) {
+            let is_thinner = shape(then) < KEPT_SHAPE * shape(at).min(GOOD_SHAPE);
+            if (left == Fault::Turned && was != Fault::Turned) || is_thinner {
                 return false;
             }
             after += left as usize;
         }
         after < before
+    }
+
+    /// Leads the line along an edge of a triangle by way of its tip where that is so near that it might as well lie on it, and
+    /// flips the edge: the line is parted by the tip.
+    /// * `low` - the greatest height of such a tip over its edge
+    fn part_any(&mut self, t: u32, low: f64, fault: &impl Fn(u32, [DVec3; 3]) -> Fault) -> Option<Change> {
+        for k in 0..3 {
+            let corners = self.mesh.get(t)?;
+            let [a, b, c] = [0, 1, 2].map(|i| corners[(k + i) % 3]);
+            let [p, q, r] = self.places([a, b, c]);
+            let e = q - p;
+            let along = (r - p).dot(e) / e.length_squared();
+            let is_tip = e.cross(r - p).length() < low * e.length() && (0.0..1.0).contains(&along);
+            let on_line = self.mesh.star(c).iter().flat_map(|&s| self.mesh.corners(s)).any(|x| self.mesh.is_line(c, x));
+            if !is_tip || on_line || !self.mesh.is_line(a, b) || self.kinds[c as usize] != FeatureKind::None {
+                continue;
+            }
+            let Some(other) = self.mesh.beyond(t, [a, b]) else { continue };
+            let d = self.mesh.corners(other).into_iter().find(|&x| x != a && x != b)?;
+            let new = [[a, d, c], [d, b, c]].map(|corners| fault(other, self.places(corners)));
+            if self.mesh.joined(c, d) || new.contains(&Fault::Turned) || !self.mesh.is_inner(c) {
+                continue;
+            }
+            return self.mesh.part_line(t, k);
+        }
+        None
     }
 
     /// Flips an edge of `t = [a, b, c]` where that helps.
@@ -210,7 +246,7 @@ mod tests {
         let mut merging = Merging::new(mesh, &tags.vertices, &tags.edges);
         let mut faulty: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
         while !faulty.is_empty() {
-            faulty = merging.round(&faulty, &fault, 2.0, &crate::Silent).unwrap();
+            faulty = merging.round(&faulty, &fault, 2.0, 0.0, &crate::Silent).unwrap();
         }
         let lines = merging.mesh.lines.iter().copied().collect();
         let triangles = merging.mesh.into_triangles();

@@ -10,7 +10,7 @@ use crate::files::{self, Content};
 use crate::summary::Summary;
 use crate::{progress, stdout};
 use planish::DVec3;
-use planish::mesh::{Adjacency, Diagnosis, TriMesh, diagnose, self_intersections};
+use planish::mesh::{Adjacency, Diagnosis, TriMesh, diagnose, folded_back, self_intersections};
 use planish::model::{Model, Units};
 use planish::pipeline::{Figure, Warning};
 use planish_io::report::{Report, count, number};
@@ -98,6 +98,7 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
         let mut table = Summary::default();
         mesh_rows(&mut table, &report, &facts, model.map_or(DVec3::ZERO, |m| m.shift));
         table.row("crossings", crossings);
+        table.row("folded back", report.figure("mesh.folded_back").map_or(String::new(), |n| count(n as u64)));
         table.row("units", told_units(session, args, model.is_some(), &report));
         let columns: Vec<&str> = mesh.attributes.iter().map(|a| a.name.as_str()).collect();
         table.row("attributes", if columns.is_empty() { "none".into() } else { columns.join(", ") });
@@ -216,8 +217,14 @@ fn faults(facts: &Diagnosis) -> Vec<Warning> {
 /// Above so many triangles crossings are not looked for: `info` is to answer soon.
 const MOST_LOOKED_AT: usize = 2_000_000;
 
-/// Looks for triangles that cross others, and tells how many in words.
+/// Looks for triangles that cross others or are folded back on their neighbours, and tells how many in words.
 fn crossings(mesh: &TriMesh, report: &mut Report) -> String {
+    let folded = folded_back(mesh, &Adjacency::new(mesh)).len();
+    report.quality.insert("mesh.folded_back".into(), Figure::Count(folded as u64));
+    if folded > 0 {
+        let text = format!("{} pairs of neighbours are folded back on one another.", count(folded as u64));
+        report.warnings.push(Warning::new("folded_back", text, ""));
+    }
     if mesh.triangles.len() > MOST_LOOKED_AT {
         return "not looked for: too many triangles".into();
     }
