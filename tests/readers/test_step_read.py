@@ -3,6 +3,7 @@
 import json
 import math
 
+import numpy
 import pytest
 import trimesh
 
@@ -27,7 +28,7 @@ from OCP.TopLoc import TopLoc_Location  # noqa: E402
 from OCP.TopoDS import TopoDS_Compound  # noqa: E402
 
 from conftest import planish
-from test_step import cast, parts, static
+from test_step import cast, faces_of, parts, static
 
 # Share of the diagonal that a triangle may be off its face.
 TOLERANCE = 2e-5
@@ -176,3 +177,29 @@ def test_the_surfaces_of_a_run_are_where_its_model_has_them(demo, tmp_path):
     figures = json.loads((tmp_path / "a.json").read_text())
     assert figures["input"]["units"] == "cm"
     assert figures["quality"]["distance.rms_rel"] < 1e-4
+
+
+def test_control_points_moved_by_another_program_deform_the_model(demo, tmp_path):
+    """Faces in reverse order, their parameters turned, in another unit, and stretched along z."""
+    surfaces = faces_of(demo / "surface.step")
+    compound, builder = TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(compound)
+    for k, surface in enumerate(reversed(surfaces)):
+        surface = surface.Copy()
+        for i in range(1, surface.NbUPoles() + 1):
+            for j in range(1, surface.NbVPoles() + 1):
+                p = surface.Pole(i, j)
+                surface.SetPole(i, j, gp_Pnt(p.X(), p.Y(), 1.25 * p.Z()))
+        if k % 2:
+            surface.ExchangeUV()
+        if k % 3:
+            surface.UReverse()
+        builder.Add(compound, BRepBuilderAPI_MakeFace(surface, 1e-6).Face())
+    write(compound, tmp_path / "stretched.step", "M")
+    told = planish("deform", demo / "model.planish", tmp_path / "stretched.step", "-o", "deformed.planish", cwd=tmp_path)
+    for model, name in [(demo / "model.planish", "before.ply"), ("deformed.planish", "after.ply")]:
+        planish("export", model, "--surface", "base", "-o", name, "-q", cwd=tmp_path)
+    before, after = [trimesh.load(tmp_path / name, process=False) for name in ("before.ply", "after.ply")]
+    assert after.is_watertight and "apart by" in told.stdout
+    off = numpy.abs(before.vertices * [1, 1, 1.25] - after.vertices).max()
+    assert off < 1e-6 * before.scale

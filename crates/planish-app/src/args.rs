@@ -233,8 +233,8 @@ pub struct Demo {
 /// `planish run`
 #[derive(Args, Debug)]
 pub struct Run {
-    /// A mesh (PLY, OBJ, STL, GLB, glTF) or a scan (E57, LAS, LAZ, PLY without faces, PCD, XYZ, TXT, CSV, ASC, PTS, NPY,
-    /// NPZ, CONF); `-` is standard input. Several files, or a pattern such as 'scans/*.e57', get a folder each below DIR, with
+    /// A mesh (PLY, OBJ, STL, GLB, glTF, STEP) or a scan (E57, LAS, LAZ, PLY without faces, PCD, XYZ, TXT, CSV, ASC, PTS,
+    /// NPY, NPZ, CONF); `-` is standard input. Several files, or a pattern such as 'scans/*.e57', get a folder each below DIR, with
     /// a table and a report of all
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
@@ -314,7 +314,7 @@ pub struct Clean {
 /// `planish mesh`
 #[derive(Args, Debug)]
 pub struct Mesh {
-    /// A scan (see `clean`); a mesh (PLY, OBJ, STL, GLB, glTF), also one with holes and intersections; a script of
+    /// A scan (see `clean`); a mesh (PLY, OBJ, STL, GLB, glTF, STEP), also one with holes and intersections; a script of
     /// solids or a milling job (.toml); a volume (.nrrd, .npy); or with --formula a formula. `-` is standard input
     pub input: PathBuf,
     /// The mesh: .ply (with feature tags), .obj, .stl or .glb; or the field itself as a volume, .nrrd or .npy: distances below
@@ -445,7 +445,7 @@ pub struct Decimate {
 /// `planish layout`
 #[derive(Args, Debug)]
 pub struct Layout {
-    /// The mesh: PLY, OBJ, STL, GLB or glTF
+    /// The mesh: PLY, OBJ, STL, GLB, glTF or STEP
     pub mesh: PathBuf,
     /// The network; `-` is standard output
     #[arg(short, long, value_name = "NETWORK.json")]
@@ -461,7 +461,7 @@ pub struct Layout {
 /// `planish fit`
 #[derive(Args, Debug)]
 pub struct Fit {
-    /// The mesh: PLY, OBJ, STL, GLB or glTF; or a model, whose network and grids are kept (one without grids gets them):
+    /// The mesh: PLY, OBJ, STL, GLB, glTF or STEP; or a model, whose network and grids are kept (one without grids gets them):
     /// only its surfaces, seams and relief are made anew, with its own parameters where no option says otherwise
     #[arg(value_name = "MESH|MODEL.planish")]
     pub input: PathBuf,

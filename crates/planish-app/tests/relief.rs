@@ -166,6 +166,10 @@ fn moved_control_points_carry_the_relief_along() {
     assert!(told.contains("apart by 0 mm") && told.contains("baked, stroke"), "{told}");
     ok(&["compare", "a.planish", "same.planish", "--surface", "displaced", "--tolerance", "0.0001%"], at);
     assert!(ok(&["info", "same.planish"], at).contains("deform"));
+    ok(&["export", "a.planish", "-q", "-o", "s.step"], at);
+    let told = ok(&["deform", "a.planish", "s.step", "-o", "same.planish", "--force"], at);
+    assert!(told.contains("apart by 0 mm"), "{told}");
+    ok(&["compare", "a.planish", "same.planish", "--surface", "displaced", "--tolerance", "0.0001%"], at);
     // A corner of the box is pulled out: all patches there stay together.
     fs::write(at.join("moves.toml"), "[[move]]\npatch = 0\ni = 0\nj = 0\nby = [0.1, 0.2, 0.3]\n").unwrap();
     ok(&["deform", "a.planish", "moves.toml", "-q", "-o", "pulled.planish"], at);
@@ -186,6 +190,7 @@ fn moved_control_points_carry_the_relief_along() {
         ("bad.obj", "v 0 0 0\nf 1 1 1\n", "without B-spline surfaces"),
         ("bad.obj", "v 0 0 0\ncstype bspline\ndeg 3 3\nsurf 0 1 0 1 1 2\nend\n", "vertex 2 is not there (line 4)"),
         ("bad.obj", "cstype bezier\n", "only surfaces of the kind bspline"),
+        ("bad.step", "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n", "no faces"),
     ] {
         fs::write(at.join(name), text).unwrap();
         let output = planish(&["deform", "a.planish", name, "-o", "x.planish"], at);

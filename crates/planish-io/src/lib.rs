@@ -55,5 +55,5 @@ pub use scan::{
     SCAN_EXTENSIONS, ScanOptions, WRITTEN_SCANS, check_columns, is_scan, read_body, read_scan, write_scan,
     write_scan_in,
 };
-pub use step::{StepInput, StepSummary, write_step};
+pub use step::{StepInput, StepSummary, read_step_surfaces, write_step};
 pub use usd::{UsdInput, write_usd};

@@ -268,4 +268,12 @@ fn attributes_stand_in_the_same_places() {
     let picture = read_picture(&folder.path().join("color_atlas.png")).unwrap();
     assert_eq!([picture.width, picture.height], sheet.images[0]);
     assert!(planish_io::relief_names(folder.path()).contains(&"color_atlas.png".to_string()));
+    // A colour that is no number is refused before anything is written.
+    let [(name, mut colours)] = list;
+    colours[1].values[0] = f32::NAN;
+    let folder = folder.path().join("none");
+    let options = options(MapParams { sheets: SheetKind::Atlas, ..MapParams::default() }, MapFile::Png);
+    let refused = write_maps(&folder, &all, &[(name, colours)], &sheet, &pair.surfaces, &options).unwrap_err();
+    assert!(refused.to_string().contains("\"color\" that is not finite"), "{refused}");
+    assert!(!folder.exists());
 }

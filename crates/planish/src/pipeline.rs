@@ -20,7 +20,7 @@ mod rework;
 mod scan;
 mod truth;
 
-pub use deform::{Move, deform, join, moved};
+pub use deform::{Move, deform, join, matched, moved};
 pub use quality::{
     FOLDED_DEG, SEAM_ANGLE_WARNING_DEG, displaced_mesh, displaced_patches, inner_angles, span_count, surface_mesh,
     surface_mesh_cut, surface_patches, worst_seams,

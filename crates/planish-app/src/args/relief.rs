@@ -292,9 +292,9 @@ pub struct Deform {
     /// The model
     #[arg(value_name = "MODEL.planish")]
     pub model: PathBuf,
-    /// Where its control points go: an OBJ with B-spline surfaces of the same network, another model of it, or a list of `[[move]]`
-    /// tables
-    #[arg(value_name = "SURFACES.obj|MODEL.planish|MOVES.toml")]
+    /// Where its control points go: an OBJ or a STEP file with B-spline surfaces of the same network, another model of it, or a list
+    /// of `[[move]]` tables
+    #[arg(value_name = "SURFACES.obj|SURFACES.step|MODEL.planish|MOVES.toml")]
     pub to: PathBuf,
     /// Where the deformed model goes
     #[arg(short, long, value_name = "MODEL.planish")]

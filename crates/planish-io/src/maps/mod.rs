@@ -109,6 +109,17 @@ fn image_name(sheet: &Sheet, image: usize, file: MapFile, attribute: Option<&str
     }
 }
 
+/// That all numbers of some maps are finite; `what` they are.
+fn all_finite(maps: &[PatchMap], what: &str, hint: &'static str) -> Result<(), WriteError> {
+    match maps.iter().position(|m| !m.values.iter().all(|x| x.is_finite())) {
+        None => Ok(()),
+        Some(patch) => {
+            let value = format!("{what} that is not finite in 32 bits");
+            Err(WriteError::Value { value, place: Place::Item("patch", patch), hint })
+        }
+    }
+}
+
 /// Writes maps of all patches, then the sidecar: where it is, all images are. Returns the sidecar.
 ///
 /// * `attributes` - maps of vertex attributes with their names, of the same shapes
@@ -132,13 +143,9 @@ pub fn write_maps(
         let what = format!("{} maps for {} places", maps.len(), sheet.spots.len());
         return Err(WriteError::Inconsistent { what, place: Place::Item("patch", maps.len()) });
     }
-    if let Some(patch) = maps.iter().position(|m| !m.values.iter().all(|x| x.is_finite())) {
-        let (value, place) = ("a number that is not finite in 32 bits".to_owned(), Place::Item("patch", patch));
-        return Err(WriteError::Value {
-            value,
-            place,
-            hint: "fit the network again, or scale the model to other units",
-        });
+    all_finite(maps, "a displacement", "fit the network again, or scale the model to other units")?;
+    for (name, maps) in attributes {
+        all_finite(maps, &format!("\"{name}\""), "leave out --attributes, or mend the values of the mesh")?;
     }
     std::fs::create_dir_all(folder)?;
     let coding = Coding::new(Some(options.params.kind), maps, options.file, options.max_error);

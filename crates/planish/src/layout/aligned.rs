@@ -149,7 +149,7 @@ pub(super) enum AlignError {
         /// Where.
         places: Vec<DVec3>,
     },
-    /// Another number of patches than the one asked for.
+    /// Far more patches than a partition needs.
     #[error("patches along its form would be {found}")]
     Count {
         /// How many they would be.
@@ -198,8 +198,47 @@ pub(super) struct Laid {
     pub cones: usize,
     /// Mean angle between the patches' isolines and the field, degrees.
     pub deviation_deg: f64,
+    /// What it is worth.
+    pub worth: Worth,
+}
+
+/// What a network is worth: the number that was asked for first, then how well grids cover it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Worth {
+    /// Logarithm of the ratio of its patches to the number asked for, 0 if near enough or if none was.
+    missed: f64,
     /// Part of the patches that a grid covers well.
-    pub good_part: f64,
+    good_part: f64,
+}
+
+impl Worth {
+    pub fn new(patches: usize, asked: Option<usize>, good_part: f64) -> Worth {
+        let missed = match asked {
+            Some(asked) if !is_near(patches, asked) => (patches as f64 / asked as f64).ln().abs(),
+            _ => 0.0,
+        };
+        Worth { missed, good_part }
+    }
+
+    /// True if there is no need to look for another.
+    pub fn is_enough(self) -> bool {
+        self.missed == 0.0 && fitness::is_good(self.good_part)
+    }
+
+    /// True for the number that was asked for.
+    pub fn is_kept(self) -> bool {
+        self.missed == 0.0
+    }
+
+    /// True if this is worth more.
+    pub fn exceeds(self, other: Worth) -> bool {
+        self.missed < other.missed || (self.missed == other.missed && self.good_part > other.good_part)
+    }
+}
+
+/// The number of patches that is asked for, if there is one.
+pub(super) fn asked(params: &LayoutParams) -> Option<usize> {
+    (params.patches > 0 && !params.coarsest).then_some(params.patches)
 }
 
 /// The network of `mesh` that follows its form, with the number of patches that `params` ask for or as few as the form
@@ -240,11 +279,11 @@ pub(super) fn lay(
             observer.progress(0.3);
             let (laid, trouble) = aligned.choose(params, observer)?;
             if let Some(laid) = laid
-                && best.as_ref().is_none_or(|best| laid.good_part > best.good_part)
+                && best.as_ref().is_none_or(|best| laid.worth.exceeds(best.worth))
             {
                 best = Some(laid);
             }
-            if best.as_ref().is_some_and(|best| params.coarsest || fitness::is_good(best.good_part)) {
+            if best.as_ref().is_some_and(|best| params.coarsest || best.worth.is_enough()) {
                 return best.ok_or(why);
             }
             let Some(trouble) = trouble else { break };
@@ -268,7 +307,7 @@ pub(super) fn lay(
 /// A layout on the proxy.
 struct Draft<'a> {
     bench: Bench<'a>,
-    good_part: f64,
+    worth: Worth,
     deviation_deg: f64,
 }
 
@@ -284,9 +323,8 @@ impl Aligned {
         }
         let mut trouble = None;
         let mut best: Option<Draft> = None;
-        let asked = if params.coarsest { 0 } else { params.patches };
         let mut coarsest = None;
-        let tried: Vec<usize> = if asked > 0 {
+        let tried: Vec<usize> = if let Some(asked) = asked(params) {
             NEAR_ASKED.map(|near| ((near * asked as f64).round() as usize).max(1)).to_vec()
         } else {
             let whole = match self.quantized(Scale::Coarsest, observer) {
@@ -310,15 +348,12 @@ impl Aligned {
             };
             let draft = whole.and_then(|whole| self.draft(&whole, params, observer));
             match draft {
-                Ok(draft) if asked > 0 && !is_near(draft.patches(), asked) => {
-                    trouble = Some(AlignError::Count { found: draft.patches() });
-                }
                 Ok(draft) => {
-                    let is_good = fitness::is_good(draft.good_part);
-                    if best.as_ref().is_none_or(|best| draft.good_part > best.good_part) {
+                    let is_enough = draft.worth.is_enough();
+                    if best.as_ref().is_none_or(|best| draft.worth.exceeds(best.worth)) {
                         best = Some(draft);
                     }
-                    if is_good {
+                    if is_enough {
                         break;
                     }
                 }
@@ -378,7 +413,8 @@ impl Aligned {
             bench = Bench::new(mesh, adjacency, joined).ok_or(AlignError::Misplaced)?;
             improve::settle(&mut bench, patches, rounds, observer).map_err(|_| Cancelled)?;
         }
-        Ok(Draft { bench, good_part, deviation_deg: mapped.deviation_deg })
+        let worth = Worth::new(bench.complex.live_cells().count(), asked(params), good_part);
+        Ok(Draft { bench, worth, deviation_deg: mapped.deviation_deg })
     }
 
     /// # Errors
@@ -403,14 +439,8 @@ impl Aligned {
         improve::straighten(&mut bench, observer).map_err(|_| Cancelled)?;
         fair::fair(&mut bench);
         let cones = self.charts.index.iter().filter(|i| **i != 0).count();
-        let Draft { good_part, deviation_deg, .. } = draft;
-        Ok(Laid { network: self.proxy.network(&bench.complex), cones, deviation_deg, good_part })
-    }
-}
-
-impl Draft<'_> {
-    fn patches(&self) -> usize {
-        self.bench.complex.live_cells().count()
+        let Draft { worth, deviation_deg, .. } = draft;
+        Ok(Laid { network: self.proxy.network(&bench.complex), cones, deviation_deg, worth })
     }
 }
 

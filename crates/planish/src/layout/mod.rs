@@ -28,7 +28,7 @@ mod shape;
 mod slide;
 mod strips;
 
-use crate::layout::aligned::AlignError;
+use crate::layout::aligned::{AlignError, Worth};
 use crate::layout::complex::Complex;
 use crate::layout::partition::{outline, polygon, tips};
 use crate::layout::proxy::refine::Refined;
@@ -182,11 +182,18 @@ pub fn layout(
     sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
     let along = aligned::lay(mesh, &sharp, corners, params, observer);
     let (along, why) = match along {
-        Ok(laid) if params.coarsest || fitness::is_good(laid.good_part) => return Ok(laid.into()),
-        Ok(laid) => (Some(laid), "patches along its form would be covered less well by grids".to_owned()),
+        Ok(laid) if params.coarsest || laid.worth.is_enough() => return Ok(laid.into()),
+        Ok(laid) if laid.worth.is_kept() => {
+            (Some(laid), "patches along its form would be covered less well by grids".to_owned())
+        }
+        Ok(laid) => {
+            let found = laid.network.patches.len();
+            (Some(laid), AlignError::Count { found }.to_string())
+        }
         Err(AlignError::Cancelled(cancelled)) => return Err(cancelled.into()),
         Err(why) => (None, why.to_string()),
     };
+    let asked = aligned::asked(params);
     let patches = match params.patches {
         _ if params.coarsest => 1,
         0 => PARTITION_PATCHES,
@@ -194,9 +201,10 @@ pub fn layout(
     };
     let params = LayoutParams { patches, ..params.clone() };
     let (network, good_part) = partitioned((mesh, &adjacency), &sharp, corners, &params, observer)?;
+    let worth = Worth::new(network.patches.len(), asked, good_part);
     match along {
         // Where neither is good the form is followed, unless that is worse.
-        Some(laid) if laid.good_part >= good_part => Ok(laid.into()),
+        Some(laid) if !worth.exceeds(laid.worth) => Ok(laid.into()),
         _ => Ok(Layout { network, method: Method::Partition { why } }),
     }
 }

@@ -11,6 +11,7 @@ use crate::observe::Observer;
 use crate::relief::{self, PatchedMesh, ReliefError, maps};
 use crate::surface::Surface;
 use glam::DVec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// A control point that is moved.
@@ -67,6 +68,60 @@ pub fn join(network: &Network, surfaces: &mut [Surface]) -> Result<f64, ReliefEr
         }
     }
     Ok(apart)
+}
+
+/// Samples along each side of a patch that tell which surface is which: more than the corners, which a turn may leave alike.
+const COMPARED: usize = 5;
+
+/// Loaded surfaces as those of the model that they are: in their order, with `u` and `v` running as theirs. Each is the one that is nearest
+/// in its nearest direction; where two are nearest to the same one, as after a large move of all, they are taken in their own order.
+/// There must be as many as the model has.
+pub fn matched(surfaces: &[Surface], loaded: &[Surface]) -> Vec<Surface> {
+    let samples = |s: &Surface| -> Vec<DVec3> {
+        let at = |k: usize| k as f64 / (COMPARED - 1) as f64;
+        (0..COMPARED * COMPARED).map(|k| s.point(at(k % COMPARED), at(k / COMPARED))).collect()
+    };
+    let own: Vec<Vec<DVec3>> = surfaces.iter().map(samples).collect();
+    let theirs: Vec<[Vec<DVec3>; 8]> =
+        loaded.par_iter().map(|s| std::array::from_fn(|way| samples(&run(s, way)))).collect();
+    let apart = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(p, q)| p.distance_squared(*q)).sum::<f64>();
+    let nearest_way = |k: usize, p: usize| {
+        let all = theirs[k].iter().enumerate().map(|(way, samples)| (apart(samples, &own[p]), way));
+        all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
+    };
+    let nearest = |k: usize| {
+        let all = (0..own.len()).map(|p| (nearest_way(k, p).0, p));
+        all.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(k, |(_, p)| p)
+    };
+    let found: Vec<usize> = (0..loaded.len()).into_par_iter().map(nearest).collect();
+    let mut of: Vec<Option<usize>> = vec![None; own.len()];
+    found.iter().enumerate().for_each(|(k, &p)| of[p] = Some(k));
+    let is_clear = of.iter().all(Option::is_some);
+    let one = |p: usize| {
+        let k = if is_clear { of[p].unwrap_or(p) } else { p };
+        run(&loaded[k], nearest_way(k, p).1)
+    };
+    (0..own.len().min(loaded.len())).map(one).collect()
+}
+
+/// The same surface with its parameters run in one of eight ways: along `u` backwards (1), along `v` backwards (2), then exchanged (4).
+fn run(surface: &Surface, way: usize) -> Surface {
+    let back = |knots: &[f64], is_back: bool| match is_back {
+        true => knots.iter().rev().map(|t| 1.0 - t).collect(),
+        false => knots.to_vec(),
+    };
+    let (u, v) = (back(&surface.knots_u, way & 1 > 0), back(&surface.knots_v, way & 2 > 0));
+    let (cols, rows) = (surface.cols, surface.rows);
+    let at = |i: usize, j: usize| {
+        let (i, j) = (if way & 1 > 0 { cols - 1 - i } else { i }, if way & 2 > 0 { rows - 1 - j } else { j });
+        surface.control[j * cols + i]
+    };
+    if way & 4 > 0 {
+        let control = (0..cols).flat_map(|i| (0..rows).map(move |j| (i, j))).map(|(i, j)| at(i, j)).collect();
+        return Surface { rows: cols, cols: rows, control, knots_u: v, knots_v: u };
+    }
+    let control = (0..rows).flat_map(|j| (0..cols).map(move |i| (i, j))).map(|(i, j)| at(i, j)).collect();
+    Surface { rows, cols, control, knots_u: u, knots_v: v }
 }
 
 /// The model on other surfaces of its network. The relief is carried along in their frames; the displaced surface becomes the

@@ -24,7 +24,7 @@ struct Moves {
 
 pub fn deform(session: &Session, args: &Deform) -> Result<Status, Failure> {
     files::check_extension(&args.output, &["planish"])?;
-    files::check_extension(&args.to, &["obj", "planish", "toml"])?;
+    files::check_extension(&args.to, &["obj", "planish", "step", "stp", "toml"])?;
     let (model, read) = open(session, &args.model)?;
     let mut report = Report::new("deform", files::model_facts(&args.model, &model, model.units));
     let ((model, told), record) = session.step("deform", || {
@@ -54,6 +54,13 @@ fn surfaces(model: &Model, args: &Deform) -> Result<(Vec<Surface>, String), Fail
             return Ok((surfaces, format!("{} control points moved", moves.len())));
         }
         "planish" => files::model(&args.to)?.surfaces,
+        "step" | "stp" => {
+            let (mut surfaces, units) =
+                planish_io::read_step_surfaces(&args.to).map_err(|e| Failure::input(&args.to, e))?;
+            let scale = units.metres() / model.units.metres();
+            surfaces.iter_mut().flat_map(|s| &mut s.control).for_each(|p| *p = scale * *p - model.shift);
+            surfaces
+        }
         _ => {
             let mut surfaces = planish_io::read_obj_surfaces(&args.to).map_err(|e| Failure::input(&args.to, e))?;
             surfaces.iter_mut().flat_map(|s| &mut s.control).for_each(|p| *p -= model.shift);
@@ -63,6 +70,10 @@ fn surfaces(model: &Model, args: &Deform) -> Result<(Vec<Surface>, String), Fail
     if loaded.len() != model.surfaces.len() {
         let what = format!("has {} surfaces for the {} patches of the model", loaded.len(), model.surfaces.len());
         return Err(Failure::input(&args.to, what).hint("give surfaces of the same network, in its order"));
+    }
+    if matches!(extension.as_str(), "step" | "stp") {
+        // CAD programs keep neither the order of faces nor their parameters.
+        loaded = pipeline::matched(&model.surfaces, &loaded);
     }
     let apart = pipeline::join(&model.network, &mut loaded).map_err(failed)?;
     Ok((loaded, format!("surfaces loaded; their seams were apart by {} {} at most", number(apart), model.units)))

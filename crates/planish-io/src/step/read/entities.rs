@@ -25,7 +25,13 @@ pub(super) struct Entities<'a> {
     pub angle: f64,
 }
 
-impl Entities<'_> {
+impl<'a> Entities<'a> {
+    /// The entities of a file.
+    pub fn new(file: &'a Exchange<'a>) -> Result<Entities<'a>, ReadError> {
+        let [_, angle] = Entities::units(file)?;
+        Ok(Entities { file, angle: angle.unwrap_or(1.0) })
+    }
+
     /// A `CARTESIAN_POINT`.
     pub fn point(&self, id: u64) -> Result<DVec3, ReadError> {
         let record = self.file.record(id)?;

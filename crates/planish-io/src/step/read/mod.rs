@@ -15,6 +15,7 @@ mod faces;
 mod parts;
 mod shape;
 mod spline;
+mod surfaces;
 mod trim;
 
 use crate::{Place, ReadError};
@@ -27,6 +28,7 @@ use planish::geom::Aabb;
 use planish::mesh::TriMesh;
 use rayon::prelude::*;
 use shape::Surface;
+pub use surfaces::read_step_surfaces;
 use trim::{Limits, Node};
 
 /// Largest distance of the triangles from their surfaces, as a share of the diagonal.
@@ -41,14 +43,9 @@ const SAME_PLACE: f64 = 1e-7;
 /// Damaged text, kinds of geometry that are not read, faces that their edges do not bound.
 pub(crate) fn read(bytes: &[u8]) -> Result<TriMesh, ReadError> {
     let file = Exchange::new(bytes)?;
-    let [_, angle] = Entities::units(&file)?;
-    let entities = Entities { file: &file, angle: angle.unwrap_or(1.0) };
+    let entities = Entities::new(&file)?;
     let scale = unit(&file)?.1;
-    let diagonal = diagonal(&file, &entities)?;
-    // What both directions leave adds up: along an edge, and across it up to the first line, which may be a margin farther away.
-    let both = 1.0 + (1.0 + faces::MARGIN).powi(2);
-    let fineness = Fineness { distance: SURFACE_TOLERANCE * diagonal / both, turn: TURN };
-    let limits = Limits { tolerance: SAME_PLACE * diagonal, fineness };
+    let limits = limits(diagonal(&file, &entities)?);
     let mut points = Points::default();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     for part in parts::parts(&entities)? {
@@ -60,7 +57,8 @@ pub(crate) fn read(bytes: &[u8]) -> Result<TriMesh, ReadError> {
                 faces.push(face_of(&entities, face, is_turned, &mut points, limits)?);
             }
         }
-        let made: Vec<_> = faces.par_iter().map(|f| faces::triangulated(&f.surface, &f.rings, fineness)).collect();
+        let made: Vec<_> =
+            faces.par_iter().map(|f| faces::triangulated(&f.surface, &f.rings, limits.fineness)).collect();
         for (face, made) in faces.iter().zip(made) {
             add(face, made, &mut points, &mut triangles)?;
         }
@@ -72,6 +70,14 @@ pub(crate) fn read(bytes: &[u8]) -> Result<TriMesh, ReadError> {
     }
     points.all.iter_mut().for_each(|p| *p *= scale);
     Ok(TriMesh { points: points.all, triangles, attributes: Vec::new() })
+}
+
+/// How near and how fine the faces of a file of this diagonal are read.
+fn limits(diagonal: f64) -> Limits {
+    // What both directions leave adds up: along an edge, and across it up to the first line, which may be a margin farther away.
+    let both = 1.0 + (1.0 + faces::MARGIN).powi(2);
+    let fineness = Fineness { distance: SURFACE_TOLERANCE * diagonal / both, turn: TURN };
+    Limits { tolerance: SAME_PLACE * diagonal, fineness }
 }
 
 /// The unit of the coordinates that [`read`] gives.

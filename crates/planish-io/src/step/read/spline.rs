@@ -11,7 +11,7 @@ pub(super) const MOST_DEGREE: usize = 25;
 #[derive(Clone, Debug)]
 pub(super) struct Basis {
     pub degree: usize,
-    knots: Vec<f64>,
+    pub knots: Vec<f64>,
 }
 
 /// Functions that are not zero somewhere: the index of the first, their values and derivatives.

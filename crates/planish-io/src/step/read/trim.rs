@@ -9,8 +9,8 @@ use super::edges::{Fineness, Points, parameters_between};
 use super::shape::Surface;
 use crate::ReadError;
 
-/// Share of a period within which two parameters are one.
-const SAME_PARAMETER: f64 = 1e-6;
+/// Share of a period, or of the range of a surface, within which two parameters are one.
+pub(super) const SAME_PARAMETER: f64 = 1e-6;
 
 /// A point of a ring: its parameters, and the point of the mesh.
 pub(super) type Node = ([f64; 2], u32);
