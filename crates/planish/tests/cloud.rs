@@ -481,3 +481,36 @@ fn a_cancelled_cleaning_ends_as_cancelled() {
     let result = cloud::clean(&Cloud::new(sphere(5000)), &CleanParams::default(), &Stop);
     assert_eq!(result.unwrap_err(), CloudError::Cancelled(planish::observe::Cancelled));
 }
+
+/// A frame of a depth camera that looks at a ball of radius 3: 240 x 180 points, depths in whole steps. `noise` in steps.
+fn depth_frame(step: f64, noise: f64) -> Vec<DVec3> {
+    let (wide, high, middle) = (240u64, 180u64, 5.0);
+    let pixel = |i: u64| {
+        let [u, v] = [(i % wide, wide), (i / wide, high)].map(|(k, n)| (k as f64 + 0.5 - n as f64 / 2.0) / 240.0);
+        let ray = DVec3::new(u, v, 1.0);
+        // Where the ray meets the ball.
+        let (a, b, c) = (ray.length_squared(), middle, middle * middle - 9.0);
+        let depth = (b - (b * b - a * c).sqrt()) / a;
+        ray * ((depth / step + noise * normal(31, i)).round() * step)
+    };
+    (0..wide * high).map(pixel).collect()
+}
+
+#[test]
+fn depths_in_whole_steps_have_noise_of_a_step_over_root_12_within_20_percent_and_no_sharp_edges() {
+    let step = 0.01;
+    for (noise, turn) in [(0.0, 0.0), (0.6, 0.0), (0.0, 0.7)] {
+        let turn = DQuat::from_axis_angle(DVec3::new(0.3, -0.5, 0.8).normalize(), turn);
+        let points = depth_frame(step, noise).into_iter().map(|p| turn * p).collect();
+        let made = mesh_scan(&Cloud::new(points), &ScanParams::default(), &Silent).unwrap();
+        let honest = step * (1.0 / 12.0 + noise * noise).sqrt();
+        assert!((made.samples.noise / honest - 1.0).abs() < 0.2, "{} for {honest}", made.samples.noise);
+        let contour = &made.meshed.extracted;
+        let facts = diagnose(&contour.mesh);
+        assert!(contour.tags.edges.is_empty(), "{} sharp edges", contour.tags.edges.len());
+        assert!(facts.components == 1 && facts.boundary_loops == 1, "{facts:?}");
+        let off = |p: &DVec3| ((turn.inverse() * *p).distance(DVec3::new(0.0, 0.0, 5.0)) - 3.0).abs();
+        let off = rms(contour.mesh.points.iter().map(off));
+        assert!(off < honest, "{off} for {honest}");
+    }
+}

@@ -59,12 +59,12 @@ const HOLE_WINDING_STEP: f64 = 0.1;
 pub(crate) fn orient(fits: &[Fit], votes: &[Vote], hints: &Hints) -> Oriented {
     let mut sign = contracted(fits.len(), votes);
     improve(&mut sign, votes);
-    let mut settled: Vec<(DVec3, DVec3)> = Vec::new();
+    let mut settled = Settled::default();
     let mut is_closed = vec![false; fits.len()];
     for own in by_area(&segments(&sign, fits, votes, hints.areas), hints.areas).1 {
         let closed = decide(&own, fits, &mut sign, hints, &settled);
         own.iter().for_each(|&i| is_closed[i as usize] = closed);
-        settled.extend(own.iter().map(|&i| {
+        settled.add(own.iter().map(|&i| {
             let i = i as usize;
             (fits[i].center, sign[i] * hints.areas[i] * fits[i].normal)
         }));
@@ -204,8 +204,36 @@ pub(crate) fn patches(sign: &[f64], votes: &[Vote]) -> Vec<u32> {
     components(sign.len(), agreed.map(|v| (v.a, v.b)))
 }
 
+/// Samples whose sides are decided, in trees each at least twice as large as the next, so that a thousand parts are added
+/// without a thousand trees of all (Bentley and Saxe, *Decomposable Searching Problems*, 1980).
+#[derive(Default)]
+struct Settled {
+    trees: Vec<(Vec<(DVec3, DVec3)>, Dipoles)>,
+}
+
+impl Settled {
+    fn is_empty(&self) -> bool {
+        self.trees.is_empty()
+    }
+
+    /// Adds a part: centres and normals times areas.
+    fn add(&mut self, part: impl Iterator<Item = (DVec3, DVec3)>) {
+        let mut all: Vec<(DVec3, DVec3)> = part.collect();
+        while let Some((last, _)) = self.trees.pop_if(|t| t.0.len() < 2 * all.len()) {
+            all = [last, all].concat();
+        }
+        let tree = Dipoles::new(&all);
+        self.trees.push((all, tree));
+    }
+
+    /// Their winding number.
+    fn number(&self, p: DVec3) -> f64 {
+        self.trees.iter().map(|t| t.1.number(p, 0.0)).sum()
+    }
+}
+
 /// Decides which side of a part is outside; returns whether it is closed.
-fn decide(own: &[u32], fits: &[Fit], sign: &mut [f64], hints: &Hints, settled: &[(DVec3, DVec3)]) -> bool {
+fn decide(own: &[u32], fits: &[Fit], sign: &mut [f64], hints: &Hints, settled: &Settled) -> bool {
     let area: f64 = own.iter().map(|&i| hints.areas[i as usize]).sum();
     let sum = |of: &dyn Fn(usize) -> f64| own.iter().map(|&i| hints.areas[i as usize] * of(i as usize)).sum::<f64>();
     let Shape { total, volume, closed } = Shape::of(own, fits, sign, hints.areas);
@@ -218,17 +246,15 @@ fn decide(own: &[u32], fits: &[Fit], sign: &mut [f64], hints: &Hints, settled: &
         }
     }
     if verdict == 0.0 && closed {
-        let around = Dipoles::new(settled);
-        let inside = sum(&|i| around.number(fits[i].center, 0.0)) / divisor(area);
+        let inside = sum(&|i| settled.number(fits[i].center)) / divisor(area);
         // Inside a body a closed part is a cavity, whose outside is its own inside.
         verdict = if inside > 0.5 { -volume } else { volume };
     }
     if verdict == 0.0 && !settled.is_empty() {
         // An open part in a hole of what is settled has the inside of that behind it.
-        let around = Dipoles::new(settled);
         let step = sum(&|i| {
             let aside = sign[i] * fits[i].radius * fits[i].normal;
-            around.number(fits[i].center - aside, 0.0) - around.number(fits[i].center + aside, 0.0)
+            settled.number(fits[i].center - aside) - settled.number(fits[i].center + aside)
         });
         if step.abs() > HOLE_WINDING_STEP * area {
             verdict = step;

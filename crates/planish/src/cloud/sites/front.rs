@@ -14,7 +14,7 @@
 //! Supports follow from the data and not from factors c_i (§6.1).
 
 use super::survey::{PLENTY_OF_POINTS, WIDEST_NOISE};
-use super::{SITE_DISTANCE, Sites, in_pieces, layers};
+use super::{SITE_DISTANCE, Sites, in_pieces, layers, rounding};
 use crate::cloud::Quadric;
 use crate::cloud::local::fit::{Ball, Sheet, localized, sheet};
 use crate::cloud::local::fitted::{Fit, GUIDE_ERROR_NOISE};
@@ -228,8 +228,8 @@ fn fit_site(
                 center,
                 normal,
                 radius,
-                noise: s.rms,
-                thickness: (s.rms / divisor(sites.prior[site].noise)).max(1.0),
+                noise: s.rms.max(survey.hidden),
+                thickness: (s.rms.max(survey.hidden) / divisor(sites.prior[site].noise)).max(1.0),
                 error,
                 irregularity,
                 class,
@@ -245,7 +245,8 @@ fn fit_site(
         let ((d, n), (e, m)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
         let turns = [n.dot(g.normal), m.dot(f.normal)];
         let alike = turns.iter().all(|t| t.abs() > SIDE_BY_SIDE && d * e * t < 0.0);
-        if alike && d.abs().min(e.abs()) > layers::LEAST_LAYER_GAP * noise {
+        let one = rounding::is_one(&sites.prior[site].steps, f.normal, d.abs().min(e.abs()));
+        if alike && !one && d.abs().min(e.abs()) > layers::LEAST_LAYER_GAP * noise {
             (f.gap, g.gap) = (d.abs(), e.abs());
         }
     }

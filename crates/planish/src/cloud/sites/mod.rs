@@ -7,9 +7,11 @@
 
 pub(crate) mod front;
 mod layers;
+mod rounding;
 pub(crate) mod strays;
 pub(crate) mod survey;
 
+use super::sites::rounding::{Rounding, Steps};
 use super::sites::survey::{Prior, Scratch, Survey, survey};
 use crate::geom::KdTree;
 use crate::observe::{Cancelled, Observer};
@@ -75,9 +77,11 @@ pub(crate) fn in_pieces<T: Send>(
 /// Chooses and surveys the sites of points in the order of their tree.
 pub(crate) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -> Result<Sites, Cancelled> {
     let scouts: Vec<u32> = (0..points.len() as u32).step_by(SCOUT.min(points.len() / 8 + 1)).collect();
-    let blank = Prior { noise: 0.0, sure: false, one: false };
+    let rounding = Rounding::of(points, tree, SCOUT);
     let first = in_pieces(scouts.len(), (0.0, 0.2), observer, |s, i| {
-        survey(tree, points[scouts[i] as usize], f64::INFINITY, blank, s)
+        let p = points[scouts[i] as usize];
+        let blank = Prior { noise: 0.0, sure: false, one: false, steps: rounding.at(p) };
+        survey(tree, p, f64::INFINITY, blank, s)
     })?;
     // A narrow ball has little noise by chance; with the noise of those around the scouts look again.
     let (known, places): (Vec<Survey>, Vec<DVec3>) =
@@ -85,7 +89,7 @@ pub(crate) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
     let seen = if known.is_empty() {
         first
     } else {
-        let regions = Regions::new(&places, &known);
+        let regions = Regions::new(&places, &known, &rounding);
         in_pieces(scouts.len(), (0.2, 0.4), observer, |s, i| {
             let p = points[scouts[i] as usize];
             survey(tree, p, f64::INFINITY, regions.at(p).prior, s)
@@ -96,7 +100,7 @@ pub(crate) fn choose(points: &[DVec3], tree: &KdTree, observer: &dyn Observer) -
     if known.is_empty() {
         return Ok(Sites { owner: vec![u32::MAX; points.len()], ..Sites::default() });
     }
-    let regions = Regions::new(&places, &known);
+    let regions = Regions::new(&places, &known, &rounding);
     let mut there = Vec::new();
     let chosen = cover(points, tree, |i| {
         let region = regions.at(points[i]);
@@ -143,13 +147,14 @@ struct Region {
 struct Regions<'a> {
     known: &'a [Survey],
     tree: KdTree,
+    rounding: &'a Rounding,
     /// The noise at every scout, where it is sure.
     certain: Option<Vec<f64>>,
 }
 
 impl Regions<'_> {
-    fn new<'a>(places: &[DVec3], known: &'a [Survey]) -> Regions<'a> {
-        Regions { known, tree: KdTree::new(places), certain: certain_noise(places, known) }
+    fn new<'a>(places: &[DVec3], known: &'a [Survey], rounding: &'a Rounding) -> Regions<'a> {
+        Regions { known, tree: KdTree::new(places), rounding, certain: certain_noise(places, known) }
     }
 
     fn at(&self, p: DVec3) -> Region {
@@ -162,9 +167,10 @@ impl Regions<'_> {
         };
         let least = near.iter().take(3).map(|n| self.known[n.1 as usize].radius).fold(f64::INFINITY, f64::min);
         let radii = sorted(&|s| s.radius);
+        let steps: Steps = self.rounding.at(p);
         let prior = match &self.certain {
-            Some(noise) => Prior { noise: noise[near[0].1 as usize], sure: true, one: false },
-            None => Prior { noise: sorted(&|s| s.noise)[near.len() / 2], sure: false, one: false },
+            Some(noise) => Prior { noise: noise[near[0].1 as usize], sure: true, one: false, steps },
+            None => Prior { noise: sorted(&|s| s.noise)[near.len() / 2], sure: false, one: false, steps },
         };
         // A scout in a crease sees next to nothing; sites there stand as for half of the usual radius.
         let least = least.max(USUAL * radii[radii.len() / 2]);
@@ -216,7 +222,8 @@ impl Sites {
             .par_iter()
             .map_init(Scratch::default, |scratch, &(site, apart)| {
                 let old = &self.survey[site as usize];
-                let prior = Prior { noise: old.noise.hypot(apart / 2.0), sure: false, one: true };
+                let steps = self.prior[site as usize].steps;
+                let prior = Prior { noise: old.noise.hypot(apart / 2.0), sure: false, one: true, steps };
                 (prior, survey(tree, old.quadric.center, f64::INFINITY, prior, scratch))
             })
             .collect();

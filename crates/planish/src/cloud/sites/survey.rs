@@ -12,6 +12,7 @@
 //! Departs from [X03]: no feature size is set by hand, and the noise is measured in every place by itself.
 
 use super::layers::{Layers, PEAKED, split};
+use super::rounding::{self, Steps};
 use crate::cloud::Quadric;
 use crate::cloud::local::height::{Frame, Height, framed_height};
 use crate::cloud::local::moments::Moments;
@@ -23,7 +24,7 @@ use glam::DVec3;
 pub(crate) const PLENTY_OF_POINTS: usize = 700;
 pub(crate) const WIDEST_NOISE: f64 = 10.0;
 /// Points in the smallest ball.
-const SMALLEST: usize = 18;
+pub(super) const SMALLEST: usize = 18;
 /// Ratio of the radii of two balls, one after the other.
 const BALL_GROWTH: f64 = 1.3;
 /// Largest number of balls: 18 points become 1.69^11 = 320 times as many.
@@ -61,6 +62,8 @@ pub(crate) struct Survey {
     pub radius: f64,
     /// Standard deviation of the points, world units.
     pub noise: f64,
+    /// The part of it that rounding adds and the points do not show, world units.
+    pub hidden: f64,
     /// Expected squared error of the fit, world units squared.
     pub error: f64,
     /// Local spacing of the points, world units.
@@ -95,6 +98,8 @@ pub(crate) struct Prior {
     pub sure: bool,
     /// Two sheets side by side are one surface there, seen twice.
     pub one: bool,
+    /// How the points were rounded.
+    pub steps: Steps,
 }
 
 /// Surveys the surface near one point.
@@ -111,6 +116,7 @@ pub(crate) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
     }
     let floor = KNOWN * prior.noise;
     let start = if prior.sure { KNOWN_RADII * prior.noise } else { NOISE_RADII * floor };
+    let start = start.max(NOISE_RADII * rounding::variance(&prior.steps).sqrt());
     let mut p = p;
     if start > r0 {
         r0 = start;
@@ -160,6 +166,7 @@ pub(crate) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch:
                 best = Some(Survey {
                     radius: radius(j),
                     noise: ball.noise * r0,
+                    hidden: ball.hidden.sqrt() * r0,
                     error: error * r0 * r0,
                     spacing: radius(j) * ball.spacing(),
                     sure: ball.is_sure(),
@@ -197,6 +204,8 @@ struct Ball {
     height: Height,
     layers: Option<Layers>,
     noise: f64,
+    /// Squared noise that the rounding of the points hides: the same error for all of them.
+    hidden: f64,
     excess: f64,
     kurtosis: f64,
     count: usize,
@@ -214,13 +223,24 @@ impl Ball {
         rows: &mut [Vec<f64>; 3],
     ) -> Option<Ball> {
         let height = framed_height(&sums.matrix(), Frame::of_moments(sums))?;
-        let Scatter { noise, excess, kurtosis } = bias(&height, inner, ball, rows);
+        let hides =
+            |scatter: f64| rounding::hidden(&prior.steps, height.frame.n, scatter * unit * unit) / (unit * unit);
+        let Scatter { noise, hidden, excess, kurtosis } = bias(&height, inner, ball, hides, rows);
         let layers = if prior.one || kurtosis >= PEAKED { None } else { split(&height, inner, &rows[2]) };
+        let two = |l: &Layers| {
+            let apart = l.sheets[0].residual(DVec3::ZERO) - l.sheets[1].residual(DVec3::ZERO);
+            !rounding::is_one(&prior.steps, height.frame.n, apart.abs() * unit)
+        };
+        let layers = layers.filter(two);
         let floor = KNOWN * prior.noise;
-        let (noise, excess) = match &layers {
-            None => (noise.max(floor / unit), excess),
+        let (noise, hidden, excess) = match &layers {
+            None => (noise.max(floor / unit), hidden, excess),
             // Each sheet has half of the points, and its bias is not measured: that of both together is.
-            Some(l) => (l.noise.max(floor / unit), PARAMETERS + 2.0 * layer_bias(l, inner, ball, rows)),
+            Some(l) => {
+                let hidden = hides(l.noise * l.noise);
+                let shown = if hidden > 0.0 { l.noise.hypot(hidden.sqrt()) } else { l.noise };
+                (shown.max(floor / unit), hidden, PARAMETERS + 2.0 * layer_bias(l, inner, ball, rows))
+            }
         };
         let (radii, own) = match prior.sure {
             true => (KNOWN_RADII, noise.min(prior.noise / unit)),
@@ -229,7 +249,15 @@ impl Ball {
         };
         let wide = (radii * own).max(NO_VOLUME * noise);
         // The first ball is as wide as the noise asks, but for rounding.
-        (!(ball * (1.0 + 1e-9) < wide)).then_some(Ball { height, layers, noise, excess, kurtosis, count: inner.len() })
+        (!(ball * (1.0 + 1e-9) < wide)).then_some(Ball {
+            height,
+            layers,
+            noise,
+            hidden,
+            excess,
+            kurtosis,
+            count: inner.len(),
+        })
     }
 
     /// Expected squared error where `usual` is the noise of the region.
@@ -237,7 +265,7 @@ impl Ball {
         // Two standard deviations of a noise level from this many points pass as chance.
         let chance = THICKER + (2.0 / self.count as f64).sqrt();
         let thick = (self.noise * self.noise - (chance * usual).powi(2)).max(0.0);
-        self.noise * self.noise * (PARAMETERS + self.excess) / self.count as f64 + thick
+        self.noise * self.noise * (PARAMETERS + self.excess) / self.count as f64 + thick + self.hidden
     }
 
     /// Distance between points, in radii of the ball.
@@ -248,6 +276,7 @@ impl Ball {
     /// True if the noise is what the points scatter and no shape.
     fn is_sure(&self) -> bool {
         self.layers.is_none()
+            && self.hidden == 0.0
             && self.count as f64 > MANY
             && self.excess < UNBIASED
             && (self.kurtosis - 3.0).abs() < LACK.min(NORMAL * (24.0 / self.count as f64).sqrt())
@@ -260,13 +289,15 @@ fn layer_bias(layers: &Layers, points: &Points, ball: f64, rows: &mut [Vec<f64>;
         let [a, b] = [k, 1 - k].map(|i| &layers.sheets[i]);
         points.iter().filter(|&y| a.residual(y).abs() <= b.residual(y).abs()).collect()
     };
-    (0..2).map(|k| bias(&layers.sheets[k], &own(k), ball, rows).excess).sum::<f64>() / 2.0
+    (0..2).map(|k| bias(&layers.sheets[k], &own(k), ball, |_| 0.0, rows).excess).sum::<f64>() / 2.0
 }
 
 /// What the residuals of a ball show.
 struct Scatter {
-    /// Standard deviation inside the sectors, local units.
+    /// Standard deviation inside the sectors, with what is hidden, local units.
     noise: f64,
+    /// The square of what rounding hides of it.
+    hidden: f64,
     /// What the averages of the sectors hold beyond it, in units of the squared noise.
     excess: f64,
     /// Fourth moment of the residuals over the square of the second: 3 of normal noise.
@@ -274,8 +305,9 @@ struct Scatter {
 }
 
 /// Noise inside the sectors and what the averages of the sectors hold beyond it.
+/// * `hides` - squared noise that the points do not show, for what they show
 /// * `rows` - takes coordinates and residuals ([`Points::heights`])
-fn bias(height: &Height, points: &Points, ball: f64, rows: &mut [Vec<f64>; 3]) -> Scatter {
+fn bias(height: &Height, points: &Points, ball: f64, hides: impl Fn(f64) -> f64, rows: &mut [Vec<f64>; 3]) -> Scatter {
     const SURVEY_SECTORS: usize = 16;
     // Two rings of equal area want five points in each part.
     let rings = points.len() >= 5 * SURVEY_SECTORS;
@@ -297,10 +329,12 @@ fn bias(height: &Height, points: &Points, ball: f64, rows: &mut [Vec<f64>; 3]) -
     let parts = sums.iter().filter(|s| s.0 > 0.0).count() as f64;
     let between: f64 = sums.iter().filter(|s| s.0 > 0.0).map(|s| s.1 * s.1 / s.0).sum();
     let n = points.len() as f64;
-    let within = ((squares - between) / (n - parts).max(1.0)).max(0.0);
+    let shown = ((squares - between) / (n - parts).max(1.0)).max(0.0);
+    let hidden = hides(shown);
+    let within = shown + hidden;
     // The averages can take up this many of the six parameters, so the fit has removed their share.
     let freedom = (parts - if rings { 5.0 } else { 4.0 }).max(1.0);
     let excess = if within > 0.0 { (between / within - freedom).max(0.0) } else { 0.0 };
     let kurtosis = if squares > 0.0 { n * fourths / (squares * squares) } else { 3.0 };
-    Scatter { noise: within.sqrt(), excess, kurtosis }
+    Scatter { noise: within.sqrt(), hidden, excess, kurtosis }
 }
