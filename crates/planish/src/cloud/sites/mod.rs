@@ -18,6 +18,8 @@ use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
 
+/// Points in the smallest ball of a survey.
+const SMALLEST: usize = 18;
 /// Distance between sites over the radius of the fits: the blend then meets about eight fits everywhere.
 pub(crate) const SITE_DISTANCE: f64 = 0.5;
 /// Sites stand no closer than for this share of the usual radius: creases have narrow balls, not finer shapes.

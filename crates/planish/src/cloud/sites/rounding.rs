@@ -10,13 +10,14 @@
 //! Layers that are spheres around a scanner, and points that were turned after they were rounded and rounded again,
 //! are not found. See `docs/methods/samples.md`, section 2.
 
+use super::SMALLEST;
 use crate::geom::{Aabb, KdTree};
 use crate::linalg::eigen3;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 /// Points that must lie in one plane: those of the smallest ball of the survey.
-const LAYER_POINTS: usize = super::survey::SMALLEST;
+const LAYER_POINTS: usize = SMALLEST;
 /// What is closer than this share of the size of the scan is the same: files have coordinates of 24 bits, and turning a scan
 /// rounds them a few times more.
 const SAME: f64 = 1.0 / (1 << 20) as f64;

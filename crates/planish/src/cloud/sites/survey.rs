@@ -11,6 +11,7 @@
 //!
 //! Departs from [X03]: no feature size is set by hand, and the noise is measured in every place by itself.
 
+use super::SMALLEST;
 use super::layers::{Layers, PEAKED, split};
 use super::rounding::{self, Steps};
 use crate::cloud::Quadric;
@@ -23,8 +24,6 @@ use glam::DVec3;
 /// A ball of so many points leaves a tenth of the noise; if it is this many noise levels wide it grows no further.
 pub(crate) const PLENTY_OF_POINTS: usize = 700;
 pub(crate) const WIDEST_NOISE: f64 = 10.0;
-/// Points in the smallest ball.
-pub(super) const SMALLEST: usize = 18;
 /// Ratio of the radii of two balls, one after the other.
 const BALL_GROWTH: f64 = 1.3;
 /// Largest number of balls: 18 points become 1.69^11 = 320 times as many.
