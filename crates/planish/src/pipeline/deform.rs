@@ -3,6 +3,7 @@
 //! [K98] §7.2: displacements are stored in the frame of the surface so that they move and deform with it.
 
 use super::PipelineError;
+use crate::geom::Aabb;
 use crate::grid::Grid;
 use crate::mesh::{Attribute, FacePoint, TriMesh};
 use crate::model::Model;
@@ -72,18 +73,25 @@ pub fn join(network: &Network, surfaces: &mut [Surface]) -> Result<f64, ReliefEr
 
 /// Samples along each side of a patch that tell which surface is which: more than the corners, which a turn may leave alike.
 const COMPARED: usize = 5;
+/// A model that is thinner than this share of its length is flat: what it has there is rounding.
+const FLAT: f64 = 1e-6;
 
 /// Loaded surfaces as those of the model that they are: in their order, with `u` and `v` running as theirs. Each is the one that is nearest
-/// in its nearest direction; where two are nearest to the same one, as after a large move of all, they are taken in their own order.
-/// There must be as many as the model has.
+/// in its nearest direction, once the boxes around both models are one: moves and stretches of all do not count. Where two are
+/// nearest to the same one, they are taken in their own order. There must be as many as the model has.
 pub fn matched(surfaces: &[Surface], loaded: &[Surface]) -> Vec<Surface> {
-    let samples = |s: &Surface| -> Vec<DVec3> {
-        let at = |k: usize| k as f64 / (COMPARED - 1) as f64;
-        (0..COMPARED * COMPARED).map(|k| s.point(at(k % COMPARED), at(k / COMPARED))).collect()
+    let at = |k: usize| k as f64 / (COMPARED - 1) as f64;
+    let samples = |s: &Surface, bounds: &Aabb| -> Vec<DVec3> {
+        let size = bounds.max - bounds.min;
+        let places = (0..COMPARED * COMPARED).map(|k| s.point(at(k % COMPARED), at(k / COMPARED)));
+        let size = size.max(DVec3::splat(FLAT * size.max_element()));
+        places.map(|p| (p - bounds.min) / size).collect()
     };
-    let own: Vec<Vec<DVec3>> = surfaces.iter().map(samples).collect();
+    let bounds = |all: &[Surface]| Aabb::of(all.iter().flat_map(|s| &s.control));
+    let [own_bounds, their_bounds] = [bounds(surfaces), bounds(loaded)];
+    let own: Vec<Vec<DVec3>> = surfaces.iter().map(|s| samples(s, &own_bounds)).collect();
     let theirs: Vec<[Vec<DVec3>; 8]> =
-        loaded.par_iter().map(|s| std::array::from_fn(|way| samples(&run(s, way)))).collect();
+        loaded.par_iter().map(|s| std::array::from_fn(|way| samples(&run(s, way), &their_bounds))).collect();
     let apart = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(p, q)| p.distance_squared(*q)).sum::<f64>();
     let nearest_way = |k: usize, p: usize| {
         let all = theirs[k].iter().enumerate().map(|(way, samples)| (apart(samples, &own[p]), way));
