@@ -190,7 +190,7 @@ fn moved_control_points_carry_the_relief_along() {
         ("bad.obj", "v 0 0 0\nf 1 1 1\n", "without B-spline surfaces"),
         ("bad.obj", "v 0 0 0\ncstype bspline\ndeg 3 3\nsurf 0 1 0 1 1 2\nend\n", "vertex 2 is not there (line 4)"),
         ("bad.obj", "cstype bezier\n", "only surfaces of the kind bspline"),
-        ("bad.step", "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n", "no faces"),
+        ("bad.step", "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n", "no triangle with area"),
     ] {
         fs::write(at.join(name), text).unwrap();
         let output = planish(&["deform", "a.planish", name, "-o", "x.planish"], at);
