@@ -17,9 +17,9 @@ def fit(folder, *arguments, status=0):
 def same_surfaces(a, b):
     # Maps are read back only where they are written.
     skip = {"mesh.feature_edges", "relief.roundtrip_max", "relief.roundtrip_max_rel"}
-    # A model does not know the scan that it comes from.
+    # A model knows neither the scan that it comes from nor how its network was laid.
     def fitted(one):
-        return sorted(k for k in set(one["quality"]) - skip if not k.startswith(("scan.", "truth.")))
+        return sorted(k for k in set(one["quality"]) - skip if not k.startswith(("scan.", "truth.", "layout.")))
 
     keys = fitted(a)
     assert keys == fitted(b)
@@ -70,10 +70,10 @@ def test_a_project_alone_is_fitted_anew_with_the_control_points_asked_for(demo, 
         assert "layout" not in names and "grids" not in names and "surfaces" in names
         assert one["input"]["units"] == "cm" and one["quality"]["grid.points"] == report["quality"]["grid.points"]
         assert one["quality"]["relief.rounding_max_rel"] < 1e-9
-    # The less of two, as other work may run beside.
+    # A second for a hundred patches; the less of two, as other work may run beside.
     refits = [fine, fit(tmp_path, "m.planish", "--control", "12,12", "-o", "twice.planish")]
     names = {"surfaces", "seams", "relief"}
-    assert min(sum(s["seconds"] for s in one["stages"] if s["name"] in names) for one in refits) < 1.0
+    assert min(sum(s["seconds"] for s in one["stages"] if s["name"] in names) for one in refits) < patches / 100
     # Without options: with the parameters it was made with, so nothing changes.
     again = fit(tmp_path, "m.planish", "-o", "again.planish")
     same_surfaces(report, again)

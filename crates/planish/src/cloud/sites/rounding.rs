@@ -192,8 +192,8 @@ mod tests {
     fn depths_in_whole_steps_are_found_also_where_the_step_grows_and_the_scan_was_turned() {
         let turn = glam::DQuat::from_axis_angle(DVec3::new(0.3, -0.5, 0.8).normalize(), 0.9);
         let even = bent(|z| (z / 0.03).round() * 0.03);
-        let grown = bent(|z| 1.0 / ((40.0 / z).round() / 40.0));
-        for (points, step) in [(&even, [0.03, 0.03]), (&grown, [0.025, 0.1])] {
+        let grown = bent(|z| 1.0 / ((120.0 / z).round() / 120.0));
+        for (points, step) in [(&even, [0.03, 0.03]), (&grown, [1.0 / 120.0, 4.0 / 120.0])] {
             let turned: Vec<DVec3> = points.iter().map(|p| turn * *p).collect();
             for (points, way) in [(points, DVec3::Z), (&turned, turn * DVec3::Z)] {
                 let rounding = found(points);
