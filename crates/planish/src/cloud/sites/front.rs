@@ -53,6 +53,8 @@ const CREASE_REACH: f64 = 2.0;
 const CREASE_COSINE: f64 = 0.94;
 /// Points that must be nearest to a sheet.
 const FEWEST_NEAREST: u32 = 3;
+/// Or to the fits of its sheet around, as a share of what fits have there.
+const SHEET_SHARE: f64 = 0.5;
 /// Fits near a point that are asked which of them explains it.
 const RIVAL_FITS: usize = 10;
 /// Neighbours asked whether they carry a sheet on, how many must, and how far off they may be over their distance.
@@ -129,8 +131,7 @@ pub(crate) fn other_sheet(fits: &[Fit], i: usize) -> Option<usize> {
 pub(crate) fn supported(points: &[DVec3], mut fits: Vec<Fit>) -> Vec<Fit> {
     let mut owner = vec![u32::MAX; points.len()];
     own(points, &mut fits, &mut owner);
-    let kept = |fits: &[Fit]| (0..fits.len()).filter(|&i| fits[i].owned >= FEWEST_NEAREST).collect();
-    keep(kept(&fits), &mut fits, &mut owner);
+    keep(upheld(&fits), &mut fits, &mut owner);
     keep(accompanied(&fits), &mut fits, &mut owner);
     // The points of those that are dropped are still there: without them a surface has less area beside its edges.
     own(points, &mut fits, &mut owner);
@@ -169,30 +170,45 @@ fn own(points: &[DVec3], fits: &mut [Fit], owner: &mut [u32]) {
     owner.iter().filter(|&&o| o != u32::MAX).for_each(|&o| fits[o as usize].owned += 1);
 }
 
+/// The fits of sheets that points are nearest to: of their own, or those that carry them on.
+///
+/// Where sites stand as densely as points, a fit has a point or two by chance; what its sheet has around tells.
+fn upheld(fits: &[Fit]) -> Vec<usize> {
+    let owned = |all: &mut dyn Iterator<Item = usize>| {
+        let (sum, count) = all.fold((0, 0), |(sum, count), j| (sum + fits[j].owned, count + 1));
+        f64::from(sum) / f64::from(count)
+    };
+    let is_upheld = around(fits, |i, near| {
+        let others = near.iter().copied().filter(|&j| carries_on(&fits[i], &fits[j]));
+        let sheet = owned(&mut others.chain([i]));
+        fits[i].owned >= FEWEST_NEAREST || sheet >= SHEET_SHARE * owned(&mut near.iter().copied().chain([i]))
+    });
+    (0..fits.len()).filter(|&i| is_upheld[i]).collect()
+}
+
 /// All but sheets that hardly any neighbour carries on: a fit across a crease stands alone, a face does not.
 fn accompanied(fits: &[Fit]) -> Vec<usize> {
-    let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
-    let tree = KdTree::new(&centers);
-    let company: Vec<usize> = (0..fits.len())
-        .into_par_iter()
-        .map_init(Vec::new, |near, i| {
-            let f = &fits[i];
-            tree.nearest(f.center, COMPANY_ASKED + 1, near);
-            near.iter()
-                .filter(|n| n.1 as usize != i)
-                .filter(|n| {
-                    let g = &fits[n.1 as usize];
-                    let ((d, m), (e, k)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
-                    let slack = COMPANY_OFFSET * n.0.sqrt() + 2.0 * (f.error + g.error);
-                    m.dot(g.normal).abs() > CREASE_COSINE
-                        && k.dot(f.normal).abs() > CREASE_COSINE
-                        && d.abs() < slack
-                        && e.abs() < slack
-                })
-                .count()
-        })
-        .collect();
+    let company = around(fits, |i, near| near.iter().filter(|&&j| carries_on(&fits[i], &fits[j])).count());
     (0..fits.len()).filter(|&i| company[i] >= COMPANY_NEEDED).collect()
+}
+
+/// What is told of every fit by those nearest to it.
+fn around<T: Send>(fits: &[Fit], tell: impl Fn(usize, &[usize]) -> T + Sync) -> Vec<T> {
+    let tree = KdTree::new(&fits.iter().map(|f| f.center).collect::<Vec<_>>());
+    let one = |(near, others): &mut (Vec<_>, Vec<usize>), i: usize| {
+        tree.nearest(fits[i].center, COMPANY_ASKED + 1, near);
+        others.clear();
+        others.extend(near.iter().map(|n| n.1 as usize).filter(|&j| j != i));
+        tell(i, others)
+    };
+    (0..fits.len()).into_par_iter().map_init(Default::default, one).collect()
+}
+
+/// Is one fit the other's sheet, a little aside?
+fn carries_on(f: &Fit, g: &Fit) -> bool {
+    let ((d, m), (e, k)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
+    let slack = COMPANY_OFFSET * f.center.distance(g.center) + 2.0 * (f.error + g.error);
+    m.dot(g.normal).abs() > CREASE_COSINE && k.dot(f.normal).abs() > CREASE_COSINE && d.abs() < slack && e.abs() < slack
 }
 
 fn fit_site(
@@ -253,7 +269,7 @@ fn fit_site(
 }
 
 /// Sheets side by side turn by less than this cosine (30 degrees) from each other: the flanks of a wedge do so, too.
-const SIDE_BY_SIDE: f64 = 0.866;
+pub(crate) const SIDE_BY_SIDE: f64 = 0.866;
 
 /// Middles of the points of two sheets are at most this far from each other along them, as a share of the ball, where the
 /// sheets lie above each other. Side by side, halves of a disk have .85.
