@@ -1,24 +1,65 @@
 //! Sharp lines of meshes that were made of scans: what they have that the part does not.
-//!
-//! `cargo test --release -p planish --test lines -- --ignored --nocapture` prints the census of all parts and noises.
-#![allow(clippy::print_stdout)]
-
-#[allow(dead_code)]
-#[path = "regress/cpu.rs"]
-mod cpu;
-#[allow(dead_code)]
-#[path = "regress/measure.rs"]
-mod measure;
 
 use planish::geom::random;
-use planish::mesh::{Adjacency, FeatureTags, TriMesh, diagnose, next, self_intersections, sharp_edges};
-use planish::pipeline::{ScanParams, edge_reach, mesh_scan};
-use planish::sharp::{Census, LinesFound, ScanScale, census, find_lines, lines_found, tidy_lines};
+use planish::mesh::{Adjacency, FeatureTags, TriMesh, diagnose, folded_back, next, self_intersections, sharp_edges};
+use planish::sharp::{ScanScale, find_lines, tidy_lines};
 use planish::synthetic::shapes;
 use planish::{DVec3, Silent};
+use std::collections::BTreeMap;
 
 /// The angle between normals that extraction takes for a sharp edge, radians.
 const SHARP: f64 = 0.451;
+
+/// A line that turns by more than this at a vertex, degrees, has a corner or a jog there.
+const TURN_DEG: f64 = 40.0;
+/// A triangle lower than this share of its longest edge is a sliver.
+const SLIVER: f64 = 0.05;
+
+/// Counts of a mesh with lines.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Census {
+    /// Length of all lines, world units.
+    length: f64,
+    /// Vertices where three lines or more meet.
+    junctions: usize,
+    /// Vertices inside the surface where a line ends.
+    ends: usize,
+    /// Vertices where a line turns by more than [`TURN_DEG`].
+    turns: usize,
+    /// Triangles with a corner on a line that are lower than [`SLIVER`] of their longest edge.
+    slivers: usize,
+    /// Pairs of neighbours in the whole mesh that are folded back on one another.
+    folded_back: usize,
+}
+
+/// Counts what lines have.
+/// * `tags` - of `mesh`
+fn census(mesh: &TriMesh, tags: &FeatureTags) -> Census {
+    let adjacency = Adjacency::new(mesh);
+    let at = |v: u32| mesh.points[v as usize];
+    let mut beside: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for &[a, b] in &tags.edges {
+        beside.entry(a).or_default().push(b);
+        beside.entry(b).or_default().push(a);
+    }
+    let turns = |v: u32, others: &[u32]| match others {
+        [a, b] => (at(v) - at(*a)).angle_between(at(*b) - at(v)) > TURN_DEG.to_radians(),
+        _ => false,
+    };
+    let is_sliver = |t: usize| {
+        let [a, b, c] = mesh.corners(t);
+        let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
+        mesh.triangles[t].iter().any(|v| beside.contains_key(v)) && (b - a).cross(c - a).length() < SLIVER * longest
+    };
+    Census {
+        length: tags.edges.iter().map(|e| at(e[0]).distance(at(e[1]))).sum(),
+        junctions: beside.values().filter(|o| o.len() > 2).count(),
+        ends: beside.iter().filter(|(v, o)| o.len() == 1 && !adjacency.is_boundary_vertex(**v)).count(),
+        turns: beside.iter().filter(|(v, o)| turns(**v, o)).count(),
+        slivers: (0..mesh.triangles.len()).filter(|&t| is_sliver(t)).count(),
+        folded_back: folded_back(mesh, &adjacency).len(),
+    }
+}
 
 /// A cube of 24 by 24 squares a side, three to a cell, its vertices off by normal deviates of 3 % of a cell; and its true edges.
 fn noisy_cube() -> (TriMesh, FeatureTags, ScanScale) {
@@ -39,6 +80,26 @@ fn found(mesh: &TriMesh, scale: &ScanScale) -> FeatureTags {
     let mut tags = FeatureTags::from_edges(mesh.points.len(), []);
     find_lines(mesh, &mut tags, scale, SHARP, &Silent).expect("nobody cancels");
     tags
+}
+
+#[test]
+fn the_edges_of_a_box_meet_at_8_corners_and_have_no_ends_turns_or_slivers() {
+    let mesh = shapes::cuboid(DVec3::ONE, 4);
+    let sharp = sharp_edges(&mesh, &Adjacency::new(&mesh), 40.0);
+    let ends = |h: usize| [mesh.origin(h as u32), mesh.origin(next(h as u32))];
+    let tags = FeatureTags::from_edges(mesh.points.len(), (0..sharp.len()).filter(|&h| sharp[h]).map(ends));
+    let found = census(&mesh, &tags);
+    let expected = Census { length: found.length, junctions: 8, ..Census::default() };
+    assert_eq!(found, expected);
+    assert!((found.length - 12.0).abs() < 1e-9);
+    // Without one edge of the box: two ends at the places where corners of two lines are left.
+    let most = mesh.bounds().max;
+    let is_kept = |e: &&[u32; 2]| {
+        e.iter().any(|&v| (mesh.points[v as usize].truncate() - most.truncate()).abs().max_element() > 1e-9)
+    };
+    let fewer = FeatureTags::from_edges(mesh.points.len(), tags.edges.iter().filter(is_kept).copied());
+    let found = census(&mesh, &fewer);
+    assert_eq!((found.junctions, found.ends, found.turns), (6, 0, 2));
 }
 
 #[test]
@@ -118,39 +179,4 @@ fn a_vertex_that_all_but_touches_a_line_and_one_next_to_another_on_it_leave_no_s
     assert!(self_intersections(&mesh).is_empty());
     let area: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
     assert!((area - 6.0).abs() < 1e-3, "{area}");
-}
-
-/// Meshes a scan of a synthetic part, and counts what its lines have.
-fn lines_of(part: &str, percent: f64, seed: u64) -> (Census, LinesFound) {
-    let scanned = measure::scan(part, percent, seed);
-    let made = mesh_scan(&scanned.cloud, &ScanParams::default(), &Silent).expect("a part can be meshed");
-    let extracted = &made.meshed.extracted;
-    let within = 2.0 * edge_reach(&scanned.truth, scanned.noise);
-    let found = lines_found(&scanned.truth, &extracted.mesh, &extracted.tags, within);
-    (census(&extracted.mesh, &extracted.tags), found)
-}
-
-fn print(part: &str, percent: f64, seed: u64) -> Census {
-    let (c, found) = lines_of(part, percent, seed);
-    println!(
-        "{part:8} {percent:4} % seed {seed}: {:4} junctions {:3} ends {:4} turns {:5} slivers {:3} folded, {:5.1} % found {:4.1} % false",
-        c.junctions,
-        c.ends,
-        c.turns,
-        c.slivers,
-        c.folded_back,
-        100.0 * found.found,
-        100.0 * found.false_share
-    );
-    c
-}
-
-#[test]
-#[ignore = "prints a table, in minutes"]
-fn census_of_the_lines_of_all_parts_and_noises() {
-    for part in measure::PARTS {
-        for percent in [0.1, 0.25] {
-            measure::SEEDS.iter().for_each(|&seed| _ = print(part, percent, seed));
-        }
-    }
 }

@@ -30,6 +30,7 @@ use crate::words;
 pub use crate::words::with_hint;
 pub use batch::folder_names;
 use planish::grid::Grid;
+use planish::mesh::{Adjacency, TriMesh, folded_back, self_intersections};
 use planish::model::{Model, Units};
 use planish::observe::Cancelled;
 use planish::pipeline::{Figure, PipelineError, Quality, StageRecord, Warning};
@@ -202,6 +203,19 @@ fn displaced_grids(model: &Model) -> Result<Option<Vec<Grid>>, ReliefError> {
         Ok(Grid { rows: r.rows, cols: r.cols, points: planish::relief::displace(s, r)?, places: Vec::new() })
     };
     model.surfaces.iter().zip(&model.reliefs).map(one).collect::<Result<_, _>>().map(Some)
+}
+
+/// Above so many triangles crossings are not looked for: an answer is to come soon.
+const MOST_LOOKED_AT: usize = 2_000_000;
+
+/// Counts triangles that cross others, where there are not too many, and those that are folded back on their neighbours.
+fn meeting_figures(mesh: &TriMesh, report: &mut Report) {
+    let folded = folded_back(mesh, &Adjacency::new(mesh)).len();
+    report.quality.insert("mesh.folded_back".into(), Figure::Count(folded as u64));
+    if mesh.triangles.len() <= MOST_LOOKED_AT {
+        let pairs = self_intersections(mesh).len();
+        report.quality.insert("mesh.self_intersections".into(), Figure::Count(pairs as u64));
+    }
 }
 
 /// Writes the report into its staged file and moves it to its place; and to standard output, where that was asked for.

@@ -291,8 +291,8 @@ pub(super) fn lay(
             if effort.is_spent() {
                 return best.ok_or(why);
             }
-            // Where no number had room, finer edges hardly ever help.
-            if best.is_none() || why.places().is_empty() {
+            // Where no number had room, or none that had is the one asked for, finer edges hardly ever help.
+            if best.as_ref().is_none_or(|best| !best.worth.is_kept()) || why.places().is_empty() {
                 break;
             }
             if !sizing.has_room_for(why.places().len()) {

@@ -28,12 +28,12 @@ const REACH_CELLS: f64 = 3.0;
 /// beside its place. What is smaller goes to the sheets around it.
 const LEAST_SHEET_CELLS: f64 = 2.0;
 /// Rounds of taking and fitting.
-const ROUNDS: usize = 4;
+const LABEL_ROUNDS: usize = 4;
 /// Least usual angle between normals, radians, and least usual distance, cells: exact meshes have none.
 const LEAST_TURN: f64 = 0.02;
 const LEAST_OFF_CELLS: f64 = 0.01;
 /// Steps of a nat that cuts count in.
-const STEPS: f64 = 1e4;
+const NAT_STEPS: f64 = 1e4;
 
 /// Labels of the faces of a mesh, and the sheets that they stand for.
 pub(super) struct Labels {
@@ -80,7 +80,7 @@ impl Labels {
             cell: scale.cell,
         };
         labels.fit(&energy);
-        for _ in 0..ROUNDS {
+        for _ in 0..LABEL_ROUNDS {
             energy.measure(&labels);
             let mut changed = 0;
             // A label gets faces in its own turn alone, so that those it had before the round are all.
@@ -143,11 +143,11 @@ impl Energy<'_> {
     }
 
     fn cost(&self, f: u32, sheet: &Surface) -> i64 {
-        (STEPS * self.points[f as usize] * self.misfit(f, sheet)).round() as i64
+        (NAT_STEPS * self.points[f as usize] * self.misfit(f, sheet)).round() as i64
     }
 
     fn price(&self, h: u32) -> i64 {
-        (STEPS * self.border[h as usize]).round() as i64
+        (NAT_STEPS * self.border[h as usize]).round() as i64
     }
 
     /// Takes the usual deviations from those of all faces: medians of normal ones (factor 1.4826) by area.

@@ -2,13 +2,11 @@
 //!
 //! Noise hides parts of the edges of a scan's mesh, and puts their vertices beside their place. [`find_lines`] labels the faces by the
 //! sheets that they are parts of, whose borders are the lines; [`fair_lines`] moves them to where the surfaces on both sides
-//! meet; [`tidy_lines`] takes out the slivers beside them; [`census`] counts what lines have that a part does not. See
-//! `docs/methods/sharp.md`; alternatives are in `docs/decisions/0016-sharp-line-alternatives.md`.
+//! meet; [`tidy_lines`] takes out the slivers beside them. See `docs/methods/sharp.md`; alternatives are in `docs/decisions/0016-sharp-line-alternatives.md`.
 
 mod bent;
 mod borders;
 mod broken_lines;
-mod census;
 mod charts;
 mod fair_lines;
 mod flanks;
@@ -21,7 +19,6 @@ mod slivers;
 pub(crate) use bent::split_bent;
 pub use borders::find_lines;
 pub(crate) use broken_lines::{bridge_gaps, cut_spikes};
-pub use census::{Census, LinesFound, SLIVER, TRUE_EDGE_DEG, TURN_DEG, census, lines_found};
 pub use fair_lines::fair_lines;
 pub use flanks::ScanScale;
 pub use slivers::tidy_lines;

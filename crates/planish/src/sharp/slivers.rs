@@ -23,7 +23,7 @@ const AROUND_CELLS: f64 = 1.0;
 /// A triangle that looks away from what is expected by more than this (cosine of 60 degrees) is turned.
 const TURNED_COSINE: f64 = 0.5;
 /// Rounds of changes.
-const ROUNDS: usize = 24;
+const TIDY_ROUNDS: usize = 24;
 
 /// Takes out what is too small beside the lines of `tags`, at which no triangle comes to look another way or to meet others.
 /// Returns how many triangles went.
@@ -59,7 +59,7 @@ pub fn tidy_lines(
         };
         let mut faulty: Vec<u32> = (0..count as u32).filter(is_faulty).collect();
         let mut merging = Merging::new(mesh, &tags.vertices, &tags.edges);
-        for _ in 0..ROUNDS {
+        for _ in 0..TIDY_ROUNDS {
             if faulty.is_empty() {
                 break;
             }

@@ -10,7 +10,7 @@ use crate::files::{self, Content};
 use crate::summary::Summary;
 use crate::{progress, stdout};
 use planish::DVec3;
-use planish::mesh::{Adjacency, Diagnosis, TriMesh, diagnose, folded_back, self_intersections};
+use planish::mesh::{Adjacency, Diagnosis, TriMesh, diagnose};
 use planish::model::{Model, Units};
 use planish::pipeline::{Figure, Warning};
 use planish_io::report::{Report, count, number};
@@ -214,27 +214,19 @@ fn faults(facts: &Diagnosis) -> Vec<Warning> {
     found.map(|(code, n, words)| Warning::new(code, format!("{n} {words}."), "")).collect()
 }
 
-/// Above so many triangles crossings are not looked for: `info` is to answer soon.
-const MOST_LOOKED_AT: usize = 2_000_000;
-
-/// Looks for triangles that cross others or are folded back on their neighbours, and tells how many in words.
+/// Tells of triangles that cross others or are folded back on their neighbours; those that cross in words.
 fn crossings(mesh: &TriMesh, report: &mut Report) -> String {
-    let folded = folded_back(mesh, &Adjacency::new(mesh)).len();
-    report.quality.insert("mesh.folded_back".into(), Figure::Count(folded as u64));
-    if folded > 0 {
-        let text = format!("{} pairs of neighbours are folded back on one another.", count(folded as u64));
-        report.warnings.push(Warning::new("folded_back", text, ""));
+    super::meeting_figures(mesh, report);
+    let found = |report: &Report, key: &str| report.figure(key).map(|n| count(n as u64));
+    for (code, words) in [
+        ("folded_back", "pairs of neighbours are folded back on one another"),
+        ("self_intersections", "pairs of triangles cross each other"),
+    ] {
+        if let Some(n) = found(report, &format!("mesh.{code}")).filter(|n| n != "0") {
+            report.warnings.push(Warning::new(code, format!("{n} {words}."), ""));
+        }
     }
-    if mesh.triangles.len() > MOST_LOOKED_AT {
-        return "not looked for: too many triangles".into();
-    }
-    let pairs = self_intersections(mesh).len();
-    report.quality.insert("mesh.self_intersections".into(), Figure::Count(pairs as u64));
-    if pairs > 0 {
-        let text = format!("{} pairs of triangles cross each other.", count(pairs as u64));
-        report.warnings.push(Warning::new("self_intersections", text, ""));
-    }
-    count(pairs as u64)
+    found(report, "mesh.self_intersections").unwrap_or_else(|| "not looked for: too many triangles".into())
 }
 
 /// Counts folds of the grids and surfaces of a model.

@@ -19,7 +19,7 @@ use planish::cloud;
 use planish::contour::{self, Meshed, MeshingError, Sampling};
 use planish::field::{Field, Formula, MeshBody, Part, ScalarGrid, Solid, Spacing};
 use planish::geom::Aabb;
-use planish::mesh::{Adjacency, TriMesh, diagnose, folded_back, self_intersections};
+use planish::mesh::{TriMesh, diagnose};
 use planish::model::Units;
 use planish::pipeline::{self, Figure, ScanError, ScanMeshed, ScanParams, StageRecord, Warning};
 use planish_io::report::{Input, Report, count, number};
@@ -331,11 +331,7 @@ fn figures(made: &Meshed, report: &mut Report) {
         ("mesh.mended_hits", made.mended),
     ];
     report.quality.extend(whole.map(|(key, n)| (key.to_owned(), Figure::Count(n as u64))));
-    let mesh = &made.extracted.mesh;
-    let folded = folded_back(mesh, &Adjacency::new(mesh)).len();
-    for (key, n) in [("mesh.self_intersections", self_intersections(mesh).len()), ("mesh.folded_back", folded)] {
-        report.quality.insert(key.into(), Figure::Count(n as u64));
-    }
+    super::meeting_figures(&made.extracted.mesh, report);
     report.quality.insert("mesh.watertight".into(), Figure::Flag(facts.watertight));
     report.quality.insert("mesh.manifold".into(), Figure::Flag(facts.manifold));
     report.quality.insert("mesh.voxel".into(), Figure::Number(made.lattice.step.x));

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 const LAYER_POINTS: usize = SMALLEST;
 /// What is closer than this share of the size of the scan is the same: files have coordinates of 24 bits, and turning a scan
 /// rounds them a few times more.
-const SAME: f64 = 1.0 / (1 << 20) as f64;
+const SAME_SHARE: f64 = 1.0 / (1 << 20) as f64;
 /// One place in this many must lie in a layer.
 const LAYERED_PLACES: usize = 50;
 /// Planes whose normals differ by less than this cosine are parallel: the nearest points are a thousandth of the scan wide, at
@@ -29,11 +29,11 @@ const PARALLEL: f64 = 1.0 - 1e-6;
 /// Directions at most: those of the axes.
 const MOST_RULERS: usize = 3;
 /// Planes whose directions are counted to find these.
-const CANDIDATES: usize = 64;
+const CANDIDATE_PLANES: usize = 64;
 /// Share of the points that lie on layers of `LAYER_POINTS`.
 const ON_LAYERS: f64 = 0.9;
 /// Layers are farther apart than so many widths of one.
-const CLEAR: f64 = 16.0;
+const CLEAR_WIDTHS: f64 = 16.0;
 /// Distances of layers around one that tell the step there, and how far they are off its multiples, in steps. Of layers at
 /// random two fifths are that near.
 const GAPS_AROUND: usize = 8;
@@ -66,7 +66,7 @@ impl Rounding {
     /// What the points themselves tell.
     /// * `every` - one point in so many is asked
     pub(crate) fn of(points: &[DVec3], tree: &KdTree, every: usize) -> Rounding {
-        let same = SAME * Aabb::of(points).diagonal();
+        let same = SAME_SHARE * Aabb::of(points).diagonal();
         let asked: Vec<usize> = (0..points.len()).step_by(every).collect();
         let flat: Vec<(DVec3, DMat3)> = asked
             .par_iter()
@@ -78,7 +78,7 @@ impl Rounding {
                 });
                 let (values, axes) = eigen3(spread);
                 let most = same * same * near.len() as f64;
-                (values[0] < most && values[1] > CLEAR * CLEAR * most).then_some((axes[0], spread))
+                (values[0] < most && values[1] > CLEAR_WIDTHS * CLEAR_WIDTHS * most).then_some((axes[0], spread))
             })
             .collect::<Vec<_>>()
             .into_iter()
@@ -88,7 +88,7 @@ impl Rounding {
             return Rounding::default();
         }
         // Of the planes every so many is a candidate: what is frequent is among them. Rows of pixels are planes, too.
-        let candidates = flat.iter().step_by(flat.len().div_ceil(CANDIDATES));
+        let candidates = flat.iter().step_by(flat.len().div_ceil(CANDIDATE_PLANES));
         let mut ways: Vec<(DVec3, DMat3, usize)> = Vec::new();
         for (n, _) in candidates {
             if ways.iter().all(|w| w.0.dot(*n).abs() <= PARALLEL) {
@@ -135,7 +135,7 @@ impl Ruler {
             let count = gap / step;
             if count < MOST_STEPS {
                 told += 1;
-                good += usize::from((count - count.round()).abs() < OFF_MARK && *gap > CLEAR * same);
+                good += usize::from((count - count.round()).abs() < OFF_MARK && *gap > CLEAR_WIDTHS * same);
             }
         }
         (told >= FEWEST_GAPS && good as f64 > ON_MARKS * told as f64).then_some(Ruler { way, marks, steps })
