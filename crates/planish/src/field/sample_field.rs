@@ -8,7 +8,7 @@ use crate::cloud::{Blend, Blended, Dipoles, Samples};
 use crate::geom::Aabb;
 use glam::DVec3;
 
-/// The pseudo-distance changes by at most this much per length near the surface.
+/// What a cell says changes by at most this much per length.
 const STEEP: f64 = 1.2;
 /// From this share of the support on a point is beside the data: cells stand less than .38 supports apart.
 const BESIDE: f64 = 0.42;
@@ -171,17 +171,17 @@ impl Field for Near<'_> {
     }
 
     fn crosses(&self, aabb: &Aabb) -> bool {
+        // The value is a mean of what the cells say: where all are on one side, so is it.
         let (center, reach) = (aabb.center(), STEEP * aabb.diagonal() / 2.0);
-        if let Some(here) = self.here(center).filter(amid) {
-            return here.value.abs() <= reach;
-        }
-        // Beside the data the value is no distance, some other surface may be nearer: all must be on one side.
-        let Some(dipoles) = &self.field.closing else { return !self.cells.is_empty() };
         let mut values = self.cells.iter().map(|&i| self.field.blend.cells()[i as usize].evaluate(center).0);
         let side = values.clone().next().map(f64::signum);
         if side.is_some_and(|side| !values.all(|d| d.is_finite() && d * side > reach)) {
             return true;
         }
+        if self.here(center).filter(amid).is_some() {
+            return false;
+        }
+        let Some(dipoles) = &self.field.closing else { return side.is_some() };
         dipoles.side(center, aabb.diagonal() / 2.0).is_none_or(|s| side.is_some_and(|side| side != s))
     }
 
@@ -203,7 +203,7 @@ impl Field for Near<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::{CleanParams, Cloud, clean};
+    use crate::cloud::{Cell, CleanParams, Cloud, Quadric, clean};
     use crate::geom::random;
     use crate::observe::Silent;
 
@@ -217,6 +217,22 @@ mod tests {
             DVec3::new(s * a.cos(), s * a.sin(), z) + 0.01 * DVec3::from_array(noise)
         };
         clean(&Cloud::new((0..4000).map(point).collect()), &CleanParams::default(), &Silent).unwrap()
+    }
+
+    #[test]
+    fn a_box_that_a_trusted_face_far_off_calls_deep_inside_is_not_ruled_out_where_a_near_face_passes_it() {
+        // Both faces of a plate of thickness 10.
+        let face = |height: f64, up: f64, trust: f64| {
+            let center = DVec3::Z * height;
+            let sheets = [Quadric::plane(center, 9.0, DVec3::Z * up); 4];
+            Cell { center, support: 9.0, trust, sheets, count: 1, concave: 0 }
+        };
+        let samples = Samples { cells: vec![face(0.0, -1.0, 100.0), face(10.0, 1.0, 1.0)], ..Samples::default() };
+        let field = SampleField::new(&samples, false);
+        let center = DVec3::Z * 7.9;
+        let aabb = Aabb { min: center - 3.0, max: center + 3.0 };
+        assert!(field.value(center) < -STEEP * aabb.diagonal() / 2.0, "{}", field.value(center));
+        assert!(field.value(DVec3::Z * 10.5) > 0.0 && field.crosses(&aabb));
     }
 
     #[test]
