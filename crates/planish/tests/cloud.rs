@@ -514,3 +514,73 @@ fn depths_in_whole_steps_have_noise_of_a_step_over_root_12_within_20_percent_and
         assert!(off < honest, "{off} for {honest}");
     }
 }
+
+/// A comb: fins on a base, all in spacings of its points.
+struct Comb {
+    fins: usize,
+    wall: f64,
+    gap: f64,
+}
+
+impl Comb {
+    const HIGH: f64 = 10.0;
+    const LONG: f64 = 30.0;
+    const BASE: f64 = 6.0;
+
+    fn wide(&self) -> f64 {
+        self.fins as f64 * (self.wall + self.gap) - self.gap
+    }
+
+    fn holds(&self, p: DVec3) -> bool {
+        let high = if p.x.rem_euclid(self.wall + self.gap) < self.wall { Comb::HIGH } else { 0.0 };
+        p.x > 0.0 && p.x < self.wide() && p.y > 0.0 && p.y < Comb::LONG && p.z > -Comb::BASE && p.z < high
+    }
+
+    /// Its faces: a corner and two edges each.
+    fn faces(&self) -> Vec<[DVec3; 3]> {
+        let (x, y, z) = (self.wide() * DVec3::X, Comb::LONG * DVec3::Y, Comb::BASE * DVec3::Z);
+        let mut faces = vec![[-z, x, y], [-z, y, z], [x - z, y, z], [-z, x, z], [y - z, x, z]];
+        for k in 0..self.fins {
+            let left = k as f64 * (self.wall + self.gap) * DVec3::X;
+            let (wall, gap, high) = (self.wall * DVec3::X, self.gap * DVec3::X, Comb::HIGH * DVec3::Z);
+            faces.extend([[left, y, high], [left + wall, y, high], [left + high, wall, y]]);
+            faces.extend([[left, wall, high], [left + y, wall, high]]);
+            if k + 1 < self.fins {
+                faces.push([left + wall, gap, y]);
+            }
+        }
+        faces
+    }
+
+    /// One point per unit of area, with noise of a quarter.
+    fn scan(&self, seed: u64) -> Vec<DVec3> {
+        let faces = self.faces();
+        let mut total = 0.0;
+        let sums: Vec<f64> = faces
+            .iter()
+            .map(|f| {
+                total += f[1].cross(f[2]).length();
+                total
+            })
+            .collect();
+        let place = |i: u64| {
+            let [pick, r, s] = [0, 1, 2].map(|k| random::unit(seed, 3 * i + k));
+            let [corner, a, b] = faces[sums.partition_point(|&x| x <= pick * total).min(faces.len() - 1)];
+            corner + r * a + s * b + 0.25 * DVec3::from_array([0, 1, 2].map(|k| normal(seed + 1, 3 * i + k)))
+        };
+        (0..total as u64).map(place).collect()
+    }
+}
+
+#[test]
+fn of_the_samples_of_combs_with_walls_and_gaps_of_two_and_a_half_to_three_spacings_1_percent_looks_the_wrong_way() {
+    for (seed, wall, gap) in [(1, 3.0, 2.5), (2, 2.5, 3.0)] {
+        let comb = Comb { fins: 6, wall, gap };
+        let samples = clean(comb.scan(seed)).samples;
+        let step = wall.min(gap) / 3.0;
+        let wrong =
+            |s: &&cloud::Sample| comb.holds(s.center + step * s.normal) && !comb.holds(s.center - step * s.normal);
+        let share = samples.iter().filter(wrong).count() as f64 / samples.len() as f64;
+        assert!(share < 0.01, "{share} of {} with walls of {wall}", samples.len());
+    }
+}

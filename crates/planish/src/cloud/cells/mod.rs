@@ -5,7 +5,8 @@
 //! 1. every site asks which nested maxima and minima (`nest`) of the oriented samples around explain its points; the
 //!    sheets are fitted again to their shares of the points (`refine`, `chance`)
 //! 2. a plate ends where its points do (`rim`); a step gets a wall where the points change over (`step`)
-//! 3. a cell that neighbours of several sheets contradict loses nearly all of its weight
+//! 3. where sheets face cells on both sides, these ask the points up to them alone, as a cell of Ohtake et al. is divided
+//! 4. a cell that neighbours of several sheets contradict loses nearly all of its weight
 //!
 //! The blend of these functions keeps edges sharp, and where one site errs its neighbours outvote it.
 
@@ -21,7 +22,7 @@ use super::cells::step::{is_alike, step};
 use super::local::joints::{RESIDUAL_LIMIT, capped, nearest_cost};
 use super::local::nest::{self, Seen, cost, nest};
 use super::local::points::Points;
-use super::sites::front::{SHEET_PRICE, VARIATION_PRICE};
+use super::sites::front::{SHEET_PRICE, SIDE_BY_SIDE, VARIATION_PRICE};
 use super::sites::{Sites, in_pieces};
 use super::{Blend, Quadric, Sample};
 use crate::geom::{Aabb, KdTree};
@@ -34,6 +35,8 @@ use serde::{Deserialize, Serialize};
 const HEARD: f64 = 1.3;
 /// And it takes part in the blend within so many: nearly as far as its points.
 const BLENDED: f64 = 1.2;
+/// A cell between sheets on both sides is at least this many distances of sites wide, so that cells overlap everywhere.
+const COVERED_GAPS: f64 = 1.5;
 /// Most sheets of a cell.
 const MOST_SHEETS: usize = nest::MOST_NESTED;
 /// Samples within this many supports are candidates.
@@ -59,9 +62,11 @@ const ONE_SHEET_COST: f64 = 1.05;
 const UNEXPLAINED: f64 = 1.3;
 /// A higher sheet, the wall joined by the maximum, the lower one by the minimum.
 const WALLED: u8 = 0b100;
-/// Of one sheet if the normals differ by less than this cosine (8 degrees) and the offsets by less than so many levels.
-const SAME_TURN: f64 = 0.99;
-const SAME_LEVEL: f64 = 0.7;
+/// Candidates are other sheets if their normals differ by the cosine of an edge (26 degrees) or their offsets by more than noise
+/// does, in levels: without these first, the nearest of a small bore would all be of its wall.
+const OTHER_SHEET: (f64, f64) = (0.9, RESIDUAL_LIMIT);
+/// And other fits of a sheet if they differ by 8 degrees or so many levels.
+const OTHER_FIT: (f64, f64) = (0.99, 0.7);
 
 /// The surface around a site: nested maxima and minima of sheets.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -120,7 +125,7 @@ pub(crate) fn cells(
             owned[o as usize].1 += 1;
         }
     }
-    let places: Vec<Place> = (0..sites.point.len())
+    let mut places: Vec<Place> = (0..sites.point.len())
         .map(|site| {
             let (sum, count) = owned[site];
             let support = sites.support(site);
@@ -128,6 +133,7 @@ pub(crate) fn cells(
                 center: if count > 0 { sum / count as f64 } else { sites.survey[site].quadric.center },
                 support,
                 noise: sites.noise(site).max(1e-9 * support),
+                apart: sites.gap[site],
             }
         })
         .collect();
@@ -162,10 +168,70 @@ pub(crate) fn cells(
             })
             .collect();
     }
+    candidates.extend(samples.iter().zip(of_site).map(candidate));
+    narrow(&mut places, &mut made, samples, tree, &candidates, observer)?;
     let home =
         made.iter().zip(&places).filter_map(|(f, p)| Some((f.as_ref().filter(|f| f.at_home(p))?.cell(p), p.noise)));
     let (cells, noise): (Vec<Cell>, Vec<f64>) = home.unzip();
     Ok(outvoted(cells, &noise))
+}
+
+/// Asks fewer points where sheets face cells on both sides: a wider ball of a stack of fins holds more sheets than a cell
+/// nests. What explains its points better is taken.
+fn narrow(
+    places: &mut [Place],
+    made: &mut [Option<Found>],
+    samples: &[Sample],
+    tree: &KdTree,
+    candidates: &[Candidate],
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
+    let faced = KdTree::new(&samples.iter().map(|s| s.center).collect::<Vec<_>>());
+    let clear = |(place, found): (&Place, &Option<Found>)| {
+        found.as_ref().and_then(|f| clearance(place, f, samples, &faced)).map(|clear| (place.center, clear))
+    };
+    let (hemmed, clear): (Vec<DVec3>, Vec<f64>) =
+        places.par_iter().zip(&*made).filter_map(clear).collect::<Vec<_>>().into_iter().unzip();
+    let hemmed = KdTree::new(&hemmed);
+    let around = KdTree::new(&candidates.iter().map(|c| c.at).collect::<Vec<_>>());
+    let fresh = in_pieces(places.len(), (1.0, 1.0), observer, |s, site| {
+        let place = &places[site];
+        let old = made[site].as_ref().filter(|f| f.cost > UNEXPLAINED)?;
+        // Rims and roots of fins are faced on one side or none.
+        let mut nearest = f64::INFINITY;
+        hemmed.within(place.center, HEARD * place.support, |i, _, _| nearest = nearest.min(clear[i as usize]));
+        let support = (nearest / HEARD).max(COVERED_GAPS * place.apart);
+        let place = Place { support, ..*place };
+        let new = if support < places[site].support {
+            find(&place, site as u32, false, tree, candidates, &around, &mut s.around)
+        } else {
+            None
+        };
+        new.filter(|n| n.cost < old.cost).map(|n| (place, n))
+    })?;
+    for (site, (place, found)) in fresh.into_iter().enumerate().filter_map(|(site, f)| Some((site, f?))) {
+        places[site] = place;
+        made[site] = Some(found);
+    }
+    Ok(())
+}
+
+/// How far the nearer of two sheets is that face a cell, one from its inside and one from its outside; `None` without
+/// both.
+fn clearance(place: &Place, found: &Found, samples: &[Sample], tree: &KdTree) -> Option<f64> {
+    let (own, d) = joined(&found.sheets, found.concave, place.center);
+    let n = found.sheets[own].0.distance(place.center).1;
+    let foot = place.center - d * n;
+    let mut nearest = [f64::INFINITY; 2];
+    tree.within(foot, HEARD * place.support, |i, c, _| {
+        let high = n.dot(c - foot);
+        if samples[i as usize].normal.dot(n) < -SIDE_BY_SIDE && high.abs() > RESIDUAL_LIMIT * place.noise {
+            let side = &mut nearest[usize::from(high > 0.0)];
+            *side = side.min(high.abs());
+        }
+    });
+    let [inside, outside] = nearest;
+    inside.max(outside).is_finite().then_some(inside.min(outside))
 }
 
 /// How far beside a cell its neighbours are asked, in noise levels, and how sure they must be of the other side.
@@ -212,6 +278,8 @@ pub(crate) struct Place {
     pub center: DVec3,
     pub support: f64,
     pub noise: f64,
+    /// Distance of sites.
+    pub apart: f64,
 }
 
 /// A sheet of a cell: quadric, middle of its points and expected error.
@@ -277,7 +345,7 @@ fn find(
     around: &KdTree,
     scratch: &mut Vec<DVec3>,
 ) -> Option<Found> {
-    let &Place { center, support, noise } = place;
+    let &Place { center, support, noise, .. } = place;
     let ball = around_place(center, HEARD * support, MOST_CELL_POINTS, tree, scratch);
     let count = ball.len().max(1) as f64;
     let residuals = |q: &Quadric| ball.levels(q, noise);
@@ -297,20 +365,8 @@ fn find(
             return Some(Found { sheets, concave: 0, total, cost: total / count });
         }
     }
-    let mut asked: Vec<&Candidate> = Vec::new();
-    let mut seen: Vec<(f64, DVec3)> = Vec::new();
-    for &(_, i) in &near {
-        let c = &candidates[i as usize];
-        let (d, n) = c.quadric.distance(center);
-        let known = seen.iter().any(|(e, m)| n.dot(*m) > SAME_TURN && (d - e).abs() < SAME_LEVEL * noise);
-        if !known && d.abs() < support {
-            asked.push(c);
-            seen.push((d, n));
-            if asked.len() == MOST_CANDIDATES {
-                break;
-            }
-        }
-    }
+    let asked = different(candidates, &near, place);
+    let seen: Vec<(f64, DVec3)> = asked.iter().map(|c| c.quadric.distance(center)).collect();
     if asked.is_empty() {
         return None;
     }
@@ -352,6 +408,28 @@ fn find(
         (sheets, concave, spent, total) = found;
     }
     Some(Found { sheets, concave, total, cost: spent / count })
+}
+
+/// The candidates that a cell tries: the nearest of every other sheet first, then what differs from these.
+/// * `near` - indices of candidates, the nearest first
+fn different<'a>(candidates: &'a [Candidate], near: &[(f64, u32)], place: &Place) -> Vec<&'a Candidate> {
+    let mut asked: Vec<&Candidate> = Vec::new();
+    let mut seen: Vec<(f64, DVec3)> = Vec::new();
+    for (turn, level) in [OTHER_SHEET, OTHER_FIT] {
+        for &(_, i) in near {
+            let c = &candidates[i as usize];
+            let (d, n) = c.quadric.distance(place.center);
+            let known = seen.iter().any(|(e, m)| n.dot(*m) > turn && (d - e).abs() < level * place.noise);
+            if !known && d.abs() < place.support {
+                asked.push(c);
+                seen.push((d, n));
+                if asked.len() == MOST_CANDIDATES {
+                    return asked;
+                }
+            }
+        }
+    }
+    asked
 }
 
 /// A step that explains the points for less than `most`, prices included: its sheets, how they are joined, cost, and cost with

@@ -129,8 +129,7 @@ pub(crate) fn other_sheet(fits: &[Fit], i: usize) -> Option<usize> {
 pub(crate) fn supported(points: &[DVec3], mut fits: Vec<Fit>) -> Vec<Fit> {
     let mut owner = vec![u32::MAX; points.len()];
     own(points, &mut fits, &mut owner);
-    let kept = |fits: &[Fit]| (0..fits.len()).filter(|&i| fits[i].owned >= FEWEST_NEAREST).collect();
-    keep(kept(&fits), &mut fits, &mut owner);
+    keep(upheld(&fits), &mut fits, &mut owner);
     keep(accompanied(&fits), &mut fits, &mut owner);
     // The points of those that are dropped are still there: without them a surface has less area beside its edges.
     own(points, &mut fits, &mut owner);
@@ -169,30 +168,47 @@ fn own(points: &[DVec3], fits: &mut [Fit], owner: &mut [u32]) {
     owner.iter().filter(|&&o| o != u32::MAX).for_each(|&o| fits[o as usize].owned += 1);
 }
 
+/// The fits that enough points are nearest to.
+///
+/// Where sites stand as densely as points, a fit has one or two by chance. Then its sheet tells: all that carry it on must have
+/// as many together as the least sheet has, and it its half of what one of them has in the mean.
+fn upheld(fits: &[Fit]) -> Vec<usize> {
+    let poor: Vec<usize> = (0..fits.len()).filter(|&i| (1..FEWEST_NEAREST).contains(&fits[i].owned)).collect();
+    let is_upheld = around(fits, &poor, |i, near| {
+        let sheet = near.iter().filter(|&&j| carries_on(&fits[i], &fits[j])).chain([&i]);
+        let (points, count) = sheet.fold((0, 0), |(points, count), &j| (points + fits[j].owned, count + 1));
+        points >= FEWEST_NEAREST * (COMPANY_NEEDED as u32 + 1) && 2 * fits[i].owned * count >= points
+    });
+    let mut kept: Vec<usize> = (0..fits.len()).filter(|&i| fits[i].owned >= FEWEST_NEAREST).collect();
+    kept.extend(poor.into_iter().zip(is_upheld).filter_map(|(i, upheld)| upheld.then_some(i)));
+    kept.sort_unstable();
+    kept
+}
+
 /// All but sheets that hardly any neighbour carries on: a fit across a crease stands alone, a face does not.
 fn accompanied(fits: &[Fit]) -> Vec<usize> {
-    let centers: Vec<DVec3> = fits.iter().map(|f| f.center).collect();
-    let tree = KdTree::new(&centers);
-    let company: Vec<usize> = (0..fits.len())
-        .into_par_iter()
-        .map_init(Vec::new, |near, i| {
-            let f = &fits[i];
-            tree.nearest(f.center, COMPANY_ASKED + 1, near);
-            near.iter()
-                .filter(|n| n.1 as usize != i)
-                .filter(|n| {
-                    let g = &fits[n.1 as usize];
-                    let ((d, m), (e, k)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
-                    let slack = COMPANY_OFFSET * n.0.sqrt() + 2.0 * (f.error + g.error);
-                    m.dot(g.normal).abs() > CREASE_COSINE
-                        && k.dot(f.normal).abs() > CREASE_COSINE
-                        && d.abs() < slack
-                        && e.abs() < slack
-                })
-                .count()
-        })
-        .collect();
-    (0..fits.len()).filter(|&i| company[i] >= COMPANY_NEEDED).collect()
+    let all: Vec<usize> = (0..fits.len()).collect();
+    let company = around(fits, &all, |i, near| near.iter().filter(|&&j| carries_on(&fits[i], &fits[j])).count());
+    all.into_iter().filter(|&i| company[i] >= COMPANY_NEEDED).collect()
+}
+
+/// What those nearest to it tell of each of `some` fits.
+fn around<T: Send>(fits: &[Fit], some: &[usize], tell: impl Fn(usize, &[usize]) -> T + Sync) -> Vec<T> {
+    let tree = KdTree::new(&fits.iter().map(|f| f.center).collect::<Vec<_>>());
+    let one = |(near, others): &mut (Vec<_>, Vec<usize>), &i: &usize| {
+        tree.nearest(fits[i].center, COMPANY_ASKED + 1, near);
+        others.clear();
+        others.extend(near.iter().map(|n| n.1 as usize).filter(|&j| j != i));
+        tell(i, others)
+    };
+    some.par_iter().map_init(Default::default, one).collect()
+}
+
+/// Is one fit the other's sheet, a little aside?
+fn carries_on(f: &Fit, g: &Fit) -> bool {
+    let ((d, m), (e, k)) = (f.quadric.distance(g.center), g.quadric.distance(f.center));
+    let slack = COMPANY_OFFSET * f.center.distance(g.center) + 2.0 * (f.error + g.error);
+    m.dot(g.normal).abs() > CREASE_COSINE && k.dot(f.normal).abs() > CREASE_COSINE && d.abs() < slack && e.abs() < slack
 }
 
 fn fit_site(
@@ -254,7 +270,7 @@ fn fit_site(
 }
 
 /// Sheets side by side turn by less than this cosine (30 degrees) from each other: the flanks of a wedge do so, too.
-const SIDE_BY_SIDE: f64 = 0.866;
+pub(crate) const SIDE_BY_SIDE: f64 = 0.866;
 
 /// Middles of the points of two sheets are at most this far from each other along them, as a share of the ball, where the
 /// sheets lie above each other. Side by side, halves of a disk have .85.
