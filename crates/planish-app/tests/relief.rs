@@ -80,6 +80,8 @@ fn maps_go_out_and_come_back_as_a_layer_and_wrong_ones_are_told() {
         ),
         ("arnold", &["--preset", "arnold", "--tile", "128"]),
         ("wired", &["--materialx", "--attributes", "--max-error", "0.01%"]),
+        ("small", &["--file", "png", "--sheets", "atlas", "--gutter", "0", "--max-error", "0.01%"]),
+        ("unreal", &["--preset", "unreal", "--max-error", "0.01%"]),
     ] {
         ok(&[&["relief", "export", "box.planish", "-o", maps], options].concat(), at);
         let told = ok(&["relief", "import", "box.planish", maps, "-o", "same.planish"], at);
@@ -118,6 +120,7 @@ fn maps_go_out_and_come_back_as_a_layer_and_wrong_ones_are_told() {
         (&["--tile", "16", "--sheets", "udim", "--texels", "40"][..], "do not fit on a tile of 16"),
         (&["--texels", "1"], "two texels"),
         (&["--kind", "normal", "--max-error", "1mm"], "does not go with normals"),
+        (&["--file", "png", "--max-error", "1e-12"], "--max-error: the largest error needs"),
         (&["--frame", "object", "--materialx"], "wires vectors in tangent space"),
     ] {
         let output = planish(&[&["relief", "export", "box.planish", "-o", "bad"], args].concat(), at);
