@@ -80,6 +80,7 @@ fn maps_go_out_and_come_back_as_a_layer_and_wrong_ones_are_told() {
         ),
         ("arnold", &["--preset", "arnold", "--tile", "128"]),
         ("wired", &["--materialx", "--attributes", "--max-error", "0.01%"]),
+        ("unreal", &["--preset", "unreal", "--max-error", "0.01%"]),
     ] {
         ok(&[&["relief", "export", "box.planish", "-o", maps], options].concat(), at);
         let told = ok(&["relief", "import", "box.planish", maps, "-o", "same.planish"], at);
@@ -96,6 +97,14 @@ fn maps_go_out_and_come_back_as_a_layer_and_wrong_ones_are_told() {
     assert!(told.contains("changed texels") && told.contains("baked, import"), "{told}");
     let compared = ok(&["compare", "a.planish", "b.planish", "--surface", "displaced", "--tolerance", "0.0001%"], at);
     assert!(!compared.is_empty());
+    // Rounded maps of a relief that is some hundred steps high.
+    for options in [&["--file", "png", "--sheets", "atlas", "--gutter", "0"][..], &["--file", "exr_half"], &[]] {
+        let told =
+            ok(&[&["relief", "export", "a.planish", "-o", "small", "--max-error", "0.01%"], options].concat(), at);
+        assert!(told.contains("a triangle of the mesh") && told.contains("part by"), "{told}");
+        let told = ok(&["relief", "import", "a.planish", "small", "-o", "same.planish"], at);
+        assert!(told.contains("nothing was changed"), "{options:?}: {told}");
+    }
     // Wrong model, half a file, nothing.
     write_box(&at.join("other.ply"), 6);
     ok(&["fit", "other.ply", "-q", "-o", "other.planish", "--control", "6x6"], at);
@@ -118,9 +127,10 @@ fn maps_go_out_and_come_back_as_a_layer_and_wrong_ones_are_told() {
         (&["--tile", "16", "--sheets", "udim", "--texels", "40"][..], "do not fit on a tile of 16"),
         (&["--texels", "1"], "two texels"),
         (&["--kind", "normal", "--max-error", "1mm"], "does not go with normals"),
+        (&["--file", "png", "--max-error", "1e-12"], "--max-error: the largest error needs"),
         (&["--frame", "object", "--materialx"], "wires vectors in tangent space"),
     ] {
-        let output = planish(&[&["relief", "export", "box.planish", "-o", "bad"], args].concat(), at);
+        let output = planish(&[&["relief", "export", "a.planish", "-o", "bad"], args].concat(), at);
         assert_eq!(status(&output), 2);
         assert!(error_line(&output).contains(words), "{}", stderr(&output));
         assert!(!at.join("bad").exists());

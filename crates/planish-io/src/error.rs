@@ -181,6 +181,9 @@ pub enum WriteError {
         /// Where.
         place: Place,
     },
+    /// Rounded displacements need more digits than the kind of file has.
+    #[error("{0} - hint: allow a larger error, or write EXR")]
+    TooFine(String),
     /// The image library refuses.
     #[error("cannot write the image: {0} - hint: check that the folder is writable and has room")]
     Image(String),

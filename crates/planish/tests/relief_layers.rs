@@ -278,10 +278,12 @@ fn limited_displacements_stay_within_their_share_of_the_radius() {
     assert_eq!(told, ["1037 texels brought back"]);
     let sum = edited.sum();
     assert!(relief::fold_over(&edited.surfaces[0], &sum[0]).unwrap().is_empty());
-    // Half the radius that the spline has at the node; at the seam, the mean of both of its sides.
-    for k in (0..17 * 61).filter(|k| (1..60).contains(&(k % 61))) {
+    // Half the radius that the spline has at the node; at the seam, that of the side that bends more.
+    for k in 0..17 * 61 {
         let bends = edited.surfaces[0].jet((k % 61) as f64 / 60.0, (k / 61) as f64 / 16.0).curvatures().unwrap();
-        assert!((sum[0].vectors[k].z * bends[1] - 0.5).abs() < 1e-9, "{}", sum[0].vectors[k]);
+        let share = sum[0].vectors[k].z * bends[1];
+        assert!(share < 0.5 + 1e-9, "{k}: {share}");
+        assert!(share > 0.5 - 1e-9 || !(1..60).contains(&(k % 61)), "{k}: {share}");
     }
 }
 

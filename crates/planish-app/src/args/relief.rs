@@ -66,8 +66,9 @@ pub enum FileWord {
     /// OpenEXR, 32-bit float: exact
     Exr,
     /// OpenEXR, 16-bit float
+    #[value(alias = "exr_half")]
     ExrHalf,
-    /// PNG, 16 bit
+    /// PNG, 16 bit; 8 where displacements rounded by --max-error have no more steps
     Png,
     /// TIFF, 16 bit
     Tiff,
@@ -134,7 +135,7 @@ pub struct ReliefExport {
     #[arg(long, value_name = "WORD")]
     pub file: Option<FileWord>,
     /// Round displacements, by at most so much, so that files get smaller: a length (0.05 in units of the model, 0.05mm) or a
-    /// share of the diagonal (0.01%)
+    /// share of the diagonal (0.01%). Smallest with --file png --sheets atlas --gutter 0
     #[arg(long, value_name = "LENGTH|%", allow_negative_numbers = true)]
     pub max_error: Option<Tolerance>,
     /// Also write colours and other vertex attributes of the mesh in the same layout

@@ -246,6 +246,7 @@ fn pipeline_failure(input: &Path, network: Option<&Path>, error: PipelineError) 
 fn write_failure(input: &Path, output: &Path, error: WriteError) -> Failure {
     match error {
         WriteError::Io(_) | WriteError::Image(_) | WriteError::UnknownExtension { .. } => Failure::usage(output, error),
+        WriteError::TooFine(_) => Failure::usage("--max-error", error),
         WriteError::Nothing(_) | WriteError::Value { .. } | WriteError::Inconsistent { .. } => {
             Failure::input(input, error)
         }

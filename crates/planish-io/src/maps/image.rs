@@ -8,8 +8,8 @@ use std::io::{Cursor, Write};
 use std::path::Path;
 use std::result::Result; // the image library brings one of its own
 
-/// The largest number of 16 bits.
-const WHOLE: f32 = 65535.0;
+/// Numbers of an image that Zopfli packs in about five seconds, a twelfth smaller than zlib's best, which larger ones get.
+pub(super) const SMALL: usize = 1 << 19;
 /// Compression makes data at most about this many times smaller: an image that claims more is lying.
 const LARGEST_RATIO: u64 = 1100;
 
@@ -22,7 +22,7 @@ pub enum MapFile {
     Exr,
     /// OpenEXR, 16-bit float.
     ExrHalf,
-    /// PNG, 16 bit.
+    /// PNG, 16 bit; 8 where rounded displacements have no more steps.
     Png,
     /// TIFF, 16 bit.
     Tiff,
@@ -53,19 +53,38 @@ impl MapFile {
     pub fn is_whole(self) -> bool {
         matches!(self, MapFile::Png | MapFile::Tiff)
     }
+}
 
-    /// The number that a file of this kind holds for `value`.
-    pub(super) fn held(self, value: f32) -> f32 {
-        match self {
-            MapFile::Exr => value,
-            MapFile::ExrHalf => f16::from_f32(value).to_f32(),
-            MapFile::Png | MapFile::Tiff => whole(value) as f32 / WHOLE,
+/// A kind of file and the bits of its numbers: 32 or 16 in EXR, 16 or 8 in PNG, 16 in TIFF.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Store {
+    pub file: MapFile,
+    pub bits: u32,
+}
+
+impl Store {
+    /// A kind of file with its usual bits.
+    pub fn new(file: MapFile) -> Store {
+        Store { file, bits: if file == MapFile::Exr { 32 } else { 16 } }
+    }
+
+    /// The number that it holds for `value`.
+    pub fn held(self, value: f32) -> f32 {
+        match self.file {
+            MapFile::Exr if self.bits == 32 => value,
+            MapFile::Exr | MapFile::ExrHalf => f16::from_f32(value).to_f32(),
+            MapFile::Png | MapFile::Tiff => whole(value, self.bits) as f32 / largest(self.bits),
         }
     }
 }
 
-fn whole(value: f32) -> u16 {
-    (value.clamp(0.0, 1.0) * WHOLE).round() as u16
+/// The largest whole number of so many bits.
+pub(super) fn largest(bits: u32) -> f32 {
+    (1u32 << bits).saturating_sub(1) as f32
+}
+
+fn whole(value: f32, bits: u32) -> u16 {
+    (value.clamp(0.0, 1.0) * largest(bits)).round() as u16
 }
 
 /// Pixels from the upper left, row by row, `channels` numbers each.
@@ -78,17 +97,24 @@ pub(super) struct Raster {
 }
 
 /// Writes an image; `note` goes into its metadata.
-pub(super) fn write(path: &Path, raster: &Raster, file: MapFile, note: &str) -> Result<(), WriteError> {
+pub(super) fn write(path: &Path, raster: &Raster, store: Store, note: &str) -> Result<(), WriteError> {
+    let bytes = encoded(raster, store, note)?;
+    atomic::write(path, |out| Ok(out.write_all(&bytes)?))
+}
+
+/// The bytes of an image.
+pub(super) fn encoded(raster: &Raster, store: Store, note: &str) -> Result<Vec<u8>, WriteError> {
     let failed = |e: &dyn std::fmt::Display| WriteError::Image(e.to_string());
     let mut bytes = Cursor::new(Vec::new());
-    match file {
+    match store.file {
         MapFile::Exr | MapFile::ExrHalf => {
-            write_exr(&mut bytes, raster, file == MapFile::ExrHalf, note).map_err(|e| failed(&e))?
+            let way = (store.bits == 16, Compression::ZIP16);
+            write_exr(&mut bytes, raster, way, note).map_err(|e| failed(&e))?
         }
-        MapFile::Png => write_png(&mut bytes, raster, note).map_err(|e| failed(&e))?,
+        MapFile::Png => write_png(&mut bytes, raster, store.bits, note).map_err(|e| failed(&e))?,
         MapFile::Tiff => write_tiff(&mut bytes, raster, note).map_err(|e| failed(&e))?,
     }
-    atomic::write(path, |out| Ok(out.write_all(bytes.get_ref())?))
+    Ok(bytes.into_inner())
 }
 
 /// Names of the channels in EXR.
@@ -111,18 +137,14 @@ pub(super) fn lossy(raster: &Raster, dwa: bool) -> Result<(u64, f64), WriteError
     let mut bytes = Cursor::new(Vec::new());
     let compression = if dwa { Compression::DWAA(None) } else { Compression::ZIP16 };
     let failed = |e: &dyn std::fmt::Display| WriteError::Image(e.to_string());
-    write_exr_as(&mut bytes, raster, (true, compression), "").map_err(|e| failed(&e))?;
+    write_exr(&mut bytes, raster, (true, compression), "").map_err(|e| failed(&e))?;
     let back = read_exr(bytes.get_ref()).map_err(|e| failed(&e))?;
     let pixels = raster.values.chunks_exact(raster.channels).zip(back.values.chunks_exact(back.channels));
     let far = |(a, b): (&[f32], &[f32])| a.iter().zip(b).map(|(x, y)| (*x as f64 - *y as f64).powi(2)).sum::<f64>();
     Ok((bytes.get_ref().len() as u64, pixels.map(far).fold(0.0, f64::max).sqrt()))
 }
 
-fn write_exr(out: &mut Cursor<Vec<u8>>, raster: &Raster, half: bool, note: &str) -> exr::error::UnitResult {
-    write_exr_as(out, raster, (half, Compression::ZIP16), note)
-}
-
-fn write_exr_as(
+fn write_exr(
     out: &mut Cursor<Vec<u8>>,
     raster: &Raster,
     (half, compression): (bool, Compression),
@@ -144,7 +166,7 @@ fn write_exr_as(
     Image::from_layer(layer).write().to_buffered(out)
 }
 
-fn write_png(out: &mut Cursor<Vec<u8>>, raster: &Raster, note: &str) -> Result<(), png::EncodingError> {
+fn write_png(out: &mut Cursor<Vec<u8>>, raster: &Raster, bits: u32, note: &str) -> Result<(), png::EncodingError> {
     let mut encoder = png::Encoder::new(out, raster.width as u32, raster.height as u32);
     encoder.set_color(match raster.channels {
         1 => png::ColorType::Grayscale,
@@ -152,17 +174,54 @@ fn write_png(out: &mut Cursor<Vec<u8>>, raster: &Raster, note: &str) -> Result<(
         3 => png::ColorType::Rgb,
         _ => png::ColorType::Rgba,
     });
-    encoder.set_depth(png::BitDepth::Sixteen);
+    encoder.set_depth(if bits == 8 { png::BitDepth::Eight } else { png::BitDepth::Sixteen });
     encoder.add_text_chunk("Comment".into(), note.into())?;
-    let mut writer = encoder.write_header()?;
-    let bytes: Vec<u8> = raster.values.iter().flat_map(|&x| whole(x).to_be_bytes()).collect();
-    writer.write_image_data(&bytes)
+    if bits == 8 && raster.values.len() <= SMALL {
+        let pixels: Vec<u8> = raster.values.iter().map(|&x| whole(x, bits) as u8).collect();
+        let mut packed = Vec::new();
+        let filtered = paeth_filtered(&pixels, raster.width * raster.channels, raster.channels);
+        zopfli::compress(zopfli::Options::default(), zopfli::Format::Zlib, &filtered[..], &mut packed)?;
+        // The end of the file is written when the writer goes.
+        return encoder.write_header()?.write_chunk(png::chunk::IDAT, &packed);
+    }
+    encoder.set_compression(png::Compression::High);
+    let bytes: Vec<u8> = match bits {
+        8 => raster.values.iter().map(|&x| whole(x, bits) as u8).collect(),
+        _ => raster.values.iter().flat_map(|&x| whole(x, bits).to_be_bytes()).collect(),
+    };
+    encoder.write_header()?.write_image_data(&bytes)
+}
+
+/// Rows of bytes as PNG keeps them by Paeth's filter: its number, then the differences from what the bytes `back` to the left
+/// and above predict.
+fn paeth_filtered(bytes: &[u8], row: usize, back: usize) -> Vec<u8> {
+    const PAETH: u8 = 4;
+    let mut out = Vec::with_capacity(bytes.len() + bytes.len() / row);
+    for (k, &byte) in bytes.iter().enumerate() {
+        let x = k % row;
+        if x == 0 {
+            out.push(PAETH);
+        }
+        let at = |inside: bool, before: usize| if inside { i32::from(bytes[k - before]) } else { 0 };
+        let (left, up) = (at(x >= back, back), at(k >= row, row));
+        let both = at(x >= back && k >= row, row + back);
+        let [l, u, b] = [(up - both).abs(), (left - both).abs(), (left + up - 2 * both).abs()];
+        let predicted = if l <= u && l <= b {
+            left
+        } else if u <= b {
+            up
+        } else {
+            both
+        };
+        out.push(byte.wrapping_sub(predicted as u8));
+    }
+    out
 }
 
 fn write_tiff(out: &mut Cursor<Vec<u8>>, raster: &Raster, note: &str) -> tiff::TiffResult<()> {
     use tiff::encoder::{TiffEncoder, colortype};
     use tiff::tags::Tag;
-    let values: Vec<u16> = raster.values.iter().map(|&x| whole(x)).collect();
+    let values: Vec<u16> = raster.values.iter().map(|&x| whole(x, 16)).collect();
     let (width, height) = (raster.width as u32, raster.height as u32);
     let mut encoder = TiffEncoder::new(out)?.with_compression(tiff::encoder::Compression::Deflate(Default::default()));
     match raster.channels {
@@ -285,7 +344,7 @@ fn png_numbers(bytes: &[u8]) -> Result<(usize, usize, usize, Vec<f32>), String> 
     let found = info.color_type.samples();
     let numbers: Vec<f32> = match info.bit_depth {
         png::BitDepth::Sixteen => {
-            data.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]]) as f32 / WHOLE).collect()
+            data.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]]) as f32 / largest(16)).collect()
         }
         _ => data.iter().map(|&b| b as f32 / 255.0).collect(),
     };
@@ -299,7 +358,7 @@ fn read_tiff(bytes: &[u8]) -> Result<Raster, String> {
     let (width, height) = (width as usize, height as usize);
     plausible(width, height, bytes)?;
     let numbers: Vec<f32> = match decoder.read_image().map_err(|e| e.to_string())? {
-        DecodingResult::U16(all) => all.iter().map(|&x| x as f32 / WHOLE).collect(),
+        DecodingResult::U16(all) => all.iter().map(|&x| x as f32 / largest(16)).collect(),
         DecodingResult::U8(all) => all.iter().map(|&x| x as f32 / 255.0).collect(),
         DecodingResult::F32(all) => all,
         _ => return Err("its numbers are neither 8 or 16 bit whole ones nor 32 bit floats".into()),

@@ -4,6 +4,7 @@
 //! sampled at `(u (n - 1) + 0.5) / n` neighbouring patches agree along their seam.
 
 mod image;
+mod rounding;
 mod sidecar;
 mod wiring;
 
@@ -12,13 +13,15 @@ pub use sidecar::{ImageEntry, PatchEntry, Sidecar};
 pub use wiring::materialx;
 
 use crate::{Place, ReadError, WriteError};
-use image::Raster;
+use image::{Raster, Store};
 use planish::Units;
 use planish::relief::layers::Picture;
-use planish::relief::maps::{MapKind, MapParams, PatchMap, Sheet};
+use planish::relief::maps::{self, MapKind, MapParams, PatchMap, Sheet, SheetKind};
 use planish::surface::Surface;
 use rayon::prelude::*;
+use rounding::Rounded;
 use sidecar::AttributeEntry;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// How maps are written.
@@ -43,16 +46,14 @@ pub struct MapOptions {
 /// How numbers stand in the images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Coding {
-    file: MapFile,
+    store: Store,
     mid_level: f64,
     scale: f64,
-    /// Displacements are multiples of this, if it is above 0.
-    step: f64,
 }
 
 impl Coding {
     /// * `kind` - of the maps; `None` for an attribute
-    fn new(kind: Option<MapKind>, maps: &[PatchMap], file: MapFile, max_error: Option<f64>) -> Coding {
+    fn new(kind: Option<MapKind>, maps: &[PatchMap], file: MapFile) -> Coding {
         let most = maps.iter().flat_map(|m| &m.values).map(|x| x.abs()).fold(0.0, f32::max) as f64;
         let most = if most > 0.0 { most } else { 1.0 };
         let (mid_level, scale) = match (file.is_whole(), kind) {
@@ -61,14 +62,37 @@ impl Coding {
             (true, Some(MapKind::Length) | None) => (0.0, most),
             (true, Some(_)) => (0.5, 2.0 * most),
         };
-        let step = max_error.map_or(0.0, |e| step_of(e, kind.map_or(1, MapKind::channels)));
-        Coding { file, mid_level, scale, step }
+        Coding { store: Store::new(file), mid_level, scale }
+    }
+
+    /// That of rounded maps: whole numbers count steps, floats take 16 bits where these hold every number exactly.
+    fn of_steps(rounded: &Rounded, file: MapFile) -> Result<Coding, WriteError> {
+        if !file.is_whole() {
+            let half = Store { file, bits: 16 };
+            let exact = |map: &PatchMap| map.values.iter().all(|&x| half.held(x) == x);
+            let store = match rounded.maps.iter().all(exact) {
+                true => half,
+                false if file == MapFile::Exr => Store::new(file),
+                false => return Err(WriteError::TooFine("the largest error is too small for half floats".into())),
+            };
+            return Ok(Coding { store, mid_level: 0.0, scale: 1.0 });
+        }
+        let [low, high] = rounded.range;
+        let bits = if file == MapFile::Png && high - low <= image::largest(8) as i64 { 8 } else { 16 };
+        let steps = image::largest(bits) as i64;
+        if high - low > steps {
+            let what = format!("the largest error needs {} steps, and whole numbers have {steps}", high - low);
+            return Err(WriteError::TooFine(what));
+        }
+        // In the middle, or as near to it as the range lets it.
+        let zero = (steps / 2 + 1).clamp(-low, steps - high);
+        let store = Store { file, bits };
+        Ok(Coding { store, mid_level: zero as f64 / steps as f64, scale: rounded.step * steps as f64 })
     }
 
     /// What the image holds for a number.
     fn coded(&self, x: f32) -> f32 {
-        let x = if self.step > 0.0 { (x as f64 / self.step).round() * self.step } else { x as f64 };
-        self.file.held((x / self.scale + self.mid_level) as f32)
+        self.store.held((x as f64 / self.scale + self.mid_level) as f32)
     }
 
     /// The number that the image means.
@@ -77,12 +101,19 @@ impl Coding {
     }
 }
 
-/// The step whose multiples are at most `error` from any vector of `channels` numbers: half a step in each. It has three binary
-/// digits, so that its multiples end in zeros and compress.
-fn step_of(error: f64, channels: usize) -> f64 {
-    let most = 2.0 * error / (channels as f64).sqrt();
-    let power = most.log2().floor().exp2();
-    (most / power * 4.0).floor() / 4.0 * power
+/// The maps as they are written, and how: rounded if an error is allowed.
+fn prepared(
+    maps: &[PatchMap],
+    kind: MapKind,
+    file: MapFile,
+    max_error: Option<f64>,
+) -> Result<(Cow<'_, [PatchMap]>, Coding), WriteError> {
+    let Some(error) = max_error.filter(|e| *e > 0.0) else {
+        return Ok((Cow::Borrowed(maps), Coding::new(Some(kind), maps, file)));
+    };
+    let rounded = rounding::rounded(maps, error, file);
+    let coding = Coding::of_steps(&rounded, file)?;
+    Ok((Cow::Owned(rounded.maps), coding))
 }
 
 /// A sum over the control points, to tell maps of another model.
@@ -104,7 +135,7 @@ fn image_name(sheet: &Sheet, image: usize, file: MapFile, attribute: Option<&str
     let prefix = stem.as_ref().map_or(String::new(), |s| format!("{s}_"));
     match (sheet.kind, sheet.udim(image)) {
         (_, Some(tile)) => format!("{}.{tile}.{extension}", stem.as_deref().unwrap_or("relief")),
-        (planish::relief::maps::SheetKind::Atlas, _) => format!("{prefix}atlas.{extension}"),
+        (SheetKind::Atlas, _) => format!("{prefix}atlas.{extension}"),
         _ => format!("{prefix}patch_{image:04}.{extension}"),
     }
 }
@@ -125,7 +156,7 @@ fn all_finite(maps: &[PatchMap], what: &str, hint: &'static str) -> Result<(), W
 /// * `attributes` - maps of vertex attributes with their names, of the same shapes
 ///
 /// # Errors
-/// `WriteError::Nothing` without maps; `WriteError::Inconsistent` if maps and sheet do not fit; `WriteError::Value` for numbers that
+/// `WriteError::Nothing` without maps; `WriteError::TooFine` for a bound that the files cannot keep; `WriteError::Inconsistent` if maps and sheet do not fit; `WriteError::Value` for numbers that
 /// are not finite; those of writing.
 pub fn write_maps(
     folder: impl AsRef<Path>,
@@ -148,11 +179,11 @@ pub fn write_maps(
         all_finite(maps, &format!("\"{name}\""), "leave out --attributes, or mend the values of the mesh")?;
     }
     std::fs::create_dir_all(folder)?;
-    let coding = Coding::new(Some(options.params.kind), maps, options.file, options.max_error);
-    let images = write_images(folder, maps, sheet, (coding, options.upside_down), None, options.units)?;
+    let (rounded, coding) = prepared(maps, options.params.kind, options.file, options.max_error)?;
+    let images = write_images(folder, &rounded, sheet, (coding, options.upside_down), None, options.units)?;
     let mut told = Vec::new();
     for (name, maps) in attributes {
-        let coding = Coding::new(None, maps, options.file, None);
+        let coding = Coding::new(None, maps, options.file);
         let files = write_images(folder, maps, sheet, (coding, options.upside_down), Some(name), options.units)?;
         told.push(AttributeEntry {
             name: name.clone(),
@@ -161,13 +192,8 @@ pub fn write_maps(
         });
     }
     let (planish_relief, generator) = sidecar::head();
-    let entry = |(m, s): (&PatchMap, &planish::relief::maps::Spot)| PatchEntry {
-        image: s.image,
-        x: s.x,
-        y: s.y,
-        width: m.cols,
-        height: m.rows,
-    };
+    let entry =
+        |(m, s): (&PatchMap, &maps::Spot)| PatchEntry { image: s.image, x: s.x, y: s.y, width: m.cols, height: m.rows };
     let length = |m: &PatchMap| {
         m.values.chunks_exact(m.channels).map(|t| t.iter().map(|&x| f64::from(x).powi(2)).sum()).fold(0.0, f64::max)
     };
@@ -177,6 +203,7 @@ pub fn write_maps(
         units: options.units,
         params: options.params.clone(),
         file: options.file,
+        bits: Some(coding.store.bits),
         mid_level: coding.mid_level,
         scale: coding.scale,
         scale_metres: coding.scale * options.units.metres(),
@@ -209,8 +236,8 @@ fn write_images(
         if upside_down {
             turn(&mut raster);
         }
-        let file = image_name(sheet, k, coding.file, attribute);
-        image::write(&folder.join(&file), &raster, coding.file, &note)?;
+        let file = image_name(sheet, k, coding.store.file, attribute);
+        image::write(&folder.join(&file), &raster, coding.store, &note)?;
         Ok(ImageEntry { file, width, height })
     };
     sheet.images.par_iter().enumerate().map(one).collect()
@@ -241,7 +268,7 @@ fn painted(maps: &[PatchMap], sheet: &Sheet, image: usize, coding: &Coding) -> R
 /// # Errors
 /// `WriteError::Image` if the image library refuses.
 pub fn other_ways(maps: &[PatchMap], sheet: &Sheet) -> Result<[(u64, f64); 2], WriteError> {
-    let coding = Coding { file: MapFile::Exr, mid_level: 0.0, scale: 1.0, step: 0.0 };
+    let coding = Coding { store: Store::new(MapFile::Exr), mid_level: 0.0, scale: 1.0 };
     let way = |dwa: bool| -> Result<(u64, f64), WriteError> {
         let one = |k: usize| image::lossy(&painted(maps, sheet, k, &coding), dwa);
         let each: Vec<(u64, f64)> =
@@ -249,6 +276,37 @@ pub fn other_ways(maps: &[PatchMap], sheet: &Sheet) -> Result<[(u64, f64); 2], W
         Ok((each.iter().map(|e| e.0).sum(), each.iter().map(|e| e.1).fold(0.0, f64::max)))
     };
     Ok([way(false)?, way(true)?])
+}
+
+/// The fewest bytes: what the maps take, rounded by at most `max_error`, in one PNG without gutters, and the largest error;
+/// `None` where that would take long, or 16 bits do not hold the steps.
+/// # Errors
+/// `WriteError::Image` if the image library refuses.
+pub fn in_one_png(maps: &[PatchMap], kind: MapKind, max_error: f64) -> Result<Option<(u64, f64)>, WriteError> {
+    let shapes: Vec<[usize; 2]> = maps.iter().map(|m| [m.rows, m.cols]).collect();
+    let Ok(sheet) = maps::pack(&shapes, SheetKind::Atlas, 0, 0) else { return Ok(None) };
+    let Ok((rounded, coding)) = prepared(maps, kind, MapFile::Png, Some(max_error)) else { return Ok(None) };
+    let raster = painted(&rounded, &sheet, 0, &coding);
+    if raster.values.len() > image::SMALL {
+        return Ok(None);
+    }
+    let bytes = image::encoded(&raster, coding.store, "")?.len() as u64;
+    let held = |map: &PatchMap| PatchMap {
+        values: map.values.iter().map(|&x| coding.meant(coding.coded(x))).collect(),
+        ..*map
+    };
+    let held: Vec<PatchMap> = rounded.iter().map(held).collect();
+    Ok(Some((bytes, largest_error(maps, &held))))
+}
+
+/// Largest distance between the texels of two sets of maps of the same shapes.
+pub fn largest_error(a: &[PatchMap], b: &[PatchMap]) -> f64 {
+    let far = |(a, b): (&PatchMap, &PatchMap)| {
+        let texel =
+            |(x, y): (&[f32], &[f32])| x.iter().zip(y).map(|(x, y)| (*x as f64 - *y as f64).powi(2)).sum::<f64>();
+        a.values.chunks_exact(a.channels).zip(b.values.chunks_exact(b.channels)).map(texel).fold(0.0, f64::max)
+    };
+    a.iter().zip(b).map(far).fold(0.0, f64::max).sqrt()
 }
 
 fn turn(raster: &mut Raster) {
@@ -322,13 +380,20 @@ pub fn read_maps(folder: impl AsRef<Path>) -> Result<ReadMaps, ReadError> {
 }
 
 fn coding_of(sidecar: &Sidecar) -> Coding {
-    Coding { file: sidecar.file, mid_level: sidecar.mid_level, scale: sidecar.scale, step: 0.0 }
+    let store = match sidecar.file {
+        MapFile::Png | MapFile::Tiff => Store { file: sidecar.file, bits: sidecar.bits.unwrap_or(16) },
+        floats => Store::new(floats),
+    };
+    Coding { store, mid_level: sidecar.mid_level, scale: sidecar.scale }
 }
 
-/// The numbers of maps as they come back from files: what was written of them with the scale of `sidecar`.
+/// The numbers of maps as they come back from files: what was written of them as `sidecar` tells.
 pub fn as_read(maps: Vec<PatchMap>, sidecar: &Sidecar) -> Vec<PatchMap> {
-    let step = sidecar.max_error.map_or(0.0, |e| step_of(e, sidecar.params.kind.channels()));
-    let coding = Coding { step, ..coding_of(sidecar) };
+    let coding = coding_of(sidecar);
+    let maps = match sidecar.max_error.filter(|e| *e > 0.0) {
+        Some(error) => rounding::rounded(&maps, error, sidecar.file).maps,
+        None => maps,
+    };
     let again = |mut map: PatchMap| {
         map.values.iter_mut().for_each(|x| *x = coding.meant(coding.coded(*x)));
         map

@@ -26,6 +26,9 @@ pub struct Sidecar {
     pub params: MapParams,
     /// Kind of the image files.
     pub file: MapFile,
+    /// Bits of each number in the files; sidecars without it have whole numbers of 16.
+    #[serde(default)]
+    pub bits: Option<u32>,
     /// A displacement is `(value - mid_level) * scale` of what the image holds.
     pub mid_level: f64,
     /// See `mid_level`.
@@ -93,8 +96,62 @@ pub struct AttributeEntry {
 
 /// Writes the sidecar.
 pub(super) fn write(folder: &Path, sidecar: &Sidecar) -> Result<(), WriteError> {
-    let text = serde_json::to_string_pretty(sidecar).map_err(|e| WriteError::Image(e.to_string()))?;
-    atomic::write(&folder.join(SIDECAR), |out| Ok(writeln!(out, "{text}")?))
+    let mut text = Vec::new();
+    let mut lines = serde_json::Serializer::with_formatter(&mut text, Lines::default());
+    sidecar.serialize(&mut lines).map_err(|e| WriteError::Image(e.to_string()))?;
+    text.push(b'\n');
+    atomic::write(&folder.join(SIDECAR), |out| Ok(out.write_all(&text)?))
+}
+
+/// JSON with a line for each entry of the sidecar and for each element of its lists: a patch takes one, not seven.
+#[derive(Default)]
+struct Lines {
+    depth: usize,
+}
+
+impl Lines {
+    /// What stands before an element: a new line as far as these go.
+    fn part<W: ?Sized + Write>(&self, out: &mut W, first: bool) -> std::io::Result<()> {
+        let comma = if first { "" } else { "," };
+        match self.depth {
+            0..=2 => write!(out, "{comma}\n{:1$}", "", 2 * self.depth),
+            _ => write!(out, "{comma}{}", if first { "" } else { " " }),
+        }
+    }
+
+    fn open<W: ?Sized + Write>(&mut self, out: &mut W, bracket: &str) -> std::io::Result<()> {
+        self.depth += 1;
+        out.write_all(bracket.as_bytes())
+    }
+
+    fn close<W: ?Sized + Write>(&mut self, out: &mut W, bracket: &str) -> std::io::Result<()> {
+        self.depth -= 1;
+        if self.depth < 2 { write!(out, "\n{:2$}{}", "", bracket, 2 * self.depth) } else { write!(out, "{bracket}") }
+    }
+}
+
+impl serde_json::ser::Formatter for Lines {
+    fn begin_array<W: ?Sized + Write>(&mut self, out: &mut W) -> std::io::Result<()> {
+        self.open(out, "[")
+    }
+    fn end_array<W: ?Sized + Write>(&mut self, out: &mut W) -> std::io::Result<()> {
+        self.close(out, "]")
+    }
+    fn begin_array_value<W: ?Sized + Write>(&mut self, out: &mut W, first: bool) -> std::io::Result<()> {
+        self.part(out, first)
+    }
+    fn begin_object<W: ?Sized + Write>(&mut self, out: &mut W) -> std::io::Result<()> {
+        self.open(out, "{")
+    }
+    fn end_object<W: ?Sized + Write>(&mut self, out: &mut W) -> std::io::Result<()> {
+        self.close(out, "}")
+    }
+    fn begin_object_key<W: ?Sized + Write>(&mut self, out: &mut W, first: bool) -> std::io::Result<()> {
+        self.part(out, first)
+    }
+    fn begin_object_value<W: ?Sized + Write>(&mut self, out: &mut W) -> std::io::Result<()> {
+        out.write_all(b": ")
+    }
 }
 
 /// The version and the program of a new sidecar.
@@ -126,6 +183,12 @@ pub(super) fn read(folder: &Path) -> Result<Sidecar, ReadError> {
     let damaged = |what: String, p: usize| Err(ReadError::Syntax { what, place: Place::Item("patch", p) });
     if !(sidecar.scale > 0.0 && sidecar.scale.is_finite() && sidecar.mid_level.is_finite()) {
         return damaged(format!("{SIDECAR}: scale and mid-level are no numbers of a map"), 0);
+    }
+    if sidecar
+        .bits
+        .is_some_and(|b| if sidecar.file.is_whole() { ![8, 16].contains(&b) } else { ![16, 32].contains(&b) })
+    {
+        return damaged(format!("{SIDECAR}: no image file has numbers of so many bits"), 0);
     }
     for (p, entry) in sidecar.patches.iter().enumerate() {
         let fits =

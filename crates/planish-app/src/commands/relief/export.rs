@@ -12,8 +12,11 @@ use crate::summary::Summary;
 use crate::tolerance::Scale;
 use planish::model::Model;
 use planish::pipeline::{Figure, Warning};
-use planish::relief::maps::{self, MapKind, MapParams, PatchMap, Preset, Sheet};
-use planish_io::maps::{MapFile, MapOptions, as_read, materialx, other_ways, read_maps, write_maps};
+use planish::relief::Displaced;
+use planish::relief::maps::{self, MapKind, MapParams, PatchMap, Preset, Sheet, SheetKind};
+use planish_io::maps::{
+    MapFile, MapOptions, as_read, in_one_png, largest_error, materialx, other_ways, read_maps, write_maps,
+};
 use planish_io::report::{Report, count, number};
 use planish_io::{MappedMesh, WriteOptions};
 use std::path::Path;
@@ -37,9 +40,9 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
     let mut report = Report::new("relief export", files::model_facts(&args.model, &model, model.units));
     let scale = Scale { diagonal: model.mesh.bounds().diagonal(), units: model.units };
     let max_error = args.max_error.map(|t| t.length(scale));
-    if let (Some(e), true) = (max_error, params.kind == MapKind::Normal || file.is_whole()) {
-        let what = format!("{} does not go with normals or whole numbers", number(e));
-        return Err(Failure::usage("--max-error", what).hint("write vectors or scalars as EXR"));
+    if let (Some(e), MapKind::Normal) = (max_error, params.kind) {
+        let what = format!("{} does not go with normals", number(e));
+        return Err(Failure::usage("--max-error", what).hint("write vectors, scalars, lengths or heights"));
     }
     let (made, bake) = session.step("bake", || {
         maps::render(&displaced(&model), &model.mesh, &params, &Interrupt).map_err(|e| wrong(&args.model, e))
@@ -58,7 +61,7 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         file,
         upside_down: preset.is_some_and(|p| p.upside_down),
         max_error,
-        wiring: preset.map_or(String::new(), |p| p.wiring.split_whitespace().collect::<Vec<_>>().join(" ")),
+        wiring: wiring(preset, max_error.is_some() && file.is_whole()),
         units: model.units,
         companions: companions.iter().filter(|(asked, _)| *asked).map(|(_, name)| name.to_string()).collect(),
     };
@@ -78,16 +81,26 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
             }
         }
     }
-    let (bytes, error) = measured(&folder, &made, &args.output)?;
+    let Measured { bytes, error, crack } = measured(&folder, &made, &model, &args.output)?;
+    let triangles = model.mesh.triangles.len() as f64;
+    let each =
+        |bytes: u64| format!("{} bytes, {} a triangle of the mesh", count(bytes), number(bytes as f64 / triangles));
     report.quality.insert("relief.map_bytes".into(), Figure::Count(bytes));
+    report.quality.insert("relief.map_bytes_per_triangle".into(), Figure::Number(bytes as f64 / triangles));
     report.quality.insert("relief.map_error_max".into(), Figure::Number(error));
+    if let Some(crack) = crack {
+        report.quality.insert("relief.map_crack_max".into(), Figure::Number(crack));
+    }
     let mut others = Vec::new();
-    if max_error.is_some() {
-        let ways = other_ways(&made, &sheet).map_err(failed)?;
-        for ((name, key), (bytes, error)) in [("half EXR", "half"), ("DWA EXR", "dwa")].into_iter().zip(ways) {
+    if let Some(e) = max_error {
+        let same = file == MapFile::Png && params.sheets == SheetKind::Atlas && params.gutter == 0;
+        let one = if same { None } else { in_one_png(&made, params.kind, e).map_err(failed)? };
+        let [half, dwa] = other_ways(&made, &sheet).map_err(failed)?;
+        let ways = [("one PNG", "png", one), ("half EXR", "half", Some(half)), ("DWA EXR", "dwa", Some(dwa))];
+        for (name, key, (bytes, error)) in ways.into_iter().filter_map(|(name, key, way)| Some((name, key, way?))) {
             report.quality.insert(format!("relief.{key}_bytes"), Figure::Count(bytes));
             report.quality.insert(format!("relief.{key}_error_max"), Figure::Number(error));
-            others.push((name, format!("{} bytes, error {} {}", count(bytes), number(error), model.units)));
+            others.push((name, format!("{}, error {} {}", each(bytes), number(error), model.units)));
         }
     }
     folds(&model, &mut report, &args.model)?;
@@ -100,15 +113,25 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         table.row("model", args.model.display().to_string());
         table.row("maps", format!("{} of {} patches", params.kind.word(), made.len()));
         table.row("images", format!("{} in {}", sidecar.images.len(), args.output.display()));
-        table.row("bytes", count(bytes));
+        table.row("images take", each(bytes));
         table.row("largest", format!("{} {}", number(sidecar.largest), model.units));
         for (name, value) in others {
             table.row(format!("as {name}"), value);
         }
         table.row("error", format!("{} {} at most, of what was written", number(error), model.units));
+        if let Some(crack) = crack.filter(|_| max_error.is_some()) {
+            table.row("seams", format!("part by {} {} at most", number(crack), model.units));
+        }
         table.print();
     }
     Ok(Status::Done)
+}
+
+/// How the preset's program wires the map.
+/// * `steps` - true where the mid-level is that of a whole number of steps
+fn wiring(preset: Option<&Preset>, steps: bool) -> String {
+    let told = preset.map_or(String::new(), |p| p.wiring.split_whitespace().collect::<Vec<_>>().join(" "));
+    if steps && !told.is_empty() { format!("{told}; in place of 0.5 take the mid_level of this file") } else { told }
 }
 
 /// The preset with the given options in place.
@@ -151,18 +174,32 @@ fn base(model: &Model, params: &MapParams, sheet: &Sheet, path: &Path, args: &Re
         .map_err(|e| write_failure(&args.model, &args.output, e))
 }
 
-/// Bytes of the images, and the largest distance of what they hold from what was made.
-fn measured(folder: &Path, made: &[PatchMap], output: &Path) -> Result<(u64, f64), Failure> {
+/// What the files hold.
+struct Measured {
+    /// Bytes of the images.
+    bytes: u64,
+    /// Largest distance of a texel from what was made.
+    error: f64,
+    /// How far apart two patches displace a place that they share, at most; of vectors alone.
+    crack: Option<f64>,
+}
+
+/// Reads the images back.
+fn measured(folder: &Path, made: &[PatchMap], model: &Model, output: &Path) -> Result<Measured, Failure> {
     let back = read_maps(folder).map_err(|e| Failure::usage(output, format!("the maps do not read back: {e}")))?;
     let size = |name: &String| std::fs::metadata(folder.join(name)).map_or(0, |m| m.len());
     let bytes = back.sidecar.images.iter().map(|i| size(&i.file)).sum();
     debug_assert_eq!(as_read(made.to_vec(), &back.sidecar), back.maps);
-    let far = |(a, b): (&PatchMap, &PatchMap)| {
-        let texel =
-            |(x, y): (&[f32], &[f32])| x.iter().zip(y).map(|(x, y)| (*x as f64 - *y as f64).powi(2)).sum::<f64>();
-        a.values.chunks_exact(a.channels).zip(b.values.chunks_exact(b.channels)).map(texel).fold(0.0, f64::max)
+    let crack = match back.sidecar.params.kind {
+        MapKind::Vector => {
+            let now = displaced(model);
+            let reliefs = maps::read_back(&now, &back.sidecar.params, &back.maps, made, &Interrupt)
+                .and_then(|reliefs| planish::relief::widest_crack(&Displaced { reliefs: &reliefs, ..now }));
+            Some(reliefs.map_err(|e| wrong(output, e))?)
+        }
+        _ => None,
     };
-    Ok((bytes, made.iter().zip(&back.maps).map(far).fold(0.0, f64::max).sqrt()))
+    Ok(Measured { bytes, error: largest_error(made, &back.maps), crack })
 }
 
 /// Tells where the relief folds the surface over.

@@ -455,7 +455,8 @@ fn limited(ground: &Ground, now: &Displaced, limit: &Limit) -> Result<Made, Reli
             over.len()
         })
         .collect();
-    ground.agree(&mut maps);
+    // The mean would leave the side that bends more beyond its limit.
+    ground.agree_on_most(&mut maps);
     Ok((maps, vec![format!("{} texels brought back", counts.iter().sum::<usize>())]))
 }
 

@@ -93,6 +93,24 @@ impl<'a> Ground<'a> {
 
     /// Gives both sides of seams the mean of their world vectors; patches without vectors have none to say.
     pub(super) fn agree(&self, maps: &mut [Relief]) {
+        self.agree_on(maps, |told| told.iter().map(|t| t.0).sum::<DVec3>() / told.len() as f64);
+    }
+
+    /// Gives all sides of seams one vector that goes as far along the normal of each as it says, or further: where normals are
+    /// within a right angle, for what one of them adds takes nothing from the others then.
+    pub(super) fn agree_on_most(&self, maps: &mut [Relief]) {
+        self.agree_on(maps, |told| {
+            let further = |sum: DVec3, (world, normal): &(DVec3, DVec3)| {
+                let wanted = world.dot(*normal);
+                let short = wanted - sum.dot(*normal);
+                if short * wanted > 0.0 { sum + *normal * short } else { sum }
+            };
+            told.iter().fold(DVec3::ZERO, further)
+        });
+    }
+
+    /// * `choice` - of the world vectors that sides say, each with the side's normal
+    fn agree_on(&self, maps: &mut [Relief], choice: impl Fn(&[(DVec3, DVec3)]) -> DVec3) {
         for members in &self.seams {
             let told = |&&(p, _): &&Member| !maps[p as usize].vectors.is_empty();
             if members.iter().filter(told).count() == 0 {
@@ -100,19 +118,20 @@ impl<'a> Ground<'a> {
             }
             let world = |&(p, n): &Member| {
                 let d = maps[p as usize].vectors.get(n as usize).copied().unwrap_or_default();
-                self.nodes[p as usize][n as usize].1.world_from_local(d)
+                let frame = &self.nodes[p as usize][n as usize].1;
+                (frame.world_from_local(d), frame.normal)
             };
-            let worlds: Vec<DVec3> = members.iter().map(world).collect();
-            if worlds.iter().all(|w| *w == DVec3::ZERO) {
+            let worlds: Vec<(DVec3, DVec3)> = members.iter().map(world).collect();
+            if worlds.iter().all(|w| w.0 == DVec3::ZERO) {
                 continue;
             }
-            let mean = worlds.iter().sum::<DVec3>() / worlds.len() as f64;
+            let one = choice(&worlds);
             for &(p, n) in members {
                 let (p, n) = (p as usize, n as usize);
                 if maps[p].vectors.is_empty() {
                     maps[p].vectors = vec![DVec3::ZERO; maps[p].rows * maps[p].cols];
                 }
-                maps[p].vectors[n] = self.nodes[p][n].1.local_from_world(mean);
+                maps[p].vectors[n] = self.nodes[p][n].1.local_from_world(one);
             }
         }
     }
