@@ -1,14 +1,12 @@
 //! What was asked for and not reached: by how much, which limit it met, and the option that moves that limit.
 
 use crate::tolerance::{Scale, Tolerance};
+use planish::layout;
 use planish::model::{Model, Units};
 use planish::network::CurveKind;
 use planish::pipeline::{self, PipelineParams, Warning};
 use planish::surface::{Continuity, Measure, SeamQuality, normal_deviation_of};
 use planish_io::report::{Report, count, number};
-
-/// Patches beyond this many times the number that was asked for, or below its inverse, are told.
-const PATCHES_OFF: f64 = 1.5;
 
 /// A demanded tolerance and what is reached, both as shares of the diagonal of the input.
 #[derive(Clone, Copy, Debug)]
@@ -126,13 +124,12 @@ pub fn angle(model: &Model, seams: &[SeamQuality], params: &PipelineParams, dema
 /// Why there are far more or fewer patches than were asked for.
 pub fn patches(model: &Model, wanted: Option<u64>) -> Option<Warning> {
     let (wanted, found) = (wanted?, model.network.patches.len() as u64);
-    let ratio = found as f64 / wanted as f64;
-    if (1.0 / PATCHES_OFF..=PATCHES_OFF).contains(&ratio) {
+    if layout::is_near(found as usize, wanted as usize) {
         return None;
     }
     let sharp = model.network.curves.iter().filter(|c| c.kind == CurveKind::Feature).count() as u64;
-    let reason = if ratio < 1.0 {
-        "the mesh has no room for more: give a finer one".to_owned()
+    let reason = if found < wanted {
+        "not every number has a network along the form, and a coarse mesh has no room for many: ask for another or give a finer mesh".to_owned()
     } else if sharp > found / 4 {
         format!(
             "{} curves follow sharp edges, which bound patches: a greater --sharp-angle-deg or --feature-length leaves edges out",

@@ -178,6 +178,7 @@ impl Field for Near<'_> {
         if side.is_some_and(|side| !values.all(|d| d.is_finite() && d * side > reach)) {
             return true;
         }
+        // In the midst of data the winding number has no say.
         if self.here(center).filter(amid).is_some() {
             return false;
         }

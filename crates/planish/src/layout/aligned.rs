@@ -189,8 +189,8 @@ const MOST_UNASKED: f64 = 300.0;
 /// Numbers that are tried in place of one that was asked for and that the form does not allow.
 const NEAR_ASKED: [f64; 4] = [1.0, 1.1, 0.9, 1.2];
 
-/// A number of patches that was asked for is missed by at most this part of it.
-const MOST_MISSED: f64 = 0.25;
+/// A network has the number of patches that was asked for if it misses it by at most this part of it.
+const MOST_MISSED: f64 = 0.2;
 
 /// A network that follows the form.
 pub(super) struct Laid {
@@ -444,7 +444,27 @@ impl Aligned {
     }
 }
 
-/// True if a number of patches is near to the one asked for.
-fn is_near(found: usize, asked: usize) -> bool {
+/// True if a network of so many patches has the number that was asked for: within a fifth.
+pub fn is_near(found: usize, asked: usize) -> bool {
     found.abs_diff(asked) as f64 <= MOST_MISSED * asked as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_network_nearer_to_the_number_asked_for_is_worth_more_and_among_those_that_have_it_the_better_one() {
+        let worth = |patches, good_part| Worth::new(patches, Some(60), good_part);
+        assert!(worth(110, 0.5).exceeds(worth(317, 1.0)) && worth(40, 0.5).exceeds(worth(110, 1.0)));
+        assert!(!worth(110, 0.5).is_enough() && !worth(110, 1.0).is_kept());
+        assert!(
+            worth(50, 0.9).exceeds(worth(60, 0.8))
+                && worth(72, 1.0).is_enough()
+                && worth(48, 1.0).is_kept()
+                && !worth(73, 1.0).is_kept()
+        );
+        // Where no number is asked for, any has it.
+        assert!(Worth::new(317, None, 0.9).exceeds(Worth::new(60, None, 0.8)));
+    }
 }
