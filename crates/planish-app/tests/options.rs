@@ -105,9 +105,11 @@ fn a_missed_tolerance_and_a_missed_number_of_patches_name_the_limit_and_the_opti
     assert_ne!(bytes("20%"), bytes("0.001%"));
     assert_eq!(bytes("0.02"), bytes("0.002cm"));
     write_box(&folder.path().join("box.ply"), 6);
-    let output = planish(&["fit", "box.ply", "-o", "b.planish", "--patches", "1"], folder.path());
-    assert_eq!(status(&output), 0, "{}", stderr(&output));
-    let told = stderr(&output);
-    assert!(told.contains("patches where 1 were asked for: 12 curves follow sharp edges"), "{told}");
-    assert!(told.contains("a greater --sharp-angle-deg"), "{told}");
+    for (command, to) in [("fit", "b.planish"), ("layout", "b.json")] {
+        let output = planish(&[command, "box.ply", "-o", to, "--patches", "1"], folder.path());
+        assert_eq!(status(&output), 0, "{}", stderr(&output));
+        let told = stderr(&output);
+        assert!(told.contains("patches where 1 were asked for: 12 curves follow sharp edges"), "{command}: {told}");
+        assert!(told.contains("a greater --sharp-angle-deg"), "{command}: {told}");
+    }
 }

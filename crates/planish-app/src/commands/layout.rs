@@ -1,6 +1,6 @@
 //! `planish layout`: a network to start from.
 
-use super::{Session, commit_report, write_failure};
+use super::{Session, commit_report, missed, write_failure};
 use crate::args::Layout;
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -28,6 +28,8 @@ pub fn layout(session: &Session, args: &Layout) -> Result<Status, Failure> {
     report.stages.extend(made.stages);
     report.warnings = made.warnings;
     report.warnings.extend(placed.warning(units.symbol()));
+    let wanted = (params.patches > 0 && !params.coarsest).then_some(params.patches as u64);
+    report.warnings.extend(missed::patches(network, wanted));
     report.quality = made.quality;
     staged.commit()?;
     commit_report(own_report, &report)?;

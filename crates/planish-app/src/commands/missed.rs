@@ -3,7 +3,7 @@
 use crate::tolerance::{Scale, Tolerance};
 use planish::layout;
 use planish::model::{Model, Units};
-use planish::network::CurveKind;
+use planish::network::{CurveKind, Network};
 use planish::pipeline::{self, PipelineParams, Warning};
 use planish::surface::{Continuity, Measure, SeamQuality, normal_deviation_of};
 use planish_io::report::{Report, count, number};
@@ -121,15 +121,17 @@ pub fn angle(model: &Model, seams: &[SeamQuality], params: &PipelineParams, dema
     Some(Warning::new(ANGLE, text, places.join("; ")))
 }
 
-/// Why there are far more or fewer patches than were asked for.
-pub fn patches(model: &Model, wanted: Option<u64>) -> Option<Warning> {
-    let (wanted, found) = (wanted?, model.network.patches.len() as u64);
-    if layout::is_near(found as usize, wanted as usize) {
+/// Why there are more or fewer patches than were asked for, by more than a fifth.
+pub fn patches(network: &Network, wanted: Option<u64>) -> Option<Warning> {
+    let (wanted, found) = (wanted?, network.patches.len() as u64);
+    if layout::count_is_near(found as usize, wanted as usize) {
         return None;
     }
-    let sharp = model.network.curves.iter().filter(|c| c.kind == CurveKind::Feature).count() as u64;
+    let sharp = network.curves.iter().filter(|c| c.kind == CurveKind::Feature).count() as u64;
     let reason = if found < wanted {
-        "not every number has a network along the form, and a coarse mesh has no room for many: ask for another or give a finer mesh".to_owned()
+        "networks along the form have certain numbers only, and a coarse mesh has no room for many: ask for another number, \
+         or give a finer mesh"
+            .to_owned()
     } else if sharp > found / 4 {
         format!(
             "{} curves follow sharp edges, which bound patches: a greater --sharp-angle-deg or --feature-length leaves edges out",

@@ -199,7 +199,7 @@ pub fn fitted(session: &Session, job: &Job, from: From, before: Vec<StageRecord>
     let reach = Reach::new(job.demanded, run.params.fit.tolerance_of, &report, units);
     report.warnings.extend(missed::tolerance(&model, &run.params, reach, report.input.diagonal));
     report.warnings.extend(missed::angle(&model, &seams, &run.params, job.demanded_angle));
-    report.warnings.extend(missed::patches(&model, job.wanted_patches));
+    report.warnings.extend(missed::patches(&model.network, job.wanted_patches));
     (model.units, model.shift) = (units, shift);
     model.params = serde_json::to_string(&run.params).map_err(Failure::fault)?;
     model.history.push(HistoryEntry { command: "fit".into(), parameters: model.params.clone() });

@@ -8,8 +8,8 @@ use std::io::{Cursor, Write};
 use std::path::Path;
 use std::result::Result; // the image library brings one of its own
 
-/// Numbers of an image that Zopfli packs in about five seconds, a twelfth smaller than zlib's best, which larger ones get.
-pub(super) const SMALL: usize = 1 << 19;
+/// Numbers of an image that Zopfli packs at most: in about five seconds, a twelfth smaller than zlib's best, which larger ones get.
+pub(super) const MOST_ZOPFLI: usize = 1 << 19;
 /// Compression makes data at most about this many times smaller: an image that claims more is lying.
 const LARGEST_RATIO: u64 = 1100;
 
@@ -176,19 +176,18 @@ fn write_png(out: &mut Cursor<Vec<u8>>, raster: &Raster, bits: u32, note: &str) 
     });
     encoder.set_depth(if bits == 8 { png::BitDepth::Eight } else { png::BitDepth::Sixteen });
     encoder.add_text_chunk("Comment".into(), note.into())?;
-    if bits == 8 && raster.values.len() <= SMALL {
-        let pixels: Vec<u8> = raster.values.iter().map(|&x| whole(x, bits) as u8).collect();
+    let bytes: Vec<u8> = match bits {
+        8 => raster.values.iter().map(|&x| whole(x, bits) as u8).collect(),
+        _ => raster.values.iter().flat_map(|&x| whole(x, bits).to_be_bytes()).collect(),
+    };
+    if bits == 8 && bytes.len() <= MOST_ZOPFLI {
         let mut packed = Vec::new();
-        let filtered = paeth_filtered(&pixels, raster.width * raster.channels, raster.channels);
+        let filtered = paeth_filtered(&bytes, raster.width * raster.channels, raster.channels);
         zopfli::compress(zopfli::Options::default(), zopfli::Format::Zlib, &filtered[..], &mut packed)?;
         // The end of the file is written when the writer goes.
         return encoder.write_header()?.write_chunk(png::chunk::IDAT, &packed);
     }
     encoder.set_compression(png::Compression::High);
-    let bytes: Vec<u8> = match bits {
-        8 => raster.values.iter().map(|&x| whole(x, bits) as u8).collect(),
-        _ => raster.values.iter().flat_map(|&x| whole(x, bits).to_be_bytes()).collect(),
-    };
     encoder.write_header()?.write_image_data(&bytes)
 }
 
@@ -202,20 +201,25 @@ fn paeth_filtered(bytes: &[u8], row: usize, back: usize) -> Vec<u8> {
         if x == 0 {
             out.push(PAETH);
         }
-        let at = |inside: bool, before: usize| if inside { i32::from(bytes[k - before]) } else { 0 };
+        let at = |inside: bool, before: usize| if inside { i64::from(bytes[k - before]) } else { 0 };
         let (left, up) = (at(x >= back, back), at(k >= row, row));
         let both = at(x >= back && k >= row, row + back);
-        let [l, u, b] = [(up - both).abs(), (left - both).abs(), (left + up - 2 * both).abs()];
-        let predicted = if l <= u && l <= b {
-            left
-        } else if u <= b {
-            up
-        } else {
-            both
-        };
-        out.push(byte.wrapping_sub(predicted as u8));
+        out.push(byte.wrapping_sub(paeth(left, up, both) as u8));
     }
     out
+}
+
+/// What Paeth's filter of PNG predicts: of the numbers to the left, above, and to the left above the one nearest to
+/// `left + up - both`.
+pub(super) fn paeth(left: i64, up: i64, both: i64) -> i64 {
+    let [l, u, b] = [(up - both).abs(), (left - both).abs(), (left + up - 2 * both).abs()];
+    if l <= u && l <= b {
+        left
+    } else if u <= b {
+        up
+    } else {
+        both
+    }
 }
 
 fn write_tiff(out: &mut Cursor<Vec<u8>>, raster: &Raster, note: &str) -> tiff::TiffResult<()> {

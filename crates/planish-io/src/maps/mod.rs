@@ -156,8 +156,8 @@ fn all_finite(maps: &[PatchMap], what: &str, hint: &'static str) -> Result<(), W
 /// * `attributes` - maps of vertex attributes with their names, of the same shapes
 ///
 /// # Errors
-/// `WriteError::Nothing` without maps; `WriteError::TooFine` for a bound that the files cannot keep; `WriteError::Inconsistent` if maps and sheet do not fit; `WriteError::Value` for numbers that
-/// are not finite; those of writing.
+/// `WriteError::Nothing` without maps; `WriteError::TooFine` for a bound that the files cannot keep; `WriteError::Inconsistent` if
+/// maps and sheet do not fit; `WriteError::Value` for numbers that are not finite; those of writing.
 pub fn write_maps(
     folder: impl AsRef<Path>,
     maps: &[PatchMap],
@@ -287,7 +287,7 @@ pub fn in_one_png(maps: &[PatchMap], kind: MapKind, max_error: f64) -> Result<Op
     let Ok(sheet) = maps::pack(&shapes, SheetKind::Atlas, 0, 0) else { return Ok(None) };
     let Ok((rounded, coding)) = prepared(maps, kind, MapFile::Png, Some(max_error)) else { return Ok(None) };
     let raster = painted(&rounded, &sheet, 0, &coding);
-    if raster.values.len() > image::SMALL {
+    if raster.values.len() > image::MOST_ZOPFLI {
         return Ok(None);
     }
     let bytes = image::encoded(&raster, coding.store, "")?.len() as u64;

@@ -7,15 +7,15 @@
 //!
 //! Texels on the border of a patch keep the nearest multiples, so that what two patches share stays one.
 
-use super::image::MapFile;
+use super::image::{MapFile, paeth};
 use planish::relief::maps::PatchMap;
 use rayon::prelude::*;
 
 /// Sweeps over a map at most: the first brings most, and each of the last ones less than a hundredth of the bytes.
-const SWEEPS: usize = 7;
+const MOST_SWEEPS: usize = 7;
 /// Room between the bound and the distance to the nearest multiples, as a share: more than single precision takes away from
 /// numbers of 16 bits, 2^-25 of 65535 steps.
-const ROOM: f64 = 1.0 / 256.0;
+const BOUND_ROOM: f64 = 1.0 / 256.0;
 
 /// Maps of multiples of a step.
 #[derive(Clone, Debug)]
@@ -47,7 +47,7 @@ pub(super) fn rounded(maps: &[PatchMap], error: f64, file: MapFile) -> Rounded {
 fn step_of(error: f64, channels: usize, file: MapFile) -> f64 {
     let most = 2.0 * error / (channels as f64).sqrt();
     if file.is_whole() {
-        return most * (1.0 - ROOM);
+        return most * (1.0 - BOUND_ROOM);
     }
     most.log2().floor().exp2()
 }
@@ -59,9 +59,9 @@ fn multiples(map: &PatchMap, error: f64, step: f64) -> Vec<i64> {
     let exact: Vec<f64> =
         map.values.chunks_exact(cols * channels).rev().flatten().map(|&x| f64::from(x) / step).collect();
     let mut plane = Plane { width: cols * channels, channels, at: exact.iter().map(|x| x.round() as i64).collect() };
-    let within = (error * (1.0 - ROOM)).powi(2);
+    let within = (error * (1.0 - BOUND_ROOM)).powi(2);
     let mut choices = Choices::default();
-    for sweep in 0..SWEEPS {
+    for sweep in 0..MOST_SWEEPS {
         let mut changed = false;
         for y in 1..rows - 1 {
             for x in 1..cols - 1 {
@@ -92,15 +92,7 @@ impl Plane {
     fn surprise(&self, k: usize) -> i64 {
         let (left, up) = (self.at[k - self.channels], self.at[k - self.width]);
         let both = self.at[k - self.width - self.channels];
-        let [l, u, b] = [(up - both).abs(), (left - both).abs(), (left + up - 2 * both).abs()];
-        let predicted = if l <= u && l <= b {
-            left
-        } else if u <= b {
-            up
-        } else {
-            both
-        };
-        (self.at[k] - predicted).abs()
+        (self.at[k] - paeth(left, up, both)).abs()
     }
 
     /// The surprises that a number inside the map has a part in: its own and, if they are set `ahead`, those to the right and

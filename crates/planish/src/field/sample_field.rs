@@ -179,7 +179,7 @@ impl Field for Near<'_> {
             return true;
         }
         // In the midst of data the winding number has no say.
-        if self.here(center).filter(amid).is_some() {
+        if self.here(center).as_ref().is_some_and(amid) {
             return false;
         }
         let Some(dipoles) = &self.field.closing else { return side.is_some() };

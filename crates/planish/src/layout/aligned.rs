@@ -214,7 +214,7 @@ pub(super) struct Worth {
 impl Worth {
     pub fn new(patches: usize, asked: Option<usize>, good_part: f64) -> Worth {
         let missed = match asked {
-            Some(asked) if !is_near(patches, asked) => (patches as f64 / asked as f64).ln().abs(),
+            Some(asked) if !count_is_near(patches, asked) => (patches as f64 / asked as f64).ln().abs(),
             _ => 0.0,
         };
         Worth { missed, good_part }
@@ -445,7 +445,7 @@ impl Aligned {
 }
 
 /// True if a network of so many patches has the number that was asked for: within a fifth.
-pub fn is_near(found: usize, asked: usize) -> bool {
+pub fn count_is_near(found: usize, asked: usize) -> bool {
     found.abs_diff(asked) as f64 <= MOST_MISSED * asked as f64
 }
 

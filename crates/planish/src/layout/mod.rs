@@ -28,7 +28,7 @@ mod shape;
 mod slide;
 mod strips;
 
-pub use crate::layout::aligned::is_near;
+pub use crate::layout::aligned::count_is_near;
 use crate::layout::aligned::{AlignError, Worth};
 use crate::layout::complex::Complex;
 use crate::layout::partition::{outline, polygon, tips};

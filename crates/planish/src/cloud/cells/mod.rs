@@ -35,7 +35,8 @@ use serde::{Deserialize, Serialize};
 const HEARD: f64 = 1.3;
 /// And it takes part in the blend within so many: nearly as far as its points.
 const BLENDED: f64 = 1.2;
-/// A cell between sheets on both sides is at least this many distances of sites wide, so that cells overlap everywhere.
+/// A cell between sheets on both sides reaches at least this many distances of sites: no place of the surface is farther than one
+/// from a site, and half of one more lets cells overlap everywhere.
 const COVERED_GAPS: f64 = 1.5;
 /// Most sheets of a cell.
 const MOST_SHEETS: usize = nest::MOST_NESTED;
@@ -365,8 +366,7 @@ fn find(
             return Some(Found { sheets, concave: 0, total, cost: total / count });
         }
     }
-    let asked = different(candidates, &near, place);
-    let seen: Vec<(f64, DVec3)> = asked.iter().map(|c| c.quadric.distance(center)).collect();
+    let (asked, seen) = different(candidates, &near, place);
     if asked.is_empty() {
         return None;
     }
@@ -410,9 +410,14 @@ fn find(
     Some(Found { sheets, concave, total, cost: spent / count })
 }
 
-/// The candidates that a cell tries: the nearest of every other sheet first, then what differs from these.
+/// The candidates that a cell tries, the nearest of every other sheet first, then what differs from these; and of each the signed
+/// distance and the normal at the middle of the cell.
 /// * `near` - indices of candidates, the nearest first
-fn different<'a>(candidates: &'a [Candidate], near: &[(f64, u32)], place: &Place) -> Vec<&'a Candidate> {
+fn different<'a>(
+    candidates: &'a [Candidate],
+    near: &[(f64, u32)],
+    place: &Place,
+) -> (Vec<&'a Candidate>, Vec<(f64, DVec3)>) {
     let mut asked: Vec<&Candidate> = Vec::new();
     let mut seen: Vec<(f64, DVec3)> = Vec::new();
     for (turn, level) in [OTHER_SHEET, OTHER_FIT] {
@@ -424,12 +429,12 @@ fn different<'a>(candidates: &'a [Candidate], near: &[(f64, u32)], place: &Place
                 asked.push(c);
                 seen.push((d, n));
                 if asked.len() == MOST_CANDIDATES {
-                    return asked;
+                    return (asked, seen);
                 }
             }
         }
     }
-    asked
+    (asked, seen)
 }
 
 /// A step that explains the points for less than `most`, prices included: its sheets, how they are joined, cost, and cost with

@@ -170,8 +170,8 @@ fn own(points: &[DVec3], fits: &mut [Fit], owner: &mut [u32]) {
 
 /// The fits that enough points are nearest to.
 ///
-/// Where sites stand as densely as points, a fit has one or two by chance. Then its sheet tells: all that carry it on must have
-/// as many together as the least sheet has, and it its half of what one of them has in the mean.
+/// Where sites stand as densely as points, a fit has one or two by chance. Then its sheet tells: the fit and those that carry it
+/// on must have as many points together as the poorest sheet of others, and the fit half of their mean.
 fn upheld(fits: &[Fit]) -> Vec<usize> {
     let poor: Vec<usize> = (0..fits.len()).filter(|&i| (1..FEWEST_NEAREST).contains(&fits[i].owned)).collect();
     let is_upheld = around(fits, &poor, |i, near| {
