@@ -60,7 +60,7 @@ fn scan_params(given: &mut Given, close: Option<bool>, memory: Option<f64>) -> P
 /// A scan's mesh with its figures.
 fn mesh_of(made: ScanMeshed) -> PyMesh {
     let more = json!({
-        "noise": made.samples.noise, "spacing": made.samples.spacing, "specks": made.specks, "closed": made.closed,
+        "noise": made.facts.noise, "spacing": made.facts.spacing, "specks": made.specks, "closed": made.closed,
         "lids": made.lids, "to_points_rms": made.to_points.0, "to_points_mean": made.to_points.1,
     });
     PyMesh::meshed(made.meshed, more)

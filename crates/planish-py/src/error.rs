@@ -95,6 +95,7 @@ impl Told for ScanError {
         match self {
             ScanError::Cloud(e) => e.exception(message),
             ScanError::Mesh(e) => e.exception(message),
+            ScanError::Memory { .. } => class::CloudError::new_err(message),
             ScanError::Cancelled(_) => class::Error::new_err(message),
         }
     }

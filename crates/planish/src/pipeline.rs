@@ -3,7 +3,7 @@
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, fig. 1.3: curves, grids, surfaces,
 //! displacement maps; before it a mesh of the scan, its repair and an automatic network, after it the measuring.
 //!
-//! 1. [`run`], everything: a scan is meshed ([`mesh_scan`]), its points are brought to the surface, and the parameters of
+//! 1. [`run`], everything: a scan is meshed (as [`mesh_scan`] does, but in one piece), its points are brought to the surface, and the parameters of
 //!    what follows are those that suit its noise ([`params_for`])
 //! 2. [`fit`], from a mesh on: repair, layout, imprint, grids, surfaces, seams, relief, measure. [`layout()`] stops at the
 //!    network, for one that is edited before
@@ -13,6 +13,7 @@
 //! A [`PipelineObserver`] hears which stage runs and how far the run is, and may stop it; [`StageRecord`] keeps what each
 //! took and made, [`Quality`] what came of it.
 
+mod bricks;
 mod deform;
 mod quality;
 mod record;
@@ -20,6 +21,7 @@ mod rework;
 mod scan;
 mod truth;
 
+pub use bricks::{BRICK_POINTS, mesh_in_bricks, mesh_scan};
 pub use deform::{Move, deform, join, matched, moved};
 pub use quality::{
     FOLDED_DEG, SEAM_ANGLE_WARNING_DEG, displaced_mesh, displaced_patches, inner_angles, span_count, surface_mesh,
@@ -28,7 +30,7 @@ pub use quality::{
 pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
 pub use rework::{Earlier, Remade, remake, rework};
 pub use scan::{
-    ScanError, ScanMeshed, ScanParams, field_of, mesh_samples, mesh_scan, params_for, sample_figures, scan_figures,
+    ScanError, ScanFacts, ScanMeshed, ScanParams, field_of, mesh_samples, params_for, sample_figures, scan_figures,
     voxel_for,
 };
 pub use truth::{EdgesFound, Zone, edge_reach, edges_found, truth_figures, zone};
@@ -136,7 +138,7 @@ pub fn run(input: Input, params: &RunParams, observer: &dyn PipelineObserver) ->
     let scan = &params.scan;
     let meshed = clock.stage(
         "mesh",
-        |o| mesh_scan(cloud, scan, o),
+        |o| scan::mesh_at_once(cloud, scan, o),
         |m| [("triangles", m.meshed.extracted.mesh.triangles.len())],
     )?;
     let points = clock.stage(

@@ -68,7 +68,7 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
     })?;
     report.stages = vec![read, fit, moved, write];
     report.input.diagonal = samples.diagonal;
-    pipeline::sample_figures(&samples, &mut report.quality, &mut report.warnings);
+    pipeline::sample_figures(&pipeline::ScanFacts::of(&samples), &mut report.quality, &mut report.warnings);
     figures(&cleaned, &mut report);
     staged.commit()?;
     segments.into_iter().chain(lines).try_for_each(Staged::commit)?;

@@ -16,7 +16,7 @@ const END_DEG: f64 = 10.0;
 const STYLE: &str = include_str!("style.css");
 
 /// Figures of a scan in words: key, meaning, and how the value is read.
-const SCAN_FIGURES: [(&str, &str, Reading); 15] = [
+const SCAN_FIGURES: [(&str, &str, Reading); 16] = [
     ("scan.noise", "Noise of the points, standard deviation", Reading::Length),
     ("scan.spacing", "Distance of neighbouring points", Reading::Length),
     ("scan.samples", "Samples fitted to them", Reading::Plain),
@@ -27,6 +27,7 @@ const SCAN_FIGURES: [(&str, &str, Reading); 15] = [
     ("scan.moved_rms", "Points moved onto the surface by, root mean square", Reading::Length),
     ("scan.closed", "Holes were closed", Reading::Plain),
     ("scan.lids", "Small holes of an open scan that were closed", Reading::Plain),
+    ("scan.bricks", "Bricks that the scan was meshed in", Reading::Plain),
     ("scan.specks", "Specks of noise left out", Reading::Plain),
     ("scan.to_mesh_rms", "Raw points to the mesh, root mean square", Reading::Length),
     ("scan.to_mesh_mean", "Raw points to the mesh, mean", Reading::Length),

@@ -13,6 +13,7 @@
 //! paper are in `docs/methods/samples.md`.
 
 mod blend;
+pub mod bricks;
 mod cells;
 mod local;
 mod orient;
@@ -172,6 +173,8 @@ pub struct Sample {
     pub class: u8,
     /// Sheets at its site: 1 regular, 2 crease, 3 and more corner.
     pub sheets: u8,
+    /// Whether it is one side of a plate or a gap that was found as such.
+    pub plate: bool,
     /// Body that it belongs to, by falling area.
     pub segment: u32,
     /// Share of its meetings with other samples that agree with its orientation, 0 to 1.
@@ -265,6 +268,7 @@ pub fn clean(cloud: &Cloud, params: &CleanParams, observer: &dyn Observer) -> Re
                 irregularity: f.irregularity,
                 class: f.class,
                 sheets: f.sheets,
+                plate: f.gap.is_finite(),
                 segment: oriented.segment[i],
                 confidence: oriented.confidence[i],
             }

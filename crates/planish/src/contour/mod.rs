@@ -30,7 +30,7 @@ use crate::mesh::{FeatureKind, FeatureTags, TriMesh};
 use crate::observe::{Cancelled, Observer};
 use cell::face;
 pub use polish::FieldCreases;
-pub use sources::{Meshed, MeshingError, Sampling, from_field, from_grid, from_mesh, from_part};
+pub use sources::{Meshed, MeshingError, Sampling, from_field, from_grid, from_mesh, from_part, on_lattice};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -104,6 +104,16 @@ pub struct ContourCounts {
     pub moved: usize,
     /// Feature vertices that stayed in their cell though they belong elsewhere.
     pub kept: usize,
+}
+
+impl std::ops::AddAssign for ContourCounts {
+    fn add_assign(&mut self, other: ContourCounts) {
+        self.cells += other.cells;
+        self.fallbacks += other.fallbacks;
+        self.pushed += other.pushed;
+        self.moved += other.moved;
+        self.kept += other.kept;
+    }
 }
 
 /// Thresholds of one run.

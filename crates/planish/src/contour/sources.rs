@@ -107,7 +107,19 @@ pub fn from_field(
     observer: &dyn Observer,
 ) -> Result<Meshed, MeshingError> {
     let lattice = lattice_of(field, sampling)?;
-    let directed = sample(field, &lattice, &observe::Part::new(observer, 0.0, 0.5))?;
+    on_lattice(field, &lattice, params, observer)
+}
+
+/// Meshes any point-wise field on a given lattice.
+/// # Errors
+/// [`MeshingError`].
+pub fn on_lattice(
+    field: &dyn Field,
+    lattice: &Lattice,
+    params: &ContourParams,
+    observer: &dyn Observer,
+) -> Result<Meshed, MeshingError> {
+    let directed = sample(field, lattice, &observe::Part::new(observer, 0.0, 0.5))?;
     let creases = FieldCreases::new(field, params.sharp, params.corner);
     // Noisy gradients would lead the search for features astray.
     let exact = field.noise_deg() == 0.0;

@@ -42,7 +42,7 @@ pub use mesh_field::MeshField;
 pub use part::{MeshBody, Part};
 pub use polygon::{Polygon, PolygonError};
 pub use sample::sample;
-pub use sample_field::SampleField;
+pub use sample_field::{FieldScale, SampleField};
 pub use scalar_grid::{Body, GradientRule, GridParams, ScalarGrid};
 pub use solid::{Formula, FormulaError, Solid};
 pub use sweep::{Milling, Move, Tool};

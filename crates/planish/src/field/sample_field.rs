@@ -4,9 +4,10 @@
 //! winding number of the samples.
 
 use super::Field;
-use crate::cloud::{Blend, Blended, Dipoles, Samples};
+use crate::cloud::{Blend, Blended, Cell, Dipoles, Samples};
 use crate::geom::Aabb;
 use glam::DVec3;
+use std::sync::Arc;
 
 /// What a cell says changes by at most this much per length.
 const STEEP: f64 = 1.2;
@@ -29,19 +30,38 @@ pub struct SampleField {
     widest: f64,
     noise_deg: f64,
     /// Winding number of the samples, where holes are closed.
-    closing: Option<Dipoles>,
+    closing: Option<Arc<Dipoles>>,
+}
+
+/// What a field of samples is measured by.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldScale {
+    /// Box of the centres of all samples, world units.
+    pub bounds: Aabb,
+    /// Widest support of a cell, world units.
+    pub widest: f64,
+    /// Typical error of the normals, degrees.
+    pub noise_deg: f64,
 }
 
 impl SampleField {
     /// The field of `samples`. With `close`, places without data get their side from the winding number.
     pub fn new(samples: &Samples, close: bool) -> SampleField {
+        let bounds = Aabb::of(samples.samples.iter().map(|s| &s.center));
+        let dipoles =
+            || Dipoles::new(&samples.samples.iter().map(|s| (s.center, s.normal * s.area)).collect::<Vec<_>>());
         let widest = samples.cells.iter().map(|s| s.support).fold(0.0, f64::max);
-        let mut bounds = Aabb::of(samples.samples.iter().map(|s| &s.center));
+        let scale = FieldScale { bounds, widest, noise_deg: samples.normal_noise_deg };
+        SampleField::of_cells(&samples.cells, &scale, close.then(|| Arc::new(dipoles())))
+    }
+
+    /// The field of some cells of a larger whole.
+    /// * `closing` - all samples of the whole, where places without data get their side from the winding number
+    pub fn of_cells(cells: &[Cell], scale: &FieldScale, closing: Option<Arc<Dipoles>>) -> SampleField {
+        let FieldScale { mut bounds, widest, noise_deg } = *scale;
         bounds.min -= DVec3::splat(0.5 * widest);
         bounds.max += DVec3::splat(0.5 * widest);
-        let closing = close
-            .then(|| Dipoles::new(&samples.samples.iter().map(|s| (s.center, s.normal * s.area)).collect::<Vec<_>>()));
-        SampleField { blend: Blend::new(&samples.cells), bounds, widest, noise_deg: samples.normal_noise_deg, closing }
+        SampleField { blend: Blend::new(cells), bounds, widest, noise_deg, closing }
     }
 
     /// The value at `p` from what the cells say there; NaN where nothing is known.

@@ -74,6 +74,21 @@ pub fn close_hole(mesh: &mut TriMesh, tags: &mut FeatureTags, near: DVec3) -> bo
     found.inspect(|lid| cover(mesh, tags, &rim, lid)).is_some()
 }
 
+/// Closes the holes of an oriented manifold all of whose boundary vertices are `wanted`, whatever lies around; returns their number.
+pub(crate) fn close_around(mesh: &mut TriMesh, tags: &mut FeatureTags, wanted: impl Fn(u32) -> bool) -> usize {
+    let adjacency = Adjacency::new(mesh);
+    let made: Vec<_> = boundary_loops(&adjacency)
+        .iter()
+        .filter(|around| around.len() <= MOST_EDGES && around.iter().all(|&h| wanted(mesh.origin(h))))
+        .filter_map(|around| {
+            let rim: Vec<u32> = around.iter().rev().map(|&h| mesh.origin(h)).collect();
+            lid_over(mesh, &adjacency, around, &rim, false).map(|lid| (rim, lid))
+        })
+        .collect();
+    made.iter().for_each(|(rim, lid)| cover(mesh, tags, rim, lid));
+    made.len()
+}
+
 /// Puts a lid on its rim.
 fn cover(mesh: &mut TriMesh, tags: &mut FeatureTags, rim: &[u32], lid: &Lid) {
     let first = mesh.points.len() as u32;

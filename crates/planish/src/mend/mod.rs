@@ -11,6 +11,7 @@ pub(crate) mod rims;
 mod slivers;
 mod trim;
 
+pub(crate) use holes::close_around;
 pub use holes::{close_hole, close_holes};
 pub use repair::{part_fans, repair, weld};
 pub use repairs::Repairs;

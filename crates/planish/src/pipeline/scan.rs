@@ -29,6 +29,16 @@ pub enum ScanError {
     /// No surface.
     #[error(transparent)]
     Mesh(#[from] MeshingError),
+    /// More points than memory allows.
+    #[error("{points} points need about {} MB, {} MB are allowed; allow more memory or thin the scan", needed >> 20, allowed >> 20)]
+    Memory {
+        /// Number of points.
+        points: usize,
+        /// Bytes needed, about.
+        needed: u64,
+        /// Bytes allowed.
+        allowed: u64,
+    },
     /// The observer no longer wanted the result.
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),
@@ -69,13 +79,67 @@ impl Default for ScanParams {
     }
 }
 
-/// What [`mesh_scan`] makes.
+/// What is known of all samples of a scan together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ScanFacts {
+    /// Number of samples.
+    pub samples: usize,
+    /// Mean of their confidence, 0 to 1.
+    pub confidence: f64,
+    /// Number of bodies.
+    pub segments: usize,
+    /// Standard deviation of the points, world units.
+    pub noise: f64,
+    /// Distance of neighbouring points, world units.
+    pub spacing: f64,
+    /// Typical error of the normals, degrees.
+    pub normal_noise_deg: f64,
+    /// Distance of sheets side by side, as of [`Samples::gap`].
+    pub gap: f64,
+    /// Bounding-box diagonal of the points, world units.
+    pub diagonal: f64,
+}
+
+impl ScanFacts {
+    /// The facts of samples.
+    pub fn of(samples: &Samples) -> ScanFacts {
+        let count = samples.samples.len();
+        ScanFacts {
+            samples: count,
+            confidence: samples.samples.iter().map(|s| s.confidence).sum::<f64>() / count.max(1) as f64,
+            segments: samples.closed.len(),
+            noise: samples.noise,
+            spacing: samples.spacing,
+            normal_noise_deg: samples.normal_noise_deg,
+            gap: samples.gap,
+            diagonal: samples.diagonal,
+        }
+    }
+
+    /// The edge of a cell that suits the samples.
+    pub fn voxel(&self) -> f64 {
+        let usual = (CELL_SPACINGS * self.spacing).max(CELL_NOISE * self.noise);
+        let gap = if self.gap < TWICE * self.noise { f64::INFINITY } else { self.gap };
+        usual.min(CELL_GAPS * gap).max(FINEST_CELL * usual)
+    }
+
+    /// How closely a surface is fitted to the scan, as a share of the diagonal.
+    fn fit_tolerance(&self) -> f64 {
+        (FIT_NOISE * self.noise / self.diagonal).max(FIT_CLOSEST)
+    }
+}
+
+/// What [`super::mesh_scan`] makes.
 #[derive(Clone, Debug)]
 pub struct ScanMeshed {
-    /// The samples.
+    /// The samples; none if the scan was meshed in bricks.
     pub samples: Samples,
+    /// What is known of them together.
+    pub facts: ScanFacts,
     /// The mesh, without specks.
     pub meshed: Meshed,
+    /// Bricks that it was made in; 0 if in one piece.
+    pub bricks: usize,
     /// Specks that were left out.
     pub specks: usize,
     /// Whether holes were closed.
@@ -101,13 +165,11 @@ const SPECK_AREA: f64 = 0.005;
 /// So are those with less than this share of the points that their area has elsewhere: what a blend leaves beside the data.
 const BARE_SPECK: f64 = 0.1;
 /// Raw points that are measured against the mesh.
-const MEASURED_POINTS: usize = 50_000;
+pub(super) const MEASURED_POINTS: usize = 50_000;
 
 /// The edge of a cell that suits the samples.
 pub fn voxel_for(samples: &Samples) -> f64 {
-    let usual = (CELL_SPACINGS * samples.spacing).max(CELL_NOISE * samples.noise);
-    let gap = if samples.gap < TWICE * samples.noise { f64::INFINITY } else { samples.gap };
-    usual.min(CELL_GAPS * gap).max(FINEST_CELL * usual)
+    ScanFacts::of(samples).voxel()
 }
 
 /// The field of the samples of a scan, and whether its holes are closed.
@@ -116,15 +178,19 @@ pub fn field_of(samples: &Samples, params: &ScanParams) -> (SampleField, bool) {
     (SampleField::new(samples, closed), closed)
 }
 
-/// Meshes a scan.
+/// Meshes a scan of any size as a whole.
 /// # Errors
 /// [`ScanError`].
-pub fn mesh_scan(scan: &Cloud, params: &ScanParams, observer: &dyn Observer) -> Result<ScanMeshed, ScanError> {
+pub(super) fn mesh_at_once(
+    scan: &Cloud,
+    params: &ScanParams,
+    observer: &dyn Observer,
+) -> Result<ScanMeshed, ScanError> {
     let samples = cloud::clean(scan, &params.clean, &Part::new(observer, 0.0, 0.6))?;
     mesh_samples(scan, samples, params, &Part::new(observer, 0.6, 0.4))
 }
 
-/// Meshes the samples of a scan: [`mesh_scan`] from there on.
+/// Meshes the samples of a scan: [`super::mesh_scan`] from there on, as a whole.
 /// * `scan` - the points that the samples were made from
 /// # Errors
 /// [`ScanError`].
@@ -135,38 +201,59 @@ pub fn mesh_samples(
     observer: &dyn Observer,
 ) -> Result<ScanMeshed, ScanError> {
     let (field, closed) = field_of(&samples, params);
-    let spacing = params.cells.unwrap_or_else(|| Spacing::Voxel(voxel_for(&samples)));
+    let facts = ScanFacts::of(&samples);
+    let spacing = params.cells.unwrap_or_else(|| Spacing::Voxel(facts.voxel()));
     let sampling = Sampling { spacing, memory: params.memory };
     let mut meshed = contour::from_field(&field, sampling, &params.contour, &Part::new(observer, 0.0, 0.88))?;
+    let lids = complete(&mut meshed, &facts, (&scan.points, closed), params, &Part::new(observer, 0.88, 0.1))?;
+    let step = scan.points.len().div_ceil(MEASURED_POINTS).max(1);
+    let mut reached = reach(&scan.points, step, &meshed.extracted.mesh, observer)?;
+    let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags, &reached);
+    if specks > 0 {
+        reached = reach(&scan.points, step, &meshed.extracted.mesh, observer)?;
+    }
+    observer.progress(1.0);
+    let to_points = distances(&reached);
+    Ok(ScanMeshed { samples, facts, meshed, bricks: 0, specks, closed, lids, to_points })
+}
+
+/// Root mean square and mean of what [`reach`] found.
+pub(super) fn distances(reached: &[(f64, u32)]) -> (f64, f64) {
+    let n = reached.len().max(1) as f64;
+    let squares = reached.iter().map(|r| r.0 * r.0).sum::<f64>();
+    ((squares / n).sqrt(), reached.iter().map(|r| r.0).sum::<f64>() / n)
+}
+
+/// Takes the mesh of a scan from its extraction to its sharp lines. Returns how many small holes got a lid.
+/// * `scan` - the points, and whether their holes are closed
+pub(super) fn complete(
+    meshed: &mut Meshed,
+    facts: &ScanFacts,
+    scan: (&[DVec3], bool),
+    params: &ScanParams,
+    observer: &dyn Observer,
+) -> Result<usize, ScanError> {
+    let (points, closed) = scan;
+    let cell = meshed.lattice.step.x;
+    let contour::Extracted { mesh, tags, .. } = &mut meshed.extracted;
     let mut lids = 0;
     if !closed {
-        let points: Vec<DVec3> = scan.points.iter().copied().filter(|p| p.is_finite()).collect();
-        let contour::Extracted { mesh, tags, .. } = &mut meshed.extracted;
-        lids = finish(mesh, tags, &points, meshed.lattice.step.x, params.close.is_none(), observer)?;
+        let points: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
+        lids = finish(mesh, tags, &points, cell, params.close.is_none(), observer)?;
     }
-    let contour::Extracted { mesh, tags, .. } = &mut meshed.extracted;
-    let cell = meshed.lattice.step.x;
-    observer.progress(0.9);
-    let scale = ScanScale { noise: samples.noise, spacing: samples.spacing, cell };
+    observer.progress(0.2);
+    let scale = ScanScale { noise: facts.noise, spacing: facts.spacing, cell };
     if !params.contour.plain {
         sharp::find_lines(mesh, tags, &scale, params.contour.sharp.acos(), observer)?;
     }
     sharp::tidy_lines(mesh, tags, &scale, observer)?;
     sharp::fair_lines(mesh, tags, &scale, observer)?;
     sharp::tidy_lines(mesh, tags, &scale, observer)?;
-    observer.progress(0.95);
-    sharp::split_bent(mesh, tags, BENT_TOLERANCE * fit_tolerance(&samples) * samples.diagonal, observer)?;
+    observer.progress(0.8);
+    sharp::split_bent(mesh, tags, BENT_TOLERANCE * facts.fit_tolerance() * facts.diagonal, observer)?;
     tags.mark(mesh);
-    let mut reached = reach(scan, &meshed.extracted.mesh, observer)?;
-    let specks = drop_specks(&mut meshed.extracted.mesh, &mut meshed.extracted.tags, &reached);
-    if specks > 0 {
-        reached = reach(scan, &meshed.extracted.mesh, observer)?;
-    }
-    let n = reached.len().max(1) as f64;
-    let squares = reached.iter().map(|r| r.0 * r.0).sum::<f64>();
-    let to_points = ((squares / n).sqrt(), reached.iter().map(|r| r.0).sum::<f64>() / n);
     observer.progress(1.0);
-    Ok(ScanMeshed { samples, meshed, specks, closed, lids, to_points })
+    Ok(lids)
 }
 
 /// A surface fitted to a scan follows its mesh along the normal to this share of the noise, within these shares of the diagonal:
@@ -185,17 +272,12 @@ const FIT_SMOOTHING: f64 = 0.05;
 const GRID_POINTS: f64 = 3e5;
 const GRID_DENSITY: f64 = 6.0;
 
-/// How closely a surface is fitted to a scan, as a share of the diagonal.
-fn fit_tolerance(samples: &Samples) -> f64 {
-    (FIT_NOISE * samples.noise / samples.diagonal).max(FIT_CLOSEST)
-}
-
 /// The parameters that suit the mesh of a scan: how fine its grids are, and how closely surfaces are fitted to it.
 pub fn params_for(made: &ScanMeshed) -> PipelineParams {
     let usual = PipelineParams::default();
-    let noise = made.samples.noise / made.samples.diagonal;
+    let noise = made.facts.noise / made.facts.diagonal;
     let resolution = match usual.fit.resolution {
-        Resolution::Tolerance(most) => Resolution::Tolerance(fit_tolerance(&made.samples).min(FIT_FARTHEST).min(most)),
+        Resolution::Tolerance(most) => Resolution::Tolerance(made.facts.fit_tolerance().min(FIT_FARTHEST).min(most)),
         other => other,
     };
     let smoothing = (FIT_SMOOTHING * (noise / 1e-3).powi(2)).clamp(usual.fit.smoothing, 1.0);
@@ -209,7 +291,7 @@ pub fn params_for(made: &ScanMeshed) -> PipelineParams {
 }
 
 /// Leaves out the components whose area is next to nothing, or which hardly any point stands for; returns how many.
-fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags, reached: &[(f64, u32)]) -> usize {
+pub(super) fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags, reached: &[(f64, u32)]) -> usize {
     let mut sets = Sets::new(mesh.points.len());
     for t in &mesh.triangles {
         sets.join(t[0], t[1]);
@@ -236,14 +318,18 @@ fn drop_specks(mesh: &mut TriMesh, tags: &mut FeatureTags, reached: &[(f64, u32)
     specks
 }
 
-/// Distance of raw points to a mesh, and the face that is closest.
-fn reach(scan: &Cloud, mesh: &TriMesh, observer: &dyn Observer) -> Result<Vec<(f64, u32)>, Cancelled> {
+/// Distance of every `step`th raw point to a mesh, and the face that is closest.
+pub(super) fn reach(
+    points: &[DVec3],
+    step: usize,
+    mesh: &TriMesh,
+    observer: &dyn Observer,
+) -> Result<Vec<(f64, u32)>, Cancelled> {
     if mesh.triangles.is_empty() {
         return Ok(Vec::new());
     }
     let bvh = Bvh::watched(mesh, observer)?;
-    let step = scan.points.len().div_ceil(MEASURED_POINTS).max(1);
-    let finite: Vec<_> = scan.points.iter().step_by(step).filter(|p| p.is_finite()).collect();
+    let finite: Vec<_> = points.iter().step_by(step).filter(|p| p.is_finite()).collect();
     let one = |p: &&DVec3| {
         observer.check()?;
         let hit = bvh.closest(**p);
@@ -254,13 +340,16 @@ fn reach(scan: &Cloud, mesh: &TriMesh, observer: &dyn Observer) -> Result<Vec<(f
 
 /// The figures and warnings of a scan that was meshed.
 pub fn scan_figures(made: &ScanMeshed, quality: &mut Quality, warnings: &mut Vec<Warning>) {
-    sample_figures(&made.samples, quality, warnings);
+    sample_figures(&made.facts, quality, warnings);
+    if made.bricks > 0 {
+        quality.insert("scan.bricks".into(), Figure::Count(made.bricks as u64));
+    }
     quality.insert("scan.specks".into(), Figure::Count(made.specks as u64));
     quality.insert("scan.closed".into(), Figure::Flag(made.closed));
     quality.insert("scan.lids".into(), Figure::Count(made.lids as u64));
     for (key, x) in [("rms", made.to_points.0), ("mean", made.to_points.1)] {
         quality.insert(format!("scan.to_mesh_{key}"), Figure::Number(x));
-        quality.insert(format!("scan.to_mesh_{key}_rel"), Figure::Number(x / made.samples.diagonal));
+        quality.insert(format!("scan.to_mesh_{key}_rel"), Figure::Number(x / made.facts.diagonal));
     }
 }
 
@@ -281,25 +370,23 @@ pub(super) fn run_figures(made: &ScanMeshed, points: &Cleaned, diagonal: f64, fi
 }
 
 /// The figures of samples alone.
-pub fn sample_figures(samples: &Samples, quality: &mut Quality, warnings: &mut Vec<Warning>) {
-    let count = samples.samples.len().max(1) as f64;
-    let confidence = samples.samples.iter().map(|s| s.confidence).sum::<f64>() / count;
+pub fn sample_figures(facts: &ScanFacts, quality: &mut Quality, warnings: &mut Vec<Warning>) {
     let numbers = [
-        ("scan.noise", samples.noise),
-        ("scan.noise_rel", samples.noise / samples.diagonal),
-        ("scan.spacing", samples.spacing),
-        ("scan.spacing_rel", samples.spacing / samples.diagonal),
-        ("scan.confidence", confidence),
-        ("scan.normal_noise_deg", samples.normal_noise_deg),
+        ("scan.noise", facts.noise),
+        ("scan.noise_rel", facts.noise / facts.diagonal),
+        ("scan.spacing", facts.spacing),
+        ("scan.spacing_rel", facts.spacing / facts.diagonal),
+        ("scan.confidence", facts.confidence),
+        ("scan.normal_noise_deg", facts.normal_noise_deg),
     ];
     quality.extend(numbers.map(|(key, x)| (key.to_owned(), Figure::Number(x))));
-    quality.insert("scan.samples".into(), Figure::Count(samples.samples.len() as u64));
-    quality.insert("scan.segments".into(), Figure::Count(samples.closed.len() as u64));
-    if confidence < UNSURE_ORIENTATION {
+    quality.insert("scan.samples".into(), Figure::Count(facts.samples as u64));
+    quality.insert("scan.segments".into(), Figure::Count(facts.segments as u64));
+    if facts.confidence < UNSURE_ORIENTATION {
         let text = format!(
             "The orientation of the points is unsure: {:.1} % of the evidence agrees. Normals or scanner positions in the \
              file would decide it.",
-            100.0 * confidence
+            100.0 * facts.confidence
         );
         warnings.push(Warning::new("unsure_orientation", text, ""));
     }

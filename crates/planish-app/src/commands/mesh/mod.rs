@@ -72,13 +72,14 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let spacing = params.cells.unwrap_or(Spacing::Resolution(RESOLUTION));
     let sampling = Sampling { spacing, memory: params.memory };
     let contour = &params.contour;
+    let plain = |made: Meshed| Made::Plain(Box::new(made));
     let (made, record) = session.bars.step("mesh", |o| {
         Ok::<Made, Trouble>(match &source {
-            Source::Scan(scan, _) => Made::OfScan(pipeline::mesh_scan(scan, &params, o)?),
-            Source::Mesh(placed) => Made::Plain(contour::from_mesh(&placed.mesh, sampling, contour, o)?),
-            Source::Script(Script::Part(part)) => Made::Plain(contour::from_part(part, sampling, contour, o)?),
-            Source::Script(Script::Job(milling)) => Made::Plain(contour::from_field(milling, sampling, contour, o)?),
-            Source::Grid(grid) => Made::Plain(contour::from_grid(grid, &grid_params, params.memory, contour, o)?),
+            Source::Scan(scan, _) => Made::OfScan(Box::new(pipeline::mesh_scan(scan, &params, o)?)),
+            Source::Mesh(placed) => plain(contour::from_mesh(&placed.mesh, sampling, contour, o)?),
+            Source::Script(Script::Part(part)) => plain(contour::from_part(part, sampling, contour, o)?),
+            Source::Script(Script::Job(milling)) => plain(contour::from_field(milling, sampling, contour, o)?),
+            Source::Grid(grid) => plain(contour::from_grid(grid, &grid_params, params.memory, contour, o)?),
         })
     });
     if progress::interrupted() {
@@ -89,8 +90,8 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
         Trouble::Scan(e) => Failure::input(&args.input, super::with_hint(&e.to_string())),
     })?;
     let (made, scanned) = match &all {
-        Made::OfScan(scanned) => (&scanned.meshed, Some(scanned)),
-        Made::Plain(made) => (made, None),
+        Made::OfScan(scanned) => (&scanned.meshed, Some(&**scanned)),
+        Made::Plain(made) => (&**made, None),
     };
     let (mesh, tags) = (&made.extracted.mesh, &made.extracted.tags);
     let shift = source.shift();
@@ -193,8 +194,8 @@ fn volume(session: &Session, args: &Mesh, from: Sampled, params: &ScanParams) ->
 
 /// What a source became.
 enum Made {
-    OfScan(ScanMeshed),
-    Plain(Meshed),
+    OfScan(Box<ScanMeshed>),
+    Plain(Box<Meshed>),
 }
 
 /// What can go wrong with one of the sources.

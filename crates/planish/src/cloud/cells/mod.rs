@@ -99,6 +99,13 @@ impl Cell {
         best
     }
 
+    /// The same surface with its other side outside.
+    pub(crate) fn flipped(mut self) -> Cell {
+        self.sheets = self.sheets.map(Quadric::flipped);
+        self.concave = !self.concave;
+        self
+    }
+
     /// Weight in the blend at `p`.
     pub(crate) fn weight(&self, p: DVec3) -> f64 {
         Reach::of(self).weight(p)

@@ -59,16 +59,8 @@ const HOLE_WINDING_STEP: f64 = 0.1;
 pub(crate) fn orient(fits: &[Fit], votes: &[Vote], hints: &Hints) -> Oriented {
     let mut sign = contracted(fits.len(), votes);
     improve(&mut sign, votes);
-    let mut settled = Settled::default();
-    let mut is_closed = vec![false; fits.len()];
-    for own in by_area(&segments(&sign, fits, votes, hints.areas), hints.areas).1 {
-        let closed = decide(&own, fits, &mut sign, hints, &settled);
-        own.iter().for_each(|&i| is_closed[i as usize] = closed);
-        settled.add(own.iter().map(|&i| {
-            let i = i as usize;
-            (fits[i].center, sign[i] * hints.areas[i] * fits[i].normal)
-        }));
-    }
+    let label = segments(&sign, fits, votes, hints.areas);
+    let is_closed = outward(fits, &mut sign, &label, hints).0;
     wind(&mut sign, fits, votes, hints, |i| is_closed[i]);
     let confidence = confidence(&sign, votes);
     let (segment, members) = by_area(&segments(&sign, fits, votes, hints.areas), hints.areas);
@@ -76,11 +68,30 @@ pub(crate) fn orient(fits: &[Fit], votes: &[Vote], hints: &Hints) -> Oriented {
     Oriented { sign, segment, confidence, closed }
 }
 
+/// Decides which side of every body is outside, the largest first. Returns for each sample whether its body is closed, and that
+/// of each body by falling area.
+/// * `label` - the body of each sample, by the least of its samples
+pub(crate) fn outward(fits: &[Fit], sign: &mut [f64], label: &[u32], hints: &Hints) -> (Vec<bool>, Vec<bool>) {
+    let mut settled = Settled::default();
+    let mut is_closed = vec![false; fits.len()];
+    let mut bodies = Vec::new();
+    for own in by_area(label, hints.areas).1 {
+        let closed = decide(&own, fits, sign, hints, &settled);
+        own.iter().for_each(|&i| is_closed[i as usize] = closed);
+        bodies.push(closed);
+        settled.add(own.iter().map(|&i| {
+            let i = i as usize;
+            (fits[i].center, sign[i] * hints.areas[i] * fits[i].normal)
+        }));
+    }
+    (is_closed, bodies)
+}
+
 /// Signs by contraction: the two groups whose votes for each other are clearest in sum become one, again and again. What
 /// contradicts itself cancels out on the way, so a few wrong votes at a place do not stand against many at others.
 /// Source: Keuper et al., *Efficient Decomposition of Image and Mesh Graphs by Lifted Multicuts*, 2015 (greedy additive edge
 /// contraction), here with signs.
-fn contracted(count: usize, votes: &[Vote]) -> Vec<f64> {
+pub(crate) fn contracted(count: usize, votes: &[Vote]) -> Vec<f64> {
     // Votes between groups, with the signs that their first samples have.
     let mut groups: Vec<BTreeMap<u32, f64>> = vec![BTreeMap::new(); count];
     let mut heap = BinaryHeap::with_capacity(votes.len());

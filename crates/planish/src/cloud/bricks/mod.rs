@@ -1,0 +1,224 @@
+//! Samples of scans that are too large to be worked at once, brick by brick.
+//!
+//! 1. [`Partition`]: boxes of space with at most so many points
+//! 2. [`BrickSamples::clean`]: the samples of a brick, from its points and those of a halo that its fits reach into; what stands in
+//!    the halo is the neighbour's
+//! 3. [`Sides`]: bricks see the same surface in their halos, so these tell how the pieces of one are turned against those of the
+//!    next; then bodies have their outside as in one piece
+//!
+//! See `docs/methods/bricks.md`.
+
+mod partition;
+mod sides;
+
+pub use partition::{Brick, Partition};
+pub use sides::Sides;
+
+use super::{Cell, CleanParams, Cloud, CloudError, FEWEST_POINTS, Quadric, Samples, clean};
+use crate::geom::{Aabb, KdTree};
+use crate::observe::{Observer, Part};
+use glam::DVec3;
+
+/// A halo is this many of the widest supports wide: fits hear points within two of theirs, a cell asks samples within two of its
+/// own.
+const HALO_SUPPORTS: f64 = 4.0;
+/// All but so many of a hundred supports are no wider than the widest one that counts.
+const WIDEST_PERCENT: usize = 99;
+/// Places that are looked at for the width of the halo, and points in each.
+const PILOTS: usize = 3;
+const PILOT_POINTS: usize = 30_000;
+
+/// Width of the halo around bricks, world units: from the supports of a few places of the scan.
+/// # Errors
+/// [`CloudError`] if there are no samples in any of them, or if cancelled.
+pub fn halo(
+    cloud: &Cloud,
+    partition: &Partition,
+    params: &CleanParams,
+    observer: &dyn Observer,
+) -> Result<f64, CloudError> {
+    let mut widest: f64 = 0.0;
+    let mut failed = None;
+    let count = partition.bricks.len();
+    for k in 0..PILOTS.min(count) {
+        let brick = &partition.bricks[k * (count - 1) / (PILOTS - 1)];
+        let own: Vec<DVec3> = partition.order[brick.range.clone()].iter().map(|&i| cloud.points[i as usize]).collect();
+        let parts = Partition::new(&own, PILOT_POINTS);
+        let pilot = &parts.bricks[parts.bricks.len() / 2];
+        let points = parts.order[pilot.range.clone()].iter().map(|&i| own[i as usize]).collect();
+        match clean(&Cloud::new(points), params, &Part::new(observer, k as f64 / PILOTS as f64, 1.0 / PILOTS as f64)) {
+            Ok(samples) => {
+                let mut supports: Vec<f64> = samples.samples.iter().map(|s| s.support).collect();
+                supports.sort_unstable_by(f64::total_cmp);
+                widest = widest.max(supports[(supports.len() - 1) * WIDEST_PERCENT / 100]);
+            }
+            Err(CloudError::Cancelled(c)) => return Err(c.into()),
+            Err(e) => failed = Some(e),
+        }
+    }
+    match failed {
+        Some(e) if widest == 0.0 => Err(e),
+        _ => Ok(HALO_SUPPORTS * widest),
+    }
+}
+
+/// A sample as its neighbours in other bricks see it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stand {
+    center: DVec3,
+    normal: DVec3,
+    area: f64,
+    radius: f64,
+    /// Part of a plate or a gap that was found as such.
+    plate: bool,
+    /// Body of the brick that it belongs to.
+    piece: u32,
+}
+
+/// A cell without the room for sheets that it has not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Packed {
+    center: DVec3,
+    support: f64,
+    trust: f64,
+    first_sheet: u32,
+    count: u8,
+    concave: u8,
+    piece: u32,
+}
+
+/// The samples of a brick.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BrickSamples {
+    cells: Vec<Packed>,
+    sheets: Vec<Quadric>,
+    /// Samples in the brick, and those in its halo.
+    own: Vec<Stand>,
+    beyond: Vec<Stand>,
+    /// Bodies; in a brick mostly parts of one.
+    pieces: u32,
+    /// Whether the file told of the outside.
+    told: bool,
+    /// Standard deviation and distance of the points, world units: the middle of all places.
+    pub noise: f64,
+    /// See `noise`.
+    pub spacing: f64,
+    /// Typical error of the normals, degrees.
+    pub normal_noise_deg: f64,
+    /// As of [`Samples`].
+    pub gap: f64,
+    /// Sum of the confidence of its samples.
+    pub confidence: f64,
+}
+
+impl BrickSamples {
+    /// The samples of one brick; none if its points are too few or no surface.
+    /// * `cloud` - its points and those of its halo
+    /// # Errors
+    /// [`CloudError::Cancelled`].
+    pub fn clean(
+        cloud: &Cloud,
+        brick: &Brick,
+        params: &CleanParams,
+        observer: &dyn Observer,
+    ) -> Result<BrickSamples, CloudError> {
+        if cloud.points.len() < FEWEST_POINTS {
+            return Ok(BrickSamples::default());
+        }
+        match clean(cloud, params, observer) {
+            Ok(samples) => Ok(BrickSamples::of(&samples, brick, is_told(cloud, params))),
+            Err(CloudError::Cancelled(c)) => Err(c.into()),
+            Err(_) => Ok(BrickSamples::default()),
+        }
+    }
+
+    fn of(samples: &Samples, brick: &Brick, told: bool) -> BrickSamples {
+        let mut made = BrickSamples {
+            pieces: samples.closed.len() as u32,
+            told,
+            noise: samples.noise,
+            spacing: samples.spacing,
+            normal_noise_deg: samples.normal_noise_deg,
+            gap: samples.gap,
+            ..BrickSamples::default()
+        };
+        for s in &samples.samples {
+            let stand = Stand {
+                center: s.center,
+                normal: s.normal,
+                area: s.area,
+                radius: s.radius,
+                plate: s.plate,
+                piece: s.segment,
+            };
+            if brick.holds(s.center) {
+                made.own.push(stand);
+                made.confidence += s.confidence;
+            } else {
+                made.beyond.push(stand);
+            }
+        }
+        let tree = KdTree::new(&samples.samples.iter().map(|s| s.center).collect::<Vec<_>>());
+        for cell in samples.cells.iter().filter(|c| brick.holds(c.center)) {
+            let piece = tree.closest(cell.center).map_or(0, |i| samples.samples[i as usize].segment);
+            let Cell { center, support, trust, sheets, count, concave } = *cell;
+            let first_sheet = made.sheets.len() as u32;
+            made.cells.push(Packed { center, support, trust, first_sheet, count, concave, piece });
+            made.sheets.extend(&sheets[..count as usize]);
+        }
+        made
+    }
+
+    /// Number of samples in the brick.
+    pub fn len(&self) -> usize {
+        self.own.len()
+    }
+
+    /// True if there are none.
+    pub fn is_empty(&self) -> bool {
+        self.own.is_empty()
+    }
+
+    /// Box of the centres of its samples.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::of(self.own.iter().map(|s| &s.center))
+    }
+
+    /// Widest support of its cells, world units.
+    pub fn widest(&self) -> f64 {
+        self.cells.iter().map(|c| c.support).fold(0.0, f64::max)
+    }
+
+    /// Centre, and outward normal times area, of its samples.
+    /// * `signs` - as of [`BrickSamples::reaching`]
+    pub fn dipoles(&self, signs: &[f64]) -> impl Iterator<Item = (DVec3, DVec3)> {
+        self.own.iter().map(|s| (s.center, signs[s.piece as usize] * s.area * s.normal))
+    }
+
+    /// Adds the cells that reach into a box, each with the outside that its piece has.
+    /// * `signs` - for each piece 1, or -1 if it is inside out
+    pub fn reaching(&self, aabb: &Aabb, signs: &[f64], into: &mut Vec<Cell>) {
+        for c in &self.cells {
+            let sheets = &self.sheets[c.first_sheet as usize..][..c.count as usize];
+            let mut cell = Cell {
+                center: c.center,
+                support: c.support,
+                trust: c.trust,
+                sheets: [sheets[0]; 4],
+                count: c.count,
+                concave: c.concave,
+            };
+            if !cell.reaches(aabb) {
+                continue;
+            }
+            cell.sheets[..sheets.len()].copy_from_slice(sheets);
+            into.push(if signs[c.piece as usize] < 0.0 { cell.flipped() } else { cell });
+        }
+    }
+}
+
+/// Does the file tell of the outside?
+fn is_told(cloud: &Cloud, params: &CleanParams) -> bool {
+    let normals = !params.ignore_normals && super::given_normals(cloud).is_some();
+    normals || super::toward_scanner(cloud).is_some()
+}

@@ -1,0 +1,134 @@
+//! Points parted into bricks of at most so many, by planes across the longest side of what is to be parted (Bentley 1975,
+//! *Multidimensional Binary Search Trees*).
+//!
+//! The bricks follow from the points alone, so that what is made of them does not depend on the machine.
+
+use crate::geom::Aabb;
+use glam::DVec3;
+
+/// A box of space with the points in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Brick {
+    /// The box: points on its lower faces are in it, those on its upper ones are not. Infinite where no brick is beyond.
+    pub aabb: Aabb,
+    /// Box of its points, world units.
+    pub bounds: Aabb,
+    /// Its points, as a range of [`Partition::order`].
+    pub range: std::ops::Range<usize>,
+}
+
+impl Brick {
+    /// Is a point in the box?
+    pub fn holds(&self, p: DVec3) -> bool {
+        p.cmpge(self.aabb.min).all() && p.cmplt(self.aabb.max).all()
+    }
+
+    /// The box and what is within `halo` of it, along the axes.
+    pub fn reach(&self, halo: f64) -> Aabb {
+        Aabb { min: self.aabb.min - halo, max: self.aabb.max + halo }
+    }
+}
+
+/// Bricks that fill all space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Partition {
+    /// The bricks.
+    pub bricks: Vec<Brick>,
+    /// All finite points, as indices, brick after brick.
+    pub order: Vec<u32>,
+}
+
+impl Partition {
+    /// Parts the finite ones of `points` into bricks of at most `most`, but for points that lie in one place.
+    pub fn new(points: &[DVec3], most: usize) -> Partition {
+        let mut order: Vec<u32> = (0..points.len() as u32).filter(|&i| points[i as usize].is_finite()).collect();
+        let all = Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY };
+        let mut bricks = Vec::new();
+        divide(points, &mut order, 0, all, most.max(1), &mut bricks);
+        Partition { bricks, order }
+    }
+
+    /// The points in a brick or within `halo` of it, as ascending indices.
+    pub fn around(&self, points: &[DVec3], brick: usize, halo: f64) -> Vec<u32> {
+        let reach = self.bricks[brick].reach(halo);
+        let inside = |p: DVec3| p.cmpge(reach.min).all() && p.cmplt(reach.max).all();
+        let mut found = Vec::new();
+        for (k, other) in self.bricks.iter().enumerate() {
+            let own = &self.order[other.range.clone()];
+            if k == brick {
+                found.extend(own);
+            } else if other.bounds.max.cmpge(reach.min).all() && other.bounds.min.cmplt(reach.max).all() {
+                found.extend(own.iter().filter(|&&i| inside(points[i as usize])));
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+}
+
+fn divide(points: &[DVec3], order: &mut [u32], from: usize, aabb: Aabb, most: usize, bricks: &mut Vec<Brick>) {
+    let bounds = Aabb::of(order.iter().map(|&i| &points[i as usize]));
+    let size = bounds.size();
+    let axis = (0..3).fold(0, |best, a| if size[a] > size[best] { a } else { best });
+    if order.len() <= most || !(size[axis] > 0.0) {
+        bricks.push(Brick { aabb, bounds, range: from..from + order.len() });
+        return;
+    }
+    let at = |i: u32| points[i as usize][axis];
+    let middle = order.len() / 2;
+    order.select_nth_unstable_by(middle, |&a, &b| at(a).total_cmp(&at(b)).then(a.cmp(&b)));
+    // What lies on the cut is beyond it; where all below does, the cut is one place on.
+    let mut cut = at(order[middle]);
+    if bounds.min[axis] >= cut {
+        cut = order.iter().map(|&i| at(i)).filter(|&x| x > cut).fold(f64::INFINITY, f64::min);
+    }
+    order.sort_unstable_by_key(|&i| (at(i) >= cut, i));
+    let split = order.partition_point(|&i| at(i) < cut);
+    let (low, high) = order.split_at_mut(split);
+    let (mut below, mut above) = (aabb, aabb);
+    (below.max[axis], above.min[axis]) = (cut, cut);
+    divide(points, low, from, below, most, bricks);
+    divide(points, high, from + split, above, most, bricks);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::random;
+
+    #[test]
+    fn every_point_is_in_one_brick_and_a_halo_holds_exactly_what_is_near() {
+        let n = 10_000u64;
+        // One third in one place, one third on a line, a NaN.
+        let place = |i: u64| {
+            let r = |k: u64| random::unit(3, 3 * i + k);
+            if i.is_multiple_of(3) {
+                DVec3::splat(0.5)
+            } else {
+                DVec3::new(r(0), if i % 3 == 1 { 0.5 } else { r(1) }, r(2))
+            }
+        };
+        let mut points: Vec<DVec3> = (0..n).map(place).collect();
+        points[7] = DVec3::NAN;
+        let parts = Partition::new(&points, 500);
+        let mut all = parts.order.clone();
+        all.sort_unstable();
+        assert_eq!(all, (0..n as u32).filter(|&i| i != 7).collect::<Vec<_>>());
+        for (k, brick) in parts.bricks.iter().enumerate() {
+            let own = &parts.order[brick.range.clone()];
+            assert!(own.len() <= 500 || brick.bounds.size() == DVec3::ZERO, "{}", own.len());
+            for &i in own {
+                let p = points[i as usize];
+                assert_eq!(parts.bricks.iter().filter(|b| b.holds(p)).count(), 1);
+                assert!(brick.holds(p));
+            }
+            let near = parts.around(&points, k, 0.1);
+            let reach = brick.reach(0.1);
+            let expected = (0..n as u32).filter(|&i| {
+                let p = points[i as usize];
+                p.cmpge(reach.min).all() && p.cmplt(reach.max).all()
+            });
+            assert_eq!(near, expected.collect::<Vec<_>>());
+        }
+    }
+}
