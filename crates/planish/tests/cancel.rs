@@ -180,6 +180,7 @@ fn cleaning_and_meshing_of_a_scan_end_within_200_ms() {
     stops("clean", |o| cloud::clean(&scan, &Default::default(), o));
     let params = ScanParams { close: Some(false), ..ScanParams::default() };
     stops("scan to mesh", |o| pipeline::mesh_scan(&scan, &params, o));
+    stops("scan to mesh in bricks", |o| pipeline::mesh_in_bricks(&scan, scan.points.len() / 4, &params, o));
     let samples = cloud::clean(&scan, &Default::default(), &Silent).expect("samples");
     stops("points", |o| cloud::project(&scan, &samples, 5.0, &Default::default(), o));
 }
