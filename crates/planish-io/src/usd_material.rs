@@ -51,11 +51,15 @@ fn one(out: &mut String, path: &str, material: &UsdMaterial) {
     let _ = writeln!(out, "            token outputs:surface.connect = <{path}/preview.outputs:surface>");
     match texture {
         UsdTexture::Height => {
-            let _ = writeln!(out, "            token outputs:displacement.connect = <{path}/preview.outputs:displacement>");
+            let _ =
+                writeln!(out, "            token outputs:displacement.connect = <{path}/preview.outputs:displacement>");
         }
         UsdTexture::Normal => {}
         UsdTexture::Vector => {
-            let _ = writeln!(out, "            token outputs:mtlx:displacement.connect = <{path}/displacement.outputs:out>");
+            let _ = writeln!(
+                out,
+                "            token outputs:mtlx:displacement.connect = <{path}/displacement.outputs:out>"
+            );
         }
     }
     let preview = match texture {
@@ -111,7 +115,10 @@ fn vector(out: &mut String, path: &str, material: &UsdMaterial) {
 }
 
 fn shader(out: &mut String, name: &str, id: &str, lines: &[&str]) {
-    let _ = writeln!(out, "\n            def Shader \"{name}\"\n            {{\n                uniform token info:id = \"{id}\"");
+    let _ = writeln!(
+        out,
+        "\n            def Shader \"{name}\"\n            {{\n                uniform token info:id = \"{id}\""
+    );
     for line in lines {
         let _ = writeln!(out, "                {line}");
     }

@@ -243,7 +243,9 @@ fn a_mask_takes_exactly_its_white_half_and_grey_a_half_of_all() {
         }
     }
     let grey = r#""image":"grey.png","at":[1,1,0],"up":[0,1,0],"width":3"#;
-    assert!(after(&format!(r#"{{"edit":"scale","factor":3,"region":{{{grey}}}}}"#)).iter().all(|(_, z)| *z == 2.0 * was));
+    assert!(
+        after(&format!(r#"{{"edit":"scale","factor":3,"region":{{{grey}}}}}"#)).iter().all(|(_, z)| *z == 2.0 * was)
+    );
     // Keys are multiplied: half of what is inside the ball, on the named patch alone.
     let both = after(&format!(r#"{{"edit":"erase","region":{{{grey},"radius":0.5,"patches":[0]}}}}"#));
     for (p, z) in both {
@@ -272,9 +274,8 @@ fn detail_goes_along_with_pairs_to_a_turned_and_a_scaled_copy_and_is_exact_there
         let ground = Ground::new(&there.network, &b, shapes).unwrap();
         let source = Displaced { network: &here.network, surfaces: &a, reliefs: &from };
         let place = |p: u32, u: f64| layers::Place::Patch { patch: p, u, v: 0.4 };
-        let pairs: Vec<layers::PlacePair> = (0..6)
-            .flat_map(|p| [0.3, 0.7].map(|u| layers::PlacePair { from: place(p, u), to: place(p, u) }))
-            .collect();
+        let pairs: Vec<layers::PlacePair> =
+            (0..6).flat_map(|p| [0.3, 0.7].map(|u| layers::PlacePair { from: place(p, u), to: place(p, u) })).collect();
         let warp = layers::warp(&ground, &source, &pairs, &Silent).unwrap();
         assert!(warp.affine && warp.bent < 1e-9, "{}", warp.bent);
         let (found, missed) = layers::transfer(&ground, &source, Some(&warp), 0.1, &Silent).unwrap();
@@ -341,7 +342,11 @@ fn synthesised_bricks_keep_their_heights_join_at_seams_and_come_again_with_the_s
     // As much mortar as in the source, about, and no height beyond it.
     let mortar = |p: usize| z(p).filter(|z| *z < 0.008).count() as f64 / (65.0 * 65.0);
     for p in 1..9 {
-        assert!(z(p).all(|z| (-0.02..0.045).contains(&z)), "patch {p}: {:?}", z(p).fold([0.0f64; 2], |[a, b], z| [a.min(z), b.max(z)]));
+        assert!(
+            z(p).all(|z| (-0.02..0.045).contains(&z)),
+            "patch {p}: {:?}",
+            z(p).fold([0.0f64; 2], |[a, b], z| [a.min(z), b.max(z)])
+        );
         assert!((mortar(p) - mortar(0)).abs() < 0.1, "patch {p}: {} {}", mortar(p), mortar(0));
     }
     // At a seam the first column inside differs from the border about as much as columns inside differ from each other.

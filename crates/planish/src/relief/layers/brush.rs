@@ -90,7 +90,8 @@ impl Stroke {
             return Err(refused("a stroke needs a radius above 0 and a height"));
         }
         let path: Option<Vec<(DVec3, DVec3)>> = self.path.iter().map(|place| ground.locate(place)).collect();
-        let path = path.filter(|p| !p.is_empty()).ok_or_else(|| refused("a stroke needs places on patches that are there"))?;
+        let path =
+            path.filter(|p| !p.is_empty()).ok_or_else(|| refused("a stroke needs places on patches that are there"))?;
         let points: Vec<DVec3> = path.iter().map(|(p, _)| *p).collect();
         let height = |p: usize, k: usize| {
             let (at, frame) = &ground.nodes[p][k];

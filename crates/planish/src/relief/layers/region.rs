@@ -75,17 +75,14 @@ impl Region {
     /// * `pictures` - gives the image of a mask
     /// # Errors
     /// [`ReliefError::Edit`] for what cannot be meant.
-    pub(super) fn shares(
-        &self,
-        ground: &Ground,
-        pictures: &Pictures,
-    ) -> Result<Vec<Option<Vec<f64>>>, ReliefError> {
+    pub(super) fn shares(&self, ground: &Ground, pictures: &Pictures) -> Result<Vec<Option<Vec<f64>>>, ReliefError> {
         let Found { ball, mask } = self.found(ground, pictures)?;
         let share = |p: usize| {
             let named = self.patches.is_empty() || self.patches.contains(&(p as u32));
             let inside = |node: &Texel| {
                 let near = ball.map_or(1.0, |middle| fade(self.radius - node.0.distance(middle), self.feather));
-                let shown = mask.as_ref().map_or(1.0, |mask| mask.at(node).into_iter().product::<f64>().clamp(0.0, 1.0));
+                let shown =
+                    mask.as_ref().map_or(1.0, |mask| mask.at(node).into_iter().product::<f64>().clamp(0.0, 1.0));
                 let within = if named { near * shown } else { 0.0 };
                 if self.outside { 1.0 - within } else { within }
             };
@@ -98,12 +95,7 @@ impl Region {
     /// What a layer is inside the region: each displacement times its share.
     /// # Errors
     /// As [`Region::shares`].
-    pub(super) fn weaken(
-        &self,
-        ground: &Ground,
-        pictures: &Pictures,
-        maps: &mut [Relief],
-    ) -> Result<(), ReliefError> {
+    pub(super) fn weaken(&self, ground: &Ground, pictures: &Pictures, maps: &mut [Relief]) -> Result<(), ReliefError> {
         if *self == Region::default() {
             return Ok(());
         }

@@ -173,7 +173,8 @@ impl Source {
     /// The displacement at a place, as it is meant on a surface of this normal; `None` where there is none.
     fn detail(&self, place: FacePoint, normal: DVec3) -> Option<DVec3> {
         let corners = self.mesh.triangles[place.face as usize].map(|v| v as usize);
-        let mean = |values: &[DVec3]| corners.iter().zip(place.bary).map(|(&v, share)| values[v] * share).sum::<DVec3>();
+        let mean =
+            |values: &[DVec3]| corners.iter().zip(place.bary).map(|(&v, share)| values[v] * share).sum::<DVec3>();
         let d = mean(&self.detail);
         if self.normals.is_empty() {
             return Some(d);

@@ -80,7 +80,10 @@ impl Warp {
     pub fn of_pairs(pairs: &[[DVec3; 2]]) -> Result<Warp, ReliefError> {
         let refused = |what: String| Err(ReliefError::Edit { what });
         if pairs.len() < 3 || pairs.len() > MOST_PAIRS {
-            return refused(format!("{} pairs are given; 3 to {MOST_PAIRS} are needed, six or more are better", pairs.len()));
+            return refused(format!(
+                "{} pairs are given; 3 to {MOST_PAIRS} are needed, six or more are better",
+                pairs.len()
+            ));
         }
         if let Some(k) = pairs.iter().position(|p| !p[0].is_finite() || !p[1].is_finite()) {
             return refused(format!("pair {} has a number that is not finite", k + 1));
@@ -90,7 +93,11 @@ impl Warp {
             for (k, a) in pairs.iter().enumerate() {
                 if let Some(l) = pairs[..k].iter().position(|b| !(a[side].distance(b[side]) > SAME * size)) {
                     let whose = ["from", "to"][side];
-                    return refused(format!("pairs {} and {} have the same place `{whose}`; take one away", l + 1, k + 1));
+                    return refused(format!(
+                        "pairs {} and {} have the same place `{whose}`; take one away",
+                        l + 1,
+                        k + 1
+                    ));
                 }
             }
         }
@@ -105,8 +112,7 @@ impl Warp {
             others.map(|(_, q)| p.distance(*q)).fold(f64::INFINITY, f64::min)
         };
         let round = ROUND * places.iter().enumerate().map(next).sum::<f64>() / places.len() as f64;
-        let mut warp =
-            Warp { linear, shift, weights: Vec::new(), round, bent: longest(&left), affine, places };
+        let mut warp = Warp { linear, shift, weights: Vec::new(), round, bent: longest(&left), affine, places };
         warp.bend(&left)?;
         Ok(warp)
     }
@@ -124,7 +130,9 @@ impl Warp {
             values[3 * i..3 * i + 3].copy_from_slice(&left[i].to_array());
         }
         if !solve_dense(&mut matrix, &mut values, n + 1, 3) {
-            return Err(ReliefError::Edit { what: "some pairs are too close to each other; take one of them away".into() });
+            return Err(ReliefError::Edit {
+                what: "some pairs are too close to each other; take one of them away".into(),
+            });
         }
         self.weights = values.chunks_exact(3).map(DVec3::from_slice).collect();
         self.shift += self.weights.pop().unwrap_or_default();
@@ -169,9 +177,8 @@ fn rotation_in(matrix: DMat3) -> DMat3 {
 
 /// The affine map of least squares where the places fill space, else the similarity; true for the affine one.
 fn base(pairs: &[[DVec3; 2]]) -> Result<(DMat3, DVec3, bool), ReliefError> {
-    let turned = Placement::of_pairs(pairs).map_err(|_| ReliefError::Edit {
-        what: "the pairs are on a line; give one beside it".into(),
-    })?;
+    let turned = Placement::of_pairs(pairs)
+        .map_err(|_| ReliefError::Edit { what: "the pairs are on a line; give one beside it".into() })?;
     let middle = |k: usize| pairs.iter().map(|pair| pair[k]).sum::<DVec3>() / pairs.len() as f64;
     let (from, to) = (middle(0), middle(1));
     let outer = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
@@ -191,9 +198,10 @@ fn base(pairs: &[[DVec3; 2]]) -> Result<(DMat3, DVec3, bool), ReliefError> {
         }
     }
     // [U91] eq. 42: the scale that goes with the rotation.
-    let [along, size] = pairs.iter().map(both).fold([0.0; 2], |[along, size], (p, q)| {
-        [along + q.dot(turned.linear * p), size + p.length_squared()]
-    });
+    let [along, size] = pairs
+        .iter()
+        .map(both)
+        .fold([0.0; 2], |[along, size], (p, q)| [along + q.dot(turned.linear * p), size + p.length_squared()]);
     let linear = turned.linear * (along / size);
     Ok((linear, to - linear * from, false))
 }
@@ -237,9 +245,9 @@ fn put_on(
         points.push(match *place {
             Place::Space(at) => DVec3::from(at),
             Place::Patch { patch, u, v } => {
-                let surface = surfaces.get(patch as usize).ok_or_else(|| {
-                    refused(k, format!("there is no patch {patch} among {}", surfaces.len()))
-                })?;
+                let surface = surfaces
+                    .get(patch as usize)
+                    .ok_or_else(|| refused(k, format!("there is no patch {patch} among {}", surfaces.len())))?;
                 if !((0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&v)) {
                     return Err(refused(k, "u and v are numbers from 0 to 1".into()));
                 }
@@ -276,7 +284,10 @@ mod tests {
         let x = DVec3::new(3.0, -2.0, 1.0);
         assert!(warp.point(x).distance(linear * x + DVec3::ONE) < 1e-11);
         let turn = warp.turn(x).unwrap();
-        assert!((turn.scale - 1.0).abs() < 1e-12 && (turn.rotation * turn.rotation.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-12));
+        assert!(
+            (turn.scale - 1.0).abs() < 1e-12
+                && (turn.rotation * turn.rotation.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-12)
+        );
         let linear = DMat3::from_rotation_y(-1.1) * 3.0;
         let flat = |p: DVec3| DVec3::new(p.x, p.y, 0.0);
         let pairs: Vec<[DVec3; 2]> = cloud(5).into_iter().map(|p| [flat(p), linear * flat(p)]).collect();

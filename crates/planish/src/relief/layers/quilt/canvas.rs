@@ -39,7 +39,8 @@ impl Chart {
         let pixels = whole.map(|l| ((l / pixel).round() as usize + 1).max(FEWEST));
         let scaled = |k: usize| {
             let (last, n) = (lengths[k].len() - 1, (pixels[k] - 1) as f64);
-            let even = |(i, l): (usize, &f64)| if whole[k] > 0.0 { l / whole[k] * n } else { i as f64 / last as f64 * n };
+            let even =
+                |(i, l): (usize, &f64)| if whole[k] > 0.0 { l / whole[k] * n } else { i as f64 / last as f64 * n };
             lengths[k].iter().enumerate().map(even).collect()
         };
         Chart { pixels, along: [scaled(0), scaled(1)] }
@@ -117,7 +118,13 @@ impl Canvas {
         let (width, height) = (self.height, self.width);
         let from = |k: usize| (width - 1 - k % width) * self.width + k / width;
         let values = (0..width * height).map(|k| turned(self.values[from(k)], 1)).collect();
-        Canvas { width, height, margin: self.margin, values, known: (0..width * height).map(|k| self.known[from(k)]).collect() }
+        Canvas {
+            width,
+            height,
+            margin: self.margin,
+            values,
+            known: (0..width * height).map(|k| self.known[from(k)]).collect(),
+        }
     }
 
     /// Bilinear, at pixels of the patch; `None` where something is not known.
@@ -130,7 +137,9 @@ impl Canvas {
         };
         let ((i, s), (j, t)) = (cell(at[0], self.width)?, cell(at[1], self.height)?);
         let mut sum = DVec3::ZERO;
-        for (di, dj, share) in [(0, 0, (1.0 - s) * (1.0 - t)), (1, 0, s * (1.0 - t)), (0, 1, (1.0 - s) * t), (1, 1, s * t)] {
+        for (di, dj, share) in
+            [(0, 0, (1.0 - s) * (1.0 - t)), (1, 0, s * (1.0 - t)), (0, 1, (1.0 - s) * t), (1, 1, s * t)]
+        {
             if share > 0.0 {
                 let k = (j + dj) * self.width + i + di;
                 if self.known[k] == Pixel::Open {

@@ -49,7 +49,8 @@ pub(super) fn fill(
         for x in starts(canvas.width) {
             number += 1;
             let block = Block { x, y, width, height };
-            let known: Vec<usize> = (0..width * height).filter(|&k| canvas.known[at(canvas, &block, k)] != Pixel::Open).collect();
+            let known: Vec<usize> =
+                (0..width * height).filter(|&k| canvas.known[at(canvas, &block, k)] != Pixel::Open).collect();
             if known.len() < width * height {
                 let place = choose(canvas, image, &block, &known, random::bits(seed, number));
                 lay(canvas, image, &block, place);
@@ -115,7 +116,12 @@ fn lay(canvas: &mut Canvas, image: &Canvas, block: &Block, place: [usize; 2]) {
     let is_open = |k: usize| canvas.known[here[k]] == Pixel::Open;
     let beside = |k: usize| {
         let (x, y) = (k % block.width, k / block.width);
-        let inside = [(x > 0, k.wrapping_sub(1)), (x + 1 < block.width, k + 1), (y > 0, k.wrapping_sub(block.width)), (y + 1 < block.height, k + block.width)];
+        let inside = [
+            (x > 0, k.wrapping_sub(1)),
+            (x + 1 < block.width, k + 1),
+            (y > 0, k.wrapping_sub(block.width)),
+            (y + 1 < block.height, k + block.width),
+        ];
         inside.into_iter().filter(|(is, _)| *is).map(|(_, k)| k)
     };
     // Where the block ends within what is filled, what is there goes on.
@@ -136,7 +142,8 @@ fn lay(canvas: &mut Canvas, image: &Canvas, block: &Block, place: [usize; 2]) {
         Pixel::Filled => Cell::Free,
     };
     let cells: Vec<Cell> = (0..count).map(cell).collect();
-    let far: Vec<f64> = (0..count).map(|k| if is_open(k) { 0.0 } else { new[k].distance(canvas.values[here[k]]) }).collect();
+    let far: Vec<f64> =
+        (0..count).map(|k| if is_open(k) { 0.0 } else { new[k].distance(canvas.values[here[k]]) }).collect();
     let most = far.iter().copied().fold(0.0, f64::max).max(f64::MIN_POSITIVE);
     // One more, so that of equal cuts the shortest is taken.
     let cost = |a: usize, b: usize| 1 + ((far[a] + far[b]) / most * COST_STEPS) as u64;

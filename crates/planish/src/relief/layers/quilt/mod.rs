@@ -12,8 +12,8 @@ mod canvas;
 mod cut;
 mod fill;
 
-use super::super::ReliefError;
 use super::super::Relief;
+use super::super::ReliefError;
 use super::ground::Ground;
 use super::region::{Region, fade};
 use crate::observe::Observer;
@@ -125,10 +125,11 @@ fn plan(ground: &Ground, edit: &Synthesise) -> Result<Plan, ReliefError> {
     }
     let area: f64 = edit.to.iter().map(|&p| size(p as usize)).map(|[w, h]| w * h).sum();
     if area > MOST_PIXELS * pixel * pixel {
-        return refused("the patches to fill are too large against the texels of the pattern; resample to fewer texels".into());
+        return refused(
+            "the patches to fill are too large against the texels of the pattern; resample to fewer texels".into(),
+        );
     }
-    let charts: Vec<Chart> =
-        (0..count).map(|p| Chart::new(&ground.nodes[p], ground.shapes[p], pixel)).collect();
+    let charts: Vec<Chart> = (0..count).map(|p| Chart::new(&ground.nodes[p], ground.shapes[p], pixel)).collect();
     let [wide, high] = charts[source].pixels;
     let side = edit.block.unwrap_or((BLOCK * wide.min(high) as f64).max(SMALLEST as f64) * pixel) / pixel;
     let most = wide.min(high);
@@ -257,9 +258,7 @@ fn spread(border: &[DVec3], chart: &Chart, [rows, cols]: [usize; 2], reach: usiz
             [i, j * cols + cols - 1, (rows - 1) * cols + i, j * cols],
             std::array::from_fn(|k| node(rows, cols, k, 0, 0)),
         ];
-        (0..4)
-            .map(|k| border[at[k]] * weight(k) - border[corner[k]] * (weight(k) * weight((k + 3) % 4)))
-            .sum::<DVec3>()
+        (0..4).map(|k| border[at[k]] * weight(k) - border[corner[k]] * (weight(k) * weight((k + 3) % 4))).sum::<DVec3>()
     };
     (0..rows * cols).map(one).collect()
 }
