@@ -62,7 +62,7 @@ pub fn transferred(
         layers::transfer(&ground, &source, warp.as_ref(), reach, o.one())
     })?;
     let texels: usize = maps.iter().map(|m| m.vectors.len()).sum();
-    let parameters = json!({ "reach": reach });
+    let parameters = json!({ "reach": reach, "points": pairs });
     let made = recorded(model, "relief transfer", &parameters, |all| all.with("transfer", maps));
     Ok((made, json!({ "texels": texels, "missed": missed })))
 }

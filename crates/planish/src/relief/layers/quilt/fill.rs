@@ -1,5 +1,9 @@
 //! Blocks of an image laid over an open canvas, each where it fits best what is there: [EF01], joined as in [K03].
+//!
+//! Departs from [K03], whose colours hide a step at a cut that light on a surface shows: cuts keep away from the borders of the
+//! overlap, and the two sides fade into each other around them.
 
+use super::super::region::fade;
 use super::canvas::{Canvas, Pixel};
 use super::cut::{Cell, old_side};
 use crate::geom::random;
@@ -10,13 +14,15 @@ use rayon::prelude::*;
 /// Places of the image that are compared first, about.
 const PLACES: f64 = 2000.0;
 /// Pixels that two blocks are compared at, at most, about.
-const COMPARED: usize = 256;
+const COMPARED: usize = 1024;
 /// Places whose surroundings are looked through.
 const BEST: usize = 12;
 /// Blocks that fit by a tenth less well than the best are as good ([EF01] §2.1); of squares.
 const AS_GOOD: f64 = 1.21;
 /// Steps of the largest cost of a cut.
 const COST_STEPS: f64 = 1e4;
+/// How far from a cut the two sides fade into each other, and how near it comes to the borders of an overlap; share of the overlap.
+const SOFT: f64 = 0.25;
 
 /// A block on the canvas.
 struct Block {
@@ -77,7 +83,9 @@ fn choose(canvas: &Canvas, image: &Canvas, block: &Block, known: &[usize], draw:
     if known.is_empty() {
         return [any(0, room[0]), any(1, room[1])];
     }
-    let sparse: Vec<usize> = known.iter().copied().step_by(known.len().div_ceil(COMPARED)).collect();
+    // One of each few, not every n-th: those would lie on lines if n divided the width.
+    let few = known.chunks(known.len().div_ceil(COMPARED)).enumerate();
+    let sparse: Vec<usize> = few.map(|(k, few)| few[any(5 + k as u64, few.len() - 1).min(few.len() - 1)]).collect();
     let misfit = |place: [usize; 2]| {
         let far = |&k: &usize| {
             image.values[from(image, block, place, k)].distance_squared(canvas.values[at(canvas, block, k)])
@@ -114,16 +122,6 @@ fn lay(canvas: &mut Canvas, image: &Canvas, block: &Block, place: [usize; 2]) {
     let here: Vec<usize> = (0..count).map(|k| at(canvas, block, k)).collect();
     let new: Vec<DVec3> = (0..count).map(|k| image.values[from(image, block, place, k)]).collect();
     let is_open = |k: usize| canvas.known[here[k]] == Pixel::Open;
-    let beside = |k: usize| {
-        let (x, y) = (k % block.width, k / block.width);
-        let inside = [
-            (x > 0, k.wrapping_sub(1)),
-            (x + 1 < block.width, k + 1),
-            (y > 0, k.wrapping_sub(block.width)),
-            (y + 1 < block.height, k + block.width),
-        ];
-        inside.into_iter().filter(|(is, _)| *is).map(|(_, k)| k)
-    };
     // Where the block ends within what is filled, what is there goes on.
     let ends = |k: usize| {
         let (x, y) = (k % block.width, k / block.width);
@@ -134,11 +132,15 @@ fn lay(canvas: &mut Canvas, image: &Canvas, block: &Block, place: [usize; 2]) {
             || known(x + 1 == block.width && right < canvas.width, here[k] + 1)
             || known(y + 1 == block.height && top < canvas.height, here[k] + canvas.width)
     };
+    let soft = (SOFT * canvas.margin as f64).max(1.0);
+    let to_open = distances(block.width, (0..count).map(is_open));
+    let to_old =
+        distances(block.width, (0..count).map(|k| canvas.known[here[k]] == Pixel::Fixed || !is_open(k) && ends(k)));
     let cell = |k: usize| match canvas.known[here[k]] {
         Pixel::Open => Cell::Out,
         Pixel::Fixed => Cell::Old,
-        Pixel::Filled if ends(k) => Cell::Old,
-        Pixel::Filled if beside(k).any(is_open) => Cell::New,
+        Pixel::Filled if to_open[k] <= soft && to_open[k] <= to_old[k] => Cell::New,
+        Pixel::Filled if to_old[k] <= soft => Cell::Old,
         Pixel::Filled => Cell::Free,
     };
     let cells: Vec<Cell> = (0..count).map(cell).collect();
@@ -148,10 +150,41 @@ fn lay(canvas: &mut Canvas, image: &Canvas, block: &Block, place: [usize; 2]) {
     // One more, so that of equal cuts the shortest is taken.
     let cost = |a: usize, b: usize| 1 + ((far[a] + far[b]) / most * COST_STEPS) as u64;
     let old = old_side(block.width, &cells, cost);
-    for k in 0..count {
-        if cells[k] == Cell::Out || !old[k] {
-            canvas.values[here[k]] = new[k];
-            canvas.known[here[k]] = Pixel::Filled;
-        }
+    let stays = |k: usize| cells[k] != Cell::Out && old[k];
+    let to_new = distances(block.width, (0..count).map(|k| !stays(k)));
+    let to_staying = distances(block.width, (0..count).map(stays));
+    let share = |k: usize| {
+        let beyond = if stays(k) { 0.5 - to_new[k] } else { to_staying[k] - 0.5 };
+        if is_open(k) { 1.0 } else { fade(beyond + soft, 2.0 * soft) }
+    };
+    let shares: Vec<f64> = (0..count).map(share).collect();
+    for k in (0..count).filter(|&k| shares[k] > 0.0 && cells[k] != Cell::Old) {
+        canvas.values[here[k]] = canvas.values[here[k]].lerp(new[k], shares[k]);
+        canvas.known[here[k]] = Pixel::Filled;
     }
+}
+
+/// For each pixel of a block the way to the nearest that is one of those, in pixels; infinite if none is.
+///
+/// Source: Borgefors, *Distance Transformations in Digital Images*, CVGIP 34, 1986, with steps of 1 and the root of 2.
+fn distances(width: usize, is: impl Iterator<Item = bool>) -> Vec<f64> {
+    let mut far: Vec<f64> = is.map(|is| if is { 0.0 } else { f64::INFINITY }).collect();
+    let across = std::f64::consts::SQRT_2;
+    for _ in 0..2 {
+        for k in 0..far.len() {
+            let (x, first) = (k % width, k < width);
+            let before = [
+                (x > 0, 1, 1.0),
+                (!first, width, 1.0),
+                (!first && x > 0, width + 1, across),
+                (!first && x + 1 < width, width - 1, across),
+            ];
+            for (_, back, step) in before.into_iter().filter(|b| b.0) {
+                far[k] = far[k].min(far[k - back] + step);
+            }
+        }
+        // The second time from the last pixel to the first, and turned round again.
+        far.reverse();
+    }
+    far
 }
