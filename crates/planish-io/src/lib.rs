@@ -31,7 +31,6 @@ mod stl;
 mod text;
 mod topology;
 mod usd;
-mod usd_material;
 mod weld;
 
 pub use error::{ReadError, WriteError};
@@ -58,4 +57,3 @@ pub use scan::{
 };
 pub use step::{StepInput, StepSummary, read_step_surfaces, write_step};
 pub use usd::{UsdInput, write_usd};
-pub use usd_material::{UsdMaterial, UsdTexture};

@@ -4,7 +4,6 @@ mod deform;
 mod edit;
 mod export;
 mod import;
-mod points;
 mod refit;
 mod transfer;
 
