@@ -14,6 +14,7 @@ mod sides;
 pub use partition::{Brick, Partition};
 pub use sides::Sides;
 
+use super::local::nest::MOST_NESTED;
 use super::{Cell, CleanParams, Cloud, CloudError, FEWEST_POINTS, Quadric, Samples, clean};
 use crate::geom::{Aabb, KdTree};
 use crate::observe::{Observer, Part};
@@ -40,13 +41,14 @@ pub fn halo(
     let mut widest: f64 = 0.0;
     let mut failed = None;
     let count = partition.bricks.len();
-    for k in 0..PILOTS.min(count) {
-        let brick = &partition.bricks[k * (count - 1) / (PILOTS - 1)];
+    let pilots = PILOTS.min(count);
+    for k in 0..pilots {
+        let brick = &partition.bricks[k * (count - 1) / (pilots - 1).max(1)];
         let own: Vec<DVec3> = partition.order[brick.range.clone()].iter().map(|&i| cloud.points[i as usize]).collect();
         let parts = Partition::new(&own, PILOT_POINTS);
         let pilot = &parts.bricks[parts.bricks.len() / 2];
         let points = parts.order[pilot.range.clone()].iter().map(|&i| own[i as usize]).collect();
-        match clean(&Cloud::new(points), params, &Part::new(observer, k as f64 / PILOTS as f64, 1.0 / PILOTS as f64)) {
+        match clean(&Cloud::new(points), params, &Part::new(observer, k as f64 / pilots as f64, 1.0 / pilots as f64)) {
             Ok(samples) => {
                 let mut supports: Vec<f64> = samples.samples.iter().map(|s| s.support).collect();
                 supports.sort_unstable_by(f64::total_cmp);
@@ -204,7 +206,7 @@ impl BrickSamples {
                 center: c.center,
                 support: c.support,
                 trust: c.trust,
-                sheets: [sheets[0]; 4],
+                sheets: [sheets[0]; MOST_NESTED],
                 count: c.count,
                 concave: c.concave,
             };

@@ -62,10 +62,12 @@ pub fn mesh_in_bricks(
     let part = |from: f64, to: f64| Part::new(observer, from, to - from);
     let halo = halo(cloud, &partition, &params.clean, &part(0.0, 0.03))?;
     let count = partition.bricks.len();
-    let samples = in_groups(count, at_once, &part(0.03, 0.6), |k, o| {
+    let mut samples = Vec::with_capacity(count);
+    let cleaned = |k: usize, o: &dyn Observer| {
         let near = cloud.select(&partition.around(&cloud.points, k, halo));
         Ok(BrickSamples::clean(&near, &partition.bricks[k], &params.clean, o)?)
-    })?;
+    };
+    in_groups(count, at_once, &part(0.03, 0.6), cleaned, |brick| samples.push(brick))?;
     let sides = Sides::new(&partition.bricks, &samples);
     let facts = facts_of(&partition, &samples, &sides);
     if facts.samples == 0 {
@@ -76,18 +78,14 @@ pub fn mesh_in_bricks(
     let mut welder = Welder::new(whole.lattice.step.x);
     let mut counts = ContourCounts::default();
     let (mut mended, mut lids) = (0, 0);
-    // Triangles of finished bricks are all that is kept of them.
-    for from in (0..count).step_by(at_once) {
-        let to = (from + at_once).min(count);
-        let span = [from, to].map(|k| 0.62 + 0.35 * k as f64 / count as f64);
-        let made = in_groups(to - from, at_once, &part(span[0], span[1]), |k, o| whole.brick(from + k, params, o))?;
-        for brick in made.into_iter().flatten() {
-            counts += brick.counts;
-            mended += brick.mended;
-            lids += brick.lids;
-            welder.add(brick.piece);
-        }
-    }
+    let meshed = |k: usize, o: &dyn Observer| whole.brick(k, params, o);
+    in_groups(count, at_once, &part(0.62, 0.97), meshed, |made| {
+        let Some(brick) = made else { return };
+        counts += brick.counts;
+        mended += brick.mended;
+        lids += brick.lids;
+        welder.add(brick.piece);
+    })?;
     let welded = welder.finish();
     let (mut mesh, mut tags) = (welded.mesh, welded.tags);
     if mesh.triangles.is_empty() {
@@ -117,28 +115,26 @@ fn bricks_at_once(partition: &Partition, memory: u64) -> Result<usize, ScanError
     Ok(((memory - kept) / one.max(1)).min(rayon::current_num_threads() as u64).max(1) as usize)
 }
 
-/// Runs `work` over `0..count`, so many at a time, in order.
+/// Runs `work` over `0..count`, so many at a time, and gives what it made to `take`, in order.
 fn in_groups<T: Send>(
     count: usize,
     at_once: usize,
     observer: &dyn Observer,
     work: impl Fn(usize, &dyn Observer) -> Result<T, ScanError> + Sync,
-) -> Result<Vec<T>, ScanError> {
-    let mut all = Vec::with_capacity(count);
-    while all.len() < count {
+    mut take: impl FnMut(T),
+) -> Result<(), ScanError> {
+    for from in (0..count).step_by(at_once) {
         observer.check()?;
-        let from = all.len();
         let done = from as f64 / count as f64;
         observer.progress(done);
         let one = |k: usize| work(k, &Part::new(observer, done, 0.0));
-        let made: Vec<Result<T, ScanError>> =
-            (from..(from + at_once).min(count)).into_par_iter().with_max_len(1).map(one).collect();
-        for one in made {
-            all.push(one?);
+        let group = (from..(from + at_once).min(count)).into_par_iter().with_max_len(1);
+        for made in group.map(one).collect::<Vec<_>>() {
+            take(made?);
         }
     }
     observer.progress(1.0);
-    Ok(all)
+    Ok(())
 }
 
 /// The facts of all bricks together: of middles the middle, by the samples that each has.
@@ -167,8 +163,7 @@ fn facts_of(partition: &Partition, samples: &[BrickSamples], sides: &Sides) -> S
 }
 
 fn bounds(boxes: impl Iterator<Item = Aabb>) -> Aabb {
-    let empty = Aabb { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
-    boxes.fold(empty, |all, b| Aabb { min: all.min.min(b.min), max: all.max.max(b.max) })
+    Aabb::of(&boxes.flat_map(|b| [b.min, b.max]).collect::<Vec<_>>())
 }
 
 /// What every brick needs to be meshed.
