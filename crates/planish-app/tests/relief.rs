@@ -57,6 +57,11 @@ fn strokes_become_layers_that_are_undone_after_a_restart() {
             "[[step]]\nedit = \"stamp\"\nimage = \"no.png\"\nat = [0, 0, 0]\nup = [0, 1, 0]\nwidth = 1\nheight = 1\n",
             "no.png",
         ),
+        (
+            "[[step]]\nedit = \"erase\"\nregion = { image = \"no.png\", at = [0, 0, 0], up = [0, 1, 0], width = 1 }\n",
+            "no.png",
+        ),
+        ("[[step]]\nedit = \"erase\"\nregion = { image = \"no.png\" }\n", "needs at, up and width"),
     ] {
         script(at, text);
         let output = planish(&["relief", "edit", "a.planish", "edits.toml", "-o", "c.planish"], at);
@@ -81,6 +86,8 @@ fn maps_go_out_and_come_back_as_a_layer_and_wrong_ones_are_told() {
         ("arnold", &["--preset", "arnold", "--tile", "128"]),
         ("wired", &["--materialx", "--attributes", "--max-error", "0.01%"]),
         ("unreal", &["--preset", "unreal", "--max-error", "0.01%"]),
+        ("usd", &["--preset", "usd", "--tile", "64"]),
+        ("stage", &["--frame", "tangent", "--usd"]),
     ] {
         ok(&[&["relief", "export", "box.planish", "-o", maps], options].concat(), at);
         let told = ok(&["relief", "import", "box.planish", maps, "-o", "same.planish"], at);
@@ -88,6 +95,9 @@ fn maps_go_out_and_come_back_as_a_layer_and_wrong_ones_are_told() {
     }
     assert!(at.join("udim/relief.1001.exr").exists() && at.join("udim/base.obj").exists());
     assert!(fs::read_to_string(at.join("wired/relief.mtlx")).unwrap().contains("patch_0000.exr"));
+    let usd = |maps: &str| fs::read_to_string(at.join(maps).join("relief.usda")).unwrap();
+    assert!(usd("usd").contains("@./relief.<UDIM>.exr@") && usd("usd").contains("UsdPreviewSurface"));
+    assert!(usd("stage").contains("ND_displacement_vector3") && usd("stage").contains("@./patch_0005.exr@"));
     assert!(fs::read_to_string(at.join("arnold/relief.json")).unwrap().contains("order XZY"));
     // A stroke goes through the files of a second export into the first model.
     script(at, "[[step]]\nedit = \"stroke\"\npath = [{ patch = 0, u = 0.5, v = 0.5 }]\nradius = 0.3\nheight = 0.05\n");
@@ -129,6 +139,8 @@ fn maps_go_out_and_come_back_as_a_layer_and_wrong_ones_are_told() {
         (&["--kind", "normal", "--max-error", "1mm"], "does not go with normals"),
         (&["--file", "png", "--max-error", "1e-12"], "--max-error: the largest error needs"),
         (&["--frame", "object", "--materialx"], "wires vectors in tangent space"),
+        (&["--kind", "length", "--usd"], "wires scalars, heights"),
+        (&["--preset", "blender", "--usd", "--tile", "64"], "in the order tbn"),
     ] {
         let output = planish(&[&["relief", "export", "a.planish", "-o", "bad"], args].concat(), at);
         assert_eq!(status(&output), 2);
@@ -160,6 +172,96 @@ fn a_model_is_parted_leveled_and_gets_detail_from_another() {
         let output = planish(args, at);
         assert_eq!(status(&output), 2);
         assert!(error_line(&output).contains(words), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn detail_goes_along_with_pairs_of_places_and_broken_lists_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    model(at);
+    script(at, "[[step]]\nedit = \"stroke\"\npath = [{ patch = 0, u = 0.5, v = 0.5 }]\nradius = 0.3\nheight = 0.05\n");
+    ok(&["relief", "edit", "box.planish", "edits.toml", "-q", "-o", "a.planish"], at);
+    let pair = |p: u32| {
+        let place = format!("{{ patch = {p}, u = 0.4, v = 0.6 }}");
+        format!("[[pair]]\nfrom = {place}\nto = {place}\n")
+    };
+    fs::write(at.join("pairs.toml"), (0..6).map(pair).collect::<String>()).unwrap();
+    let transfer = ["relief", "transfer", "box.planish", "a.planish", "--points"];
+    let told = ok(&[&transfer[..], &["pairs.toml", "-o", "t.planish"]].concat(), at);
+    assert!(told.contains("6 pairs; an affine map leaves"), "{told}");
+    ok(&["compare", "a.planish", "t.planish", "--surface", "displaced", "--tolerance", "0.01%"], at);
+    for (name, text, words) in [
+        ("bad.toml", pair(0) + &pair(1), "2 pairs are given - hint: 3 to 2000 are needed"),
+        ("bad.toml", (0..4).map(|_| pair(0)).collect(), "pairs 1 and 2 have the same place `from`"),
+        ("bad.toml", pair(0) + &pair(1) + &pair(77), "pair 3, `from`: there is no patch 77 among"),
+        ("bad.toml", "[[pair]]\nfrom = [0, 0]\n".into(), "(line "),
+        ("bad.csv", "x,y,z,x,y,z\n0,0,0,0,0\n".into(), "six numbers are needed in line 2"),
+        ("bad.csv", "0,0,0,0,0,0\nnan,0,0,1,0,0\n0,1,0,0,1,0\n".into(), "a number is not finite"),
+        ("bad.csv", "900,0,0,0,0,0\n0,1,0,1,0,0\n0,1,0,0,1,0\n".into(), "away from the surface"),
+        ("bad.csv", String::new(), "0 pairs are given"),
+    ] {
+        fs::write(at.join(name), text).unwrap();
+        let output = planish(&[&transfer[..], &[name, "-o", "x.planish"]].concat(), at);
+        assert_eq!(status(&output), 3, "{}", stderr(&output));
+        assert!(error_line(&output).contains(words), "{}", stderr(&output));
+        assert!(!at.join("x.planish").exists());
+    }
+    let output = planish(&["relief", "transfer", "a.planish", "--points", "pairs.toml", "-o", "x.planish"], at);
+    assert_eq!(status(&output), 2);
+    assert!(error_line(&output).contains("needs FROM.planish"), "{}", stderr(&output));
+}
+
+#[test]
+fn detail_is_synthesised_the_same_again_with_the_seed_and_taken_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    model(at);
+    script(
+        at,
+        "[[step]]\nedit = \"resample\"\ntexels = 33\n\n[[step]]\nedit = \"erase\"\n\n[[step]]\nedit = \"stroke\"\n\
+         path = [{ patch = 0, u = 0.1, v = 0.3 }, { patch = 0, u = 0.9, v = 0.4 }]\nradius = 0.2\nheight = 0.05\n\
+         region = { patches = [0] }\n",
+    );
+    ok(&["relief", "edit", "box.planish", "edits.toml", "-q", "-o", "a.planish"], at);
+    let made = |name: &str, keys: &str| {
+        script(at, &format!("[[step]]\nedit = \"synthesise\"\nfrom = 0\nto = [1, 2, 3, 4, 5]\n{keys}"));
+        let model = format!("{name}.planish");
+        let told = ok(&["relief", "edit", "a.planish", "edits.toml", "-o", &model], at);
+        assert!(told.contains("stroke, synthesise"), "{told}");
+        let maps = at.join(format!("{name}.maps"));
+        ok(&["relief", "export", &model, "-q", "-o", maps.to_str().unwrap(), "--kind", "scalar"], at);
+        (0..6).map(|p| fs::read(maps.join(format!("patch_{p:04}.exr"))).unwrap()).collect::<Vec<_>>()
+    };
+    let first = made("b", "seed = 1\n");
+    assert!(first == made("c", "seed = 1\n"), "the same seed");
+    assert!(first != made("d", "seed = 2\n"), "another seed");
+    let region = made("e", "seed = 1\nregion = { patches = [1, 2] }\n");
+    let plain = {
+        ok(&["relief", "export", "a.planish", "-q", "-o", "a.maps", "--kind", "scalar"], at);
+        (0..6).map(|p| fs::read(at.join(format!("a.maps/patch_{p:04}.exr"))).unwrap()).collect::<Vec<_>>()
+    };
+    assert!((1..6).all(|p| first[p] != plain[p]), "every patch that is named gets some");
+    assert!(region[1] != plain[1] && region[2] != plain[2], "the region's patches get some");
+    // The pattern is .05 high, and no more than that is made of it.
+    let told = ok(&["compare", "a.planish", "b.planish", "--surface", "displaced", "--tolerance", "0.06"], at);
+    assert!(!told.is_empty());
+    script(at, "[[step]]\nedit = \"undo\"\n");
+    ok(&["relief", "edit", "b.planish", "edits.toml", "-q", "-o", "back.planish"], at);
+    ok(&["export", "a.planish", "-q", "-o", "before.ply"], at);
+    ok(&["export", "back.planish", "-q", "-o", "after.ply"], at);
+    assert_eq!(fs::read(at.join("before.ply")).unwrap(), fs::read(at.join("after.ply")).unwrap());
+    for (keys, words) in [
+        ("from = 77\nto = [1]\n", "there is no patch 77 among 6"),
+        ("from = 0\nto = []\n", "patches to fill are needed"),
+        ("from = 0\nto = [1]\nblock = 1e9\n", "blocks have sides from"),
+        ("from = 0\nto = [1]\nblok = 1\n", "unknown field `blok`"),
+    ] {
+        script(at, &format!("[[step]]\nedit = \"synthesise\"\n{keys}"));
+        let output = planish(&["relief", "edit", "a.planish", "edits.toml", "-o", "x.planish"], at);
+        assert_eq!(status(&output), 3, "{}", stderr(&output));
+        assert!(error_line(&output).contains(words), "{}", stderr(&output));
+        assert!(!at.join("x.planish").exists());
     }
 }
 

@@ -73,7 +73,10 @@ pub fn export(
         ExportKind::Usd => {
             let mesh = MappedMesh::new(displaced(), &model.reliefs);
             let (surfaces, mesh) = (model.surfaces.as_slice(), Some(("displaced", &mesh)));
-            write_usd(path, &UsdInput { surfaces, mesh, shift: model.shift, options: &options(path, model) })?;
+            write_usd(
+                path,
+                &UsdInput { surfaces, mesh, shift: model.shift, materials: &[], options: &options(path, model) },
+            )?;
         }
         ExportKind::Mesh => {
             write_patches(path, &MappedMesh::new(displaced(), &model.reliefs), &options(path, model))?;

@@ -31,6 +31,7 @@ mod stl;
 mod text;
 mod topology;
 mod usd;
+mod usd_material;
 mod weld;
 
 pub use error::{ReadError, WriteError};
@@ -57,3 +58,4 @@ pub use scan::{
 };
 pub use step::{StepInput, StepSummary, read_step_surfaces, write_step};
 pub use usd::{UsdInput, write_usd};
+pub use usd_material::{UsdMaterial, UsdTexture};

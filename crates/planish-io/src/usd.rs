@@ -7,6 +7,7 @@
 //! of the model, which has double precision, puts it in its place.
 
 use crate::mapped::patch_name;
+use crate::usd_material::{self, UsdMaterial};
 use crate::{MappedMesh, Place, Up, WriteError, WriteOptions, atomic};
 use planish::DVec3;
 use planish::surface::Surface;
@@ -23,6 +24,8 @@ pub struct UsdInput<'a> {
     pub mesh: Option<(&'a str, &'a MappedMesh)>,
     /// What brings them to their place.
     pub shift: DVec3,
+    /// Materials of the mesh; with one, surfaces may be left away.
+    pub materials: &'a [UsdMaterial],
     /// Units, axis and name.
     pub options: &'a WriteOptions,
 }
@@ -33,7 +36,7 @@ pub struct UsdInput<'a> {
 /// `WriteError::Nothing` without surfaces; `WriteError::Inconsistent` for a surface that cannot be evaluated;
 /// `WriteError::Value` for a coordinate that single precision cannot hold.
 pub fn write_usd(path: impl AsRef<Path>, input: &UsdInput) -> Result<(), WriteError> {
-    if input.surfaces.is_empty() {
+    if input.surfaces.is_empty() && input.materials.is_empty() {
         return Err(WriteError::Nothing("the model has no surfaces"));
     }
     for (p, surface) in input.surfaces.iter().enumerate() {
@@ -63,7 +66,7 @@ fn held(points: &[DVec3], place: impl Fn(usize) -> Place) -> Result<(), WriteErr
 }
 
 fn write<W: Write>(out: &mut W, input: &UsdInput) -> Result<(), WriteError> {
-    let UsdInput { surfaces, mesh, shift, options } = input;
+    let UsdInput { surfaces, mesh, shift, materials, options } = input;
     let name = identifier(&options.name);
     let up = if options.up == Up::Y { "Y" } else { "Z" };
     writeln!(out, "#usda 1.0\n(\n    defaultPrim = \"{name}\"\n    doc = \"{}\"", options.generator())?;
@@ -77,13 +80,19 @@ fn write<W: Write>(out: &mut W, input: &UsdInput) -> Result<(), WriteError> {
         writeln!(out, "    double3 xformOp:translate = ({}, {}, {})", shift.x, shift.y, shift.z)?;
         writeln!(out, "    uniform token[] xformOpOrder = [\"xformOp:translate\"]\n")?;
     }
-    writeln!(out, "    def Scope \"surfaces\"\n    {{\n        uniform token purpose = \"guide\"")?;
-    for (p, surface) in surfaces.iter().enumerate() {
-        write_patch(out, &patch_name(p), surface)?;
+    if !surfaces.is_empty() {
+        writeln!(out, "    def Scope \"surfaces\"\n    {{\n        uniform token purpose = \"guide\"")?;
+        for (p, surface) in surfaces.iter().enumerate() {
+            write_patch(out, &patch_name(p), surface)?;
+        }
+        writeln!(out, "    }}")?;
     }
-    writeln!(out, "    }}")?;
+    if !materials.is_empty() {
+        out.write_all(usd_material::scope(&name, materials).as_bytes())?;
+    }
+    let bound = Bound { root: &name, materials };
     if let Some((name, mesh)) = mesh {
-        write_mesh(out, &identifier(name), mesh)?;
+        write_mesh(out, &identifier(name), mesh, &bound)?;
     }
     writeln!(out, "}}")?;
     Ok(())
@@ -114,10 +123,38 @@ fn write_points<W: Write>(out: &mut W, indent: &str, points: &[DVec3]) -> Result
     list(out, singles(), |out, p| triple(out, p.to_array()))
 }
 
-fn write_mesh<W: Write>(out: &mut W, name: &str, mesh: &MappedMesh) -> Result<(), WriteError> {
+/// Which patch has which material.
+struct Bound<'a> {
+    root: &'a str,
+    materials: &'a [UsdMaterial],
+}
+
+impl Bound<'_> {
+    /// What follows the name of a prim that has the material, and the line that names it; nothing without one.
+    fn words(&self, material: Option<&UsdMaterial>, indent: &str) -> [String; 2] {
+        let Some(material) = material else { return Default::default() };
+        let head = format!(" (\n{indent}    prepend apiSchemas = [\"MaterialBindingAPI\"]\n{indent})");
+        let line = format!("{indent}    rel material:binding = </{}/materials/{}>\n", self.root, material.name);
+        [head, line]
+    }
+
+    /// The one material of all patches.
+    fn whole(&self) -> Option<&UsdMaterial> {
+        self.materials.first().filter(|_| self.materials.len() == 1)
+    }
+
+    /// The material of one patch, where patches have their own.
+    fn of(&self, patch: usize) -> Option<&UsdMaterial> {
+        self.materials.iter().find(|m| self.materials.len() > 1 && m.patches.contains(&patch))
+    }
+}
+
+fn write_mesh<W: Write>(out: &mut W, name: &str, mesh: &MappedMesh, bound: &Bound) -> Result<(), WriteError> {
     const INDENT: &str = "        ";
     let patched = &mesh.patched;
-    writeln!(out, "\n    def Mesh \"{name}\"\n    {{")?;
+    let [head, line] = bound.words(bound.whole(), "    ");
+    writeln!(out, "\n    def Mesh \"{name}\"{head}\n    {{")?;
+    write!(out, "{line}")?;
     writeln!(
         out,
         "{INDENT}uniform token subdivisionScheme = \"none\"\n{INDENT}uniform token orientation = \"rightHanded\""
@@ -147,7 +184,9 @@ fn write_mesh<W: Write>(out: &mut W, name: &str, mesh: &MappedMesh) -> Result<()
     writeln!(out, "{INDENT}uniform token subsetFamily:materialBind:familyType = \"partition\"")?;
     let mut first = 0;
     for (p, nodes) in patched.patches.iter().enumerate() {
-        writeln!(out, "\n{INDENT}def GeomSubset \"{}\"\n{INDENT}{{", patch_name(p))?;
+        let [head, line] = bound.words(bound.of(p), INDENT);
+        writeln!(out, "\n{INDENT}def GeomSubset \"{}\"{head}\n{INDENT}{{", patch_name(p))?;
+        write!(out, "{line}")?;
         writeln!(out, "{INDENT}    uniform token elementType = \"face\"")?;
         writeln!(out, "{INDENT}    uniform token familyName = \"materialBind\"")?;
         write!(out, "{INDENT}    int[] indices = ")?;

@@ -14,7 +14,7 @@ fn write(surfaces: &[Surface], mesh: Option<&MappedMesh>, shift: DVec3) -> Resul
     let path = folder.path().join("a.usda");
     let options = WriteOptions { units: Units::Mm, up: Up::Z, name: "1 \"ä\"".into() };
     let mesh = mesh.map(|mesh| ("displaced", mesh));
-    write_usd(&path, &UsdInput { surfaces, mesh, shift, options: &options })?;
+    write_usd(&path, &UsdInput { surfaces, mesh, shift, materials: &[], options: &options })?;
     Ok(std::fs::read_to_string(path).unwrap())
 }
 

@@ -345,18 +345,21 @@ impl PyModel {
     /// The model with the detail of another of the same shape, as a layer: at each texel the displacement that the other has at
     /// the closest place of its surfaces, meant in space. `facts` tells `texels`, and how many `missed`. Raises ReliefError.
     ///
-    /// * reach: further away than this nothing is taken over, world units; 2 % of the diagonal unless given
+    /// * points: (n, 2, 3), n places on the other model and where each is on this one, for models of a similar, not equal shape;
+    ///   displacements go along in the frame of the surface then
+    /// * reach: further away than this nothing is taken over, world units; 2 % of the diagonal unless given, 10 % with points
     ///
     /// Source: Krishnamurthy 1998, figure 7.5; docs/methods/relief.md.
-    #[pyo3(signature = (other, *, reach=None, progress=None))]
+    #[pyo3(signature = (other, *, points=None, reach=None, progress=None))]
     fn transfer_relief(
         &self,
         py: Python,
         other: &PyModel,
+        points: Option<&Bound<PyAny>>,
         reach: Option<f64>,
         progress: Option<&Bound<PyAny>>,
     ) -> PyResult<PyModel> {
-        let (model, told) = relief::transferred(py, &self.model, &other.model, reach, progress)?;
+        let (model, told) = relief::transferred(py, &self.model, &other.model, (reach, points), progress)?;
         Ok(PyModel::new(model).after(told))
     }
 

@@ -2,10 +2,11 @@
 
 use crate::error::{class, hinted, told};
 use crate::surface::PyRelief;
-use crate::{json, watch};
+use crate::{array, json, watch};
+use planish::DVec3;
 use planish::model::{HistoryEntry, Model};
 use planish::observe::Observer;
-use planish::relief::layers::{self, Ground, Layer, Layers, ReliefEdit};
+use planish::relief::layers::{self, Ground, Layer, Layers, Place, PlacePair, ReliefEdit};
 use planish::relief::{Displaced, Relief, ReliefError};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -13,6 +14,8 @@ use serde_json::{Value, json};
 
 /// How far detail of another model is looked for unless the caller says, share of the diagonal: as on the command line.
 const REACH: f64 = 0.02;
+/// The same with pairs of places.
+const REACH_OF_POINTS: f64 = 0.1;
 
 /// Refuses a model without relief.
 fn check(py: Python, model: &Model) -> PyResult<()> {
@@ -27,28 +30,39 @@ fn shapes(reliefs: &[Relief]) -> Vec<[usize; 2]> {
     reliefs.iter().map(|r| [r.rows, r.cols]).collect()
 }
 
+/// Pairs of places of an array (n, 2, 3).
+fn pairs_of(given: &Bound<PyAny>) -> PyResult<Vec<PlacePair>> {
+    let read = array::reals(given, "points", &[0, 2, 3])?;
+    let place = |p: DVec3| Place::Space(p.to_array());
+    Ok(read.vectors().chunks_exact(2).map(|p| PlacePair { from: place(p[0]), to: place(p[1]) }).collect())
+}
+
 /// The model with the detail of another.
 /// * `reach` - further away than this nothing is taken over, world units
+/// * `points` - places of the other model and of this one in turn, for models of a similar shape
 pub fn transferred(
     py: Python,
     model: &Model,
     from: &Model,
-    reach: Option<f64>,
+    (reach, points): (Option<f64>, Option<&Bound<PyAny>>),
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<(Model, Value)> {
     check(py, model)?;
     check(py, from)?;
-    let reach = reach.unwrap_or(REACH * model.mesh.bounds().diagonal());
+    let pairs = points.map(|given| pairs_of(given)).transpose()?;
+    let share = if pairs.is_some() { REACH_OF_POINTS } else { REACH };
+    let reach = reach.unwrap_or(share * model.mesh.bounds().diagonal());
     if !(reach > 0.0) {
         return Err(PyValueError::new_err(format!("reach={reach}: a length above 0 is needed")));
     }
     let (maps, missed) = watch::run(py, "transfer", progress, |o| -> Result<_, ReliefError> {
         let ground = Ground::new(&model.network, &model.surfaces, shapes(&model.reliefs))?;
         let source = Displaced { network: &from.network, surfaces: &from.surfaces, reliefs: &from.reliefs };
-        layers::transfer(&ground, &source, reach, o.one())
+        let warp = pairs.as_ref().map(|pairs| layers::warp(&ground, &source, pairs, o.one())).transpose()?;
+        layers::transfer(&ground, &source, warp.as_ref(), reach, o.one())
     })?;
     let texels: usize = maps.iter().map(|m| m.vectors.len()).sum();
-    let parameters = json!({ "reach": reach });
+    let parameters = json!({ "reach": reach, "points": pairs });
     let made = recorded(model, "relief transfer", &parameters, |all| all.with("transfer", maps));
     Ok((made, json!({ "texels": texels, "missed": missed })))
 }

@@ -35,6 +35,27 @@ def test_detail_moves_to_a_model_with_another_network(detailed: planish.Model, p
     assert nothing.facts["texels"] - nothing.facts["missed"] <= 4 * len(plain.reliefs)
 
 
+def test_detail_goes_along_with_pairs_of_places_to_a_turned_and_doubled_copy(detailed: planish.Model, plain: planish.Model) -> None:
+    turn = np.array([[0.0, -2.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0]])
+    copy = plain.surface_mesh("base")
+    moved = planish.Mesh(copy.points @ turn.T + [50.0, 0.0, 0.0], copy.triangles).fit(patches=24, tolerance=2e-4)
+    # Both are balls of radius 10, but for what the fit leaves.
+    places = 10.0 * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1], [0.6, 0.8, 0]])
+    points = np.stack([places, places @ turn.T + [50.0, 0.0, 0.0]], axis=1)
+    made = moved.transfer_relief(detailed, points=points)
+    assert made.facts["missed"] == 0 and len(made.history[-1]["parameters"]["points"]) == 7
+    whole = detailed.surface_mesh("displaced")
+    wanted = planish.Mesh(whole.points @ turn.T + [50.0, 0.0, 0.0], whole.triangles)
+    before, after = (m.surface_mesh("displaced").compare(wanted)["both"]["rms"] for m in (moved, made))
+    assert before > 0.06 and after < 0.3 * before
+    with pytest.raises(planish.ReliefError, match="2 pairs are given"):
+        moved.transfer_relief(detailed, points=points[:2])
+    with pytest.raises(planish.ReliefError, match="mirror image"):
+        moved.transfer_relief(detailed, points=np.stack([places, (places * [-1, 1, 1]) @ turn.T + [50.0, 0.0, 0.0]], axis=1))
+    with pytest.raises(ValueError, match="points"):
+        moved.transfer_relief(detailed, points=points[:, :, :2])
+
+
 def test_arrays_become_the_relief_and_are_a_layer_that_can_be_taken_back(detailed: planish.Model) -> None:
     doubled = detailed.with_reliefs([planish.Relief(2.0 * r.vectors) for r in detailed.reliefs], name="doubled")
     for new, old in zip(doubled.reliefs, detailed.reliefs, strict=True):

@@ -50,7 +50,10 @@ impl<'a> Edited<'a> {
         Edited { work, surfaces: surfaces(work, 4), layers }
     }
 
-    fn picture(_: &str) -> Result<Picture, String> {
+    fn picture(name: &str) -> Result<Picture, String> {
+        if name == "grey.png" {
+            return Ok(Picture { width: 4, height: 4, pixels: vec![[0.5, 1.0]; 16] });
+        }
         // The left half white, the right half transparent.
         let pixels = (0..8 * 4).map(|k| if k % 8 < 4 { [1.0, 1.0] } else { [1.0, 0.0] }).collect();
         Ok(Picture { width: 8, height: 4, pixels })
@@ -219,6 +222,142 @@ fn scale_threshold_erase_blur_and_sharpen_do_what_they_say() {
 }
 
 #[test]
+fn a_mask_takes_exactly_its_white_half_and_grey_a_half_of_all() {
+    let work = flat(2, 33);
+    let was = 0.3;
+    let after = |json: &str| {
+        let mut edited = Edited::new(&work, &heights(&work, |_| was));
+        edited.make(json).unwrap();
+        assert!(edited.crack() < 1e-14);
+        let sum = edited.sum();
+        let all = work.grids.iter().zip(&sum).flat_map(|(g, r)| g.points.iter().zip(&r.vectors));
+        all.map(|(p, d)| (*p, d.z)).collect::<Vec<(DVec3, f64)>>()
+    };
+    // A pixel of the mask is as wide as 8 cells: its border, softened over one pixel, is at x = 1.
+    let mask = r#""image":"a.png","at":[1,1,0],"up":[0,1,0],"width":2"#;
+    for (outside, left) in [(false, 0.0), (true, was)] {
+        let json = format!(r#"{{"edit":"erase","region":{{{mask},"outside":{outside}}}}}"#);
+        for (p, z) in after(&json).into_iter().filter(|(p, _)| (p.y - 1.0).abs() < 0.3 && p.x > 0.2 && p.x < 1.8) {
+            let wanted = if p.x < 0.87 { left } else { was - left };
+            assert!(z == wanted || (0.87..1.13).contains(&p.x), "{p}: {z}");
+        }
+    }
+    let grey = r#""image":"grey.png","at":[1,1,0],"up":[0,1,0],"width":3"#;
+    assert!(
+        after(&format!(r#"{{"edit":"scale","factor":3,"region":{{{grey}}}}}"#)).iter().all(|(_, z)| *z == 2.0 * was)
+    );
+    // Keys are multiplied: half of what is inside the ball, on the named patch alone.
+    let both = after(&format!(r#"{{"edit":"erase","region":{{{grey},"radius":0.5,"patches":[0]}}}}"#));
+    for (p, z) in both {
+        let inside = p.distance(DVec3::new(1.0, 1.0, 0.0)) < 0.5 - 1e-9 && p.x < 1.0 && p.y < 1.0;
+        let seam = p.x == 1.0 || p.y == 1.0;
+        assert!((z - if inside { 0.5 * was } else { was }).abs() < 1e-15 || seam, "{p}: {z}");
+    }
+    // A stroke is let through by half, too.
+    let stroke = format!(r#"{{"edit":"stroke","path":[[1,1,0]],"radius":0.5,"height":0.1,"region":{{{grey}}}}}"#);
+    assert!(after(&stroke).iter().any(|(p, z)| p.x == 1.0 && p.y == 1.0 && (z - was - 0.05).abs() < 1e-12));
+}
+
+#[test]
+fn detail_goes_along_with_pairs_to_a_turned_and_a_scaled_copy_and_is_exact_there() {
+    let turn = glam::DMat3::from_rotation_z(0.8) * glam::DMat3::from_rotation_x(0.5);
+    let height = |p: DVec3| 0.03 * (6.0 * p.x).sin() * (5.0 * p.y).cos();
+    let shape = |p: DVec3| blob(p);
+    for scale in [1.0, 2.5] {
+        let (here, there) = (
+            cube(17, CurveKind::Smooth, shape),
+            cube(17, CurveKind::Smooth, |p| turn * shape(p) * scale + DVec3::new(4.0, 0.0, 1.0)),
+        );
+        let (a, b) = (surfaces(&here, 8), surfaces(&there, 8));
+        let from: Vec<Relief> = heights(&here, height);
+        let shapes = there.grids.iter().map(|g| [g.rows, g.cols]).collect();
+        let ground = Ground::new(&there.network, &b, shapes).unwrap();
+        let source = Displaced { network: &here.network, surfaces: &a, reliefs: &from };
+        let place = |p: u32, u: f64| layers::Place::Patch { patch: p, u, v: 0.4 };
+        let pairs: Vec<layers::PlacePair> =
+            (0..6).flat_map(|p| [0.3, 0.7].map(|u| layers::PlacePair { from: place(p, u), to: place(p, u) })).collect();
+        let warp = layers::warp(&ground, &source, &pairs, &Silent).unwrap();
+        assert!(warp.affine && warp.bent < 1e-9, "{}", warp.bent);
+        let (found, missed) = layers::transfer(&ground, &source, Some(&warp), 0.1, &Silent).unwrap();
+        assert_eq!(missed, 0);
+        // The base mesh has flat triangles: what is found between its vertices is off by their sag. Nodes inside are its vertices.
+        for (found, from) in found.iter().zip(&from) {
+            for k in (0..17 * 17).filter(|k| (1..16).contains(&(k % 17)) && (1..16).contains(&(k / 17))) {
+                assert!(found.vectors[k].distance(from.vectors[k] * scale) < 1e-6, "{k}: {}", found.vectors[k]);
+            }
+        }
+        let far = layers::PlacePair { from: layers::Place::Space([90.0, 0.0, 0.0]), to: pairs[0].to };
+        let told = |pair| layers::warp(&ground, &source, &[pairs.clone(), vec![pair]].concat(), &Silent).unwrap_err();
+        assert!(told(far).to_string().contains("pair 13, `from`: the place is"));
+        let none = layers::PlacePair { from: pairs[0].from, to: place(99, 0.5) };
+        assert!(told(none).to_string().contains("pair 13, `to`: there is no patch 99 among 6"));
+        let out = layers::PlacePair { from: pairs[0].from, to: place(0, 1.5) };
+        assert!(told(out).to_string().contains("from 0 to 1"));
+    }
+}
+
+/// Bricks of .25 x .12 with mortar, and a number of its own for the height of each.
+fn bricks(p: DVec3) -> f64 {
+    let row = (p.y / 0.12).floor();
+    let along = p.x / 0.25 + 0.5 * (row % 2.0);
+    let (s, t) = ((along - along.floor() - 0.5).abs() * 0.25, (p.y / 0.12 - row - 0.5).abs() * 0.12);
+    let high = 0.02 + 0.004 * (along.floor() * 5.3 + row * 2.1).sin();
+    if s > 0.11 || t > 0.045 { 0.0 } else { high }
+}
+
+#[test]
+fn a_constant_is_synthesised_as_a_constant_on_every_patch_of_a_sheet() {
+    let work = flat(3, 17);
+    let mut maps = heights(&work, |_| 0.0);
+    maps[0].vectors.fill(DVec3::new(0.0, 0.0, 0.25));
+    relief::agree(&work.network, &surfaces(&work, 4), &mut maps, relief::Agreement::First).unwrap();
+    let mut edited = Edited::new(&work, &maps);
+    edited.make(r#"{"edit":"synthesise","from":0,"to":[0,1,2,3,4,5,6,7,8]}"#).unwrap();
+    for d in edited.sum().iter().flat_map(|r| &r.vectors) {
+        assert!(d.distance(DVec3::new(0.0, 0.0, 0.25)) < 1e-12, "{d}");
+    }
+    assert!(edited.crack() < 1e-14);
+}
+
+#[test]
+fn synthesised_bricks_keep_their_heights_join_at_seams_and_come_again_with_the_seed() {
+    let work = flat(3, 65);
+    let reliefs = heights(&work, |p| if p.x <= 1.0 && p.y <= 1.0 { bricks(p) } else { 0.0 });
+    let run = |seed: u64, threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut edited = Edited::new(&work, &reliefs);
+            let json = format!(r#"{{"edit":"synthesise","from":0,"to":[1,2,3,4,5,6,7,8],"block":0.4,"seed":{seed}}}"#);
+            edited.make(&json).unwrap();
+            // Samples on both sides of every seam are one vector.
+            assert!(edited.crack() < 1e-14);
+            edited.sum()
+        })
+    };
+    let sum = run(1, 1);
+    assert_eq!(sum, run(1, 4), "any number of threads");
+    assert_ne!(sum, run(2, 4), "another seed");
+    assert_eq!(sum[0].vectors[33 * 65 + 20], reliefs[0].vectors[33 * 65 + 20], "the source stays");
+    let z = |p: usize| sum[p].vectors.iter().map(|d| d.z);
+    // As much mortar as in the source, about, and no height beyond it.
+    let mortar = |p: usize| z(p).filter(|z| *z < 0.008).count() as f64 / (65.0 * 65.0);
+    for p in 1..9 {
+        assert!(
+            z(p).all(|z| (-0.02..0.045).contains(&z)),
+            "patch {p}: {:?}",
+            z(p).fold([0.0f64; 2], |[a, b], z| [a.min(z), b.max(z)])
+        );
+        assert!((mortar(p) - mortar(0)).abs() < 0.1, "patch {p}: {} {}", mortar(p), mortar(0));
+    }
+    // At a seam the first column inside differs from the border about as much as columns inside differ from each other.
+    let step = |p: usize, a: usize, b: usize| {
+        (0..65).map(|j| (sum[p].vectors[j * 65 + a].z - sum[p].vectors[j * 65 + b].z).abs()).sum::<f64>() / 65.0
+    };
+    let usual = (1..64).map(|i| step(4, i, i + 1)).fold(0.0, f64::max);
+    assert!(step(4, 0, 1).max(step(5, 0, 1)) <= 1.5 * usual, "{} {} {usual}", step(4, 0, 1), step(5, 0, 1));
+}
+
+#[test]
 fn layers_come_back_in_every_order_of_undo_and_redo() {
     let work = flat(2, 9);
     let mut edited = Edited::new(&work, &heights(&work, |p| 0.1 * p.x));
@@ -254,12 +393,19 @@ fn edits_that_cannot_be_meant_tell_why() {
         (r#"{"edit":"stroke","path":[[0,0,0]],"radius":0,"height":1}"#, "radius above 0"),
         (r#"{"edit":"erase","region":{"patches":[1]}}"#, "no patch 1 among 1"),
         (r#"{"edit":"erase","region":{"at":[0,0,0]}}"#, "needs a radius"),
+        (r#"{"edit":"erase","region":{"image":"a.png"}}"#, "needs at, up and width"),
+        (r#"{"edit":"erase","region":{"width":1}}"#, "name the image"),
+        (r#"{"edit":"erase","region":{"image":"a.png","at":[0,0,0],"up":[0,0,1],"width":1}}"#, "along the normal"),
+        (r#"{"edit":"erase","region":{"image":"a.png","at":[0,0,0],"up":[0,1,0],"width":0}}"#, "a width above 0"),
         (r#"{"edit":"threshold","height":0}"#, "above 0"),
         (r#"{"edit":"split","wavelengths":[]}"#, "above 0"),
         (r#"{"edit":"scale","factor":2,"layer":"hair"}"#, "no layer \"hair\"; there are baked"),
         (r#"{"edit":"remove","layer":"baked"}"#, "only layer"),
         (r#"{"edit":"resample","texels":1}"#, "2 to 16384"),
         (r#"{"edit":"tile","from":0,"to":[4]}"#, "no patch 4"),
+        (r#"{"edit":"synthesise","from":0,"to":[4]}"#, "no patch 4"),
+        (r#"{"edit":"synthesise","from":0,"to":[]}"#, "patches to fill"),
+        (r#"{"edit":"synthesise","from":0,"to":[0],"block":9}"#, "blocks have sides from"),
         (r#"{"edit":"limit","share":2}"#, "at most 1"),
     ] {
         let told = edited.make(json).unwrap_err();
@@ -313,7 +459,7 @@ fn detail_goes_to_another_network_of_the_same_shape_by_closest_points() {
     let shapes = fine.grids.iter().map(|g| [g.rows, g.cols]).collect();
     let ground = Ground::new(&fine.network, &b, shapes).unwrap();
     let source = Displaced { network: &coarse.network, surfaces: &a, reliefs: &from };
-    let (found, missed) = layers::transfer(&ground, &source, 0.1, &Silent).unwrap();
+    let (found, missed) = layers::transfer(&ground, &source, None, 0.1, &Silent).unwrap();
     assert_eq!(missed, 0);
     let pairs = found.iter().flat_map(|r| &r.vectors).zip(to.iter().flat_map(|r| &r.vectors));
     let worst = pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);

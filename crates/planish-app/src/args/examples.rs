@@ -79,6 +79,7 @@ Examples:
 pub const RELIEF_TRANSFER: &str = "\
 Examples:
   planish relief transfer plain.planish detailed.planish -o both.planish
+  planish relief transfer bust.planish head.planish --points eyes.toml -o both.planish
   planish relief transfer part.planish --pairs 0:3,0:4 -o copied.planish";
 
 pub const EXPORT: &str = "\

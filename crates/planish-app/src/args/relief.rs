@@ -100,6 +100,8 @@ pub enum PresetWord {
     Renderman,
     /// Unreal Engine: heights in one PNG
     Unreal,
+    /// USD: heights along the normal, UDIM, EXR, with relief.usda
+    Usd,
     /// ZBrush: heights in one TIFF, upside down
     Zbrush,
 }
@@ -114,6 +116,7 @@ impl PresetWord {
             PresetWord::Mudbox => "mudbox",
             PresetWord::Renderman => "renderman",
             PresetWord::Unreal => "unreal",
+            PresetWord::Usd => "usd",
             PresetWord::Zbrush => "zbrush",
         }
     }
@@ -147,6 +150,9 @@ pub struct ReliefExport {
     /// Also write relief.mtlx, a MaterialX file that wires the maps
     #[arg(long)]
     pub materialx: bool,
+    /// Also write relief.usda, the base mesh in USD with a material that reads the maps
+    #[arg(long)]
+    pub usd: bool,
     #[command(flatten)]
     pub maps: StageOptions<MapParams>,
     #[command(flatten)]
@@ -280,9 +286,13 @@ pub struct ReliefTransfer {
     /// on 8 turned by a quarter
     #[arg(long, value_name = "PAIRS", value_parser = pair, value_delimiter = ',')]
     pub pairs: Vec<Pair>,
-    /// Take nothing over from further away than this: a length or a share of the diagonal
-    #[arg(long, value_name = "LENGTH|%", default_value = "2%", allow_negative_numbers = true)]
-    pub reach: Tolerance,
+    /// Places that belong together, for models of a similar, not equal shape: a TOML file with [[pair]] tables of `from` and `to`, or
+    /// a CSV file with x, y, z on FROM and x, y, z on MODEL in each line
+    #[arg(long, value_name = "PAIRS.toml|PAIRS.csv", conflicts_with = "pairs")]
+    pub points: Option<PathBuf>,
+    /// Take nothing over from further away than this: a length or a share of the diagonal [default: 2%, with --points 10%]
+    #[arg(long, value_name = "LENGTH|%", allow_negative_numbers = true)]
+    pub reach: Option<Tolerance>,
     #[command(flatten)]
     pub common: Common,
 }

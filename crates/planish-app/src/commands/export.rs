@@ -51,7 +51,8 @@ pub fn export(session: &Session, args: &Export) -> Result<Status, Failure> {
         ExportKind::Usd => {
             let mesh = named_mesh(&model, args.surface).map_err(unfit)?;
             let mesh = mesh.as_ref().map(|(name, mesh)| (*name, mesh));
-            let usd = UsdInput { surfaces: &model.surfaces, mesh, shift: model.shift, options: &options };
+            let usd =
+                UsdInput { surfaces: &model.surfaces, mesh, shift: model.shift, materials: &[], options: &options };
             planish_io::write_usd(staged.file_path(), &usd).map_err(wrong)
         }
         ExportKind::Mesh => match named_mesh(&model, args.surface).map_err(unfit)? {

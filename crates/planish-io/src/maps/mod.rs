@@ -10,7 +10,7 @@ mod wiring;
 
 pub use image::MapFile;
 pub use sidecar::{ImageEntry, PatchEntry, Sidecar};
-pub use wiring::materialx;
+pub use wiring::{materialx, usd_materials};
 
 use crate::{Place, ReadError, WriteError};
 use image::{Raster, Store};

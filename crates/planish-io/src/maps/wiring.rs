@@ -1,9 +1,44 @@
-//! A MaterialX document that wires displacement or normal maps (MaterialX 1.38: `displacement` takes a float along the normal,
+//! Materials of USD, and a MaterialX document, that wire displacement or normal maps (MaterialX 1.38: `displacement` takes a float along the normal,
 //! or a vector3 in tangent space `(T, B, N)`).
 
 use super::sidecar::Sidecar;
+use crate::{UsdMaterial, UsdTexture};
 use planish::relief::maps::{AxisOrder, MapFrame, MapKind, SheetKind};
 use std::fmt::Write;
+
+/// The materials of USD for the maps; `None` for maps that it has no input for: lengths, and vectors and normals in another frame or
+/// order than tangent, bitangent, normal of tangent space.
+pub fn usd_materials(sidecar: &Sidecar) -> Option<Vec<UsdMaterial>> {
+    let texture = match sidecar.params.kind {
+        MapKind::Scalar | MapKind::Height => UsdTexture::Height,
+        MapKind::Normal => UsdTexture::Normal,
+        MapKind::Vector => UsdTexture::Vector,
+        MapKind::Length => return None,
+    };
+    let in_tangent_space = sidecar.params.frame == MapFrame::Tangent && sidecar.params.order == AxisOrder::Tbn;
+    if texture != UsdTexture::Height && !in_tangent_space {
+        return None;
+    }
+    let (scale, bias) = (sidecar.scale, -sidecar.mid_level * sidecar.scale);
+    let material = |name: &str, file: &str, patches: Vec<usize>| UsdMaterial {
+        name: name.into(),
+        patches,
+        file: file.into(),
+        texture,
+        scale,
+        bias: if bias == 0.0 { 0.0 } else { bias },
+    };
+    if sidecar.params.sheets == SheetKind::Udim {
+        let file = sidecar.images.first()?.file.replace(".1001.", ".<UDIM>.");
+        return Some(vec![material("relief", &file, (0..sidecar.patches.len()).collect())]);
+    }
+    let one = |(k, image): (usize, &super::ImageEntry)| {
+        let name = image.file.rsplit_once('.').map_or(image.file.as_str(), |(stem, _)| stem);
+        let patches = sidecar.patches.iter().enumerate().filter(|(_, p)| p.image == k).map(|(p, _)| p).collect();
+        material(name, &image.file, patches)
+    };
+    Some(sidecar.images.iter().enumerate().map(one).collect())
+}
 
 /// The document; `None` for maps that MaterialX has no node for: vectors in object space or of another order.
 pub fn materialx(sidecar: &Sidecar) -> Option<String> {

@@ -73,7 +73,8 @@ fn write(model: &Model, format: Format, name: &str, report: &Report, observer: &
         Format::Usd => {
             let mesh = mesh()?;
             let mesh = Some(("displaced", &mesh));
-            let usd = UsdInput { surfaces: &model.surfaces, mesh, shift: model.shift, options: &options };
+            let usd =
+                UsdInput { surfaces: &model.surfaces, mesh, shift: model.shift, materials: &[], options: &options };
             planish_io::write_usd(&path, &usd).map_err(|e| told(&e))?;
         }
         Format::Glb => planish_io::write_patches(&path, &mesh()?, &options).map_err(|e| told(&e))?,

@@ -15,16 +15,19 @@ use planish::pipeline::{Figure, Warning};
 use planish::relief::Displaced;
 use planish::relief::maps::{self, MapKind, MapParams, PatchMap, Preset, Sheet, SheetKind};
 use planish_io::maps::{
-    MapFile, MapOptions, as_read, in_one_png, largest_error, materialx, other_ways, read_maps, write_maps,
+    MapFile, MapOptions, Sidecar, as_read, in_one_png, largest_error, materialx, other_ways, read_maps, usd_materials,
+    write_maps,
 };
 use planish_io::report::{Report, count, number};
-use planish_io::{MappedMesh, WriteOptions};
+use planish_io::{MappedMesh, UsdInput, WriteOptions};
 use std::path::Path;
 
 /// The base mesh beside the maps.
 const BASE: &str = "base.obj";
 /// The wiring beside the maps.
 const WIRING: &str = "relief.mtlx";
+/// The base mesh with a material that reads the maps.
+const SCENE: &str = "relief.usda";
 
 pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
@@ -55,7 +58,8 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         Failure::usage("--tile", what).hint("raise it, or lower --texels")
     })?;
     let attributes = if args.attributes { attributes(&model, &shapes, &args.model)? } else { Vec::new() };
-    let companions = [(args.base, BASE), (args.materialx, WIRING)];
+    let is_usd = args.usd || preset.is_some_and(|p| p.name == "usd");
+    let companions = [(args.base, BASE), (args.materialx, WIRING), (is_usd, SCENE)];
     let options = MapOptions {
         params: params.clone(),
         file,
@@ -70,7 +74,12 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
     let (sidecar, write) = session
         .step("write", || write_maps(&folder, &made, &attributes, &sheet, &model.surfaces, &options).map_err(failed))?;
     if args.base {
-        base(&model, &params, &sheet, &folder.join(BASE), args)?;
+        let mesh = base(&model, &params, &sheet, args)?;
+        let options = WriteOptions { units: model.units, name: "base".into(), ..WriteOptions::default() };
+        placed::write_patches(&folder.join(BASE), mesh, model.shift, &options).map_err(failed)?;
+    }
+    if is_usd {
+        scene(&model, base(&model, &params, &sheet, args)?, &sidecar, &folder.join(SCENE), args)?;
     }
     if args.materialx {
         match materialx(&sidecar) {
@@ -160,18 +169,42 @@ fn attributes(model: &Model, shapes: &[[usize; 2]], path: &Path) -> Result<Vec<(
     Ok(all)
 }
 
-/// Writes the base mesh with a vertex for each texel.
-fn base(model: &Model, params: &MapParams, sheet: &Sheet, path: &Path, args: &ReliefExport) -> Result<(), Failure> {
+/// The base mesh with a vertex for each texel.
+fn base(model: &Model, params: &MapParams, sheet: &Sheet, args: &ReliefExport) -> Result<MappedMesh, Failure> {
     let (patched, normals) =
         maps::base_mesh(&displaced(model), params, &Interrupt).map_err(|e| wrong(&args.model, e))?;
     let nodes = |(p, n): (usize, &planish::relief::PatchNodes)| {
         (0..n.rows * n.cols).map(|k| sheet.uv(p, k % n.cols, k / n.cols)).collect::<Vec<[f32; 2]>>()
     };
     let uvs = patched.patches.iter().enumerate().map(nodes).collect();
-    let options = WriteOptions { units: model.units, name: "base".into(), ..WriteOptions::default() };
-    placed::write_patches(path, MappedMesh { patched, uvs, normals }, model.shift, &options)
-        .map(drop)
-        .map_err(|e| write_failure(&args.model, &args.output, e))
+    Ok(MappedMesh { patched, uvs, normals })
+}
+
+/// Writes the base mesh with materials that read the maps.
+fn scene(
+    model: &Model,
+    mut mesh: MappedMesh,
+    sidecar: &Sidecar,
+    path: &Path,
+    args: &ReliefExport,
+) -> Result<(), Failure> {
+    let materials = usd_materials(sidecar).ok_or_else(|| {
+        let what = "wires scalars, heights, and vectors and normals in tangent space in the order tbn";
+        Failure::usage("--usd", what).hint("add --frame tangent --order tbn, or take --kind scalar")
+    })?;
+    if sidecar.upside_down {
+        // Within their tile: what its first row holds is below there.
+        mesh.uvs.iter_mut().flatten().for_each(|uv| uv[1] = 2.0 * uv[1].floor() + 1.0 - uv[1]);
+    }
+    let options = WriteOptions { units: model.units, name: "relief".into(), ..WriteOptions::default() };
+    let input = UsdInput {
+        surfaces: &[],
+        mesh: Some(("base", &mesh)),
+        shift: model.shift,
+        materials: &materials,
+        options: &options,
+    };
+    planish_io::write_usd(path, &input).map_err(|e| write_failure(&args.model, &args.output, e))
 }
 
 /// What the files hold.

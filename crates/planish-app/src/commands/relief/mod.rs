@@ -4,6 +4,7 @@ mod deform;
 mod edit;
 mod export;
 mod import;
+mod points;
 mod refit;
 mod transfer;
 

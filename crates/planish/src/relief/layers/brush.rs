@@ -2,8 +2,10 @@
 
 use super::super::Relief;
 use super::ground::{Ground, Place};
-use super::region::fade;
-use glam::{DVec2, DVec3};
+use super::projection::{Picture, Projection, Spot};
+use super::region::{Region, fade};
+use crate::relief::ReliefError;
+use glam::DVec3;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,6 +23,9 @@ pub struct Stroke {
     /// Share of the radius over which it fades: 1 is soft, 0 has an upright border.
     #[serde(default = "soft")]
     pub softness: f64,
+    /// Only here.
+    #[serde(default)]
+    pub region: Region,
 }
 
 fn soft() -> f64 {
@@ -47,34 +52,9 @@ pub struct Stamp {
     /// What is there gives way to the stamp where its alpha is 1; else it is added.
     #[serde(default)]
     pub replace: bool,
-}
-
-/// An image to stamp with.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Picture {
-    /// Pixels across.
-    pub width: usize,
-    /// Pixels from top to bottom.
-    pub height: usize,
-    /// Grey and alpha of each pixel, 0 to 1, from the upper left.
-    pub pixels: Vec<[f32; 2]>,
-}
-
-impl Picture {
-    /// Grey and alpha at `(x, y)` in pixels from the upper left corner, bilinear; transparent outside.
-    fn at(&self, x: f64, y: f64) -> [f64; 2] {
-        let (x, y) = (x - 0.5, y - 0.5);
-        let (i, j) = (x.floor(), y.floor());
-        let (s, t) = (x - i, y - j);
-        let pixel = |di: f64, dj: f64| {
-            let (i, j) = (i + di, j + dj);
-            let inside = i >= 0.0 && j >= 0.0 && i < self.width as f64 && j < self.height as f64;
-            let [g, a] = if inside { self.pixels[j as usize * self.width + i as usize] } else { [0.0, 0.0] };
-            DVec2::new(g as f64, a as f64)
-        };
-        let low = pixel(0.0, 0.0).lerp(pixel(1.0, 0.0), s);
-        low.lerp(pixel(0.0, 1.0).lerp(pixel(1.0, 1.0), s), t).to_array()
-    }
+    /// Only here.
+    #[serde(default)]
+    pub region: Region,
 }
 
 /// Heights of some nodes of the patches as a layer on which both sides of seams agree.
@@ -103,13 +83,15 @@ fn comes_near(ground: &Ground, patch: usize, points: &[DVec3], reach: f64) -> bo
 impl Stroke {
     /// The layer; patches that it does not touch have no vectors.
     /// # Errors
-    /// What is wrong with it.
-    pub fn layer(&self, ground: &Ground) -> Result<Vec<Relief>, String> {
+    /// [`ReliefError::Edit`]: what is wrong with it.
+    pub fn layer(&self, ground: &Ground) -> Result<Vec<Relief>, ReliefError> {
+        let refused = |words: &str| ReliefError::Edit { what: words.into() };
         if !(self.radius > 0.0 && self.radius.is_finite() && self.height.is_finite()) {
-            return Err("a stroke needs a radius above 0 and a height".into());
+            return Err(refused("a stroke needs a radius above 0 and a height"));
         }
         let path: Option<Vec<(DVec3, DVec3)>> = self.path.iter().map(|place| ground.locate(place)).collect();
-        let path = path.filter(|p| !p.is_empty()).ok_or("a stroke needs places on patches that are there")?;
+        let path =
+            path.filter(|p| !p.is_empty()).ok_or_else(|| refused("a stroke needs places on patches that are there"))?;
         let points: Vec<DVec3> = path.iter().map(|(p, _)| *p).collect();
         let height = |p: usize, k: usize| {
             let (at, frame) = &ground.nodes[p][k];
@@ -139,39 +121,23 @@ fn nearest(path: &[(DVec3, DVec3)], at: DVec3) -> (f64, DVec3) {
 }
 
 impl Stamp {
-    /// The layer, or what is wrong.
+    /// The layer.
     /// * `now` - the relief that gives way, where it does
-    pub(super) fn layer(&self, ground: &Ground, picture: &Picture, now: &[Relief]) -> Result<Vec<Relief>, String> {
-        if !(self.width > 0.0 && self.width.is_finite() && self.height.is_finite()) {
-            return Err("a stamp needs a width above 0 and a height".into());
+    /// # Errors
+    /// [`ReliefError::Edit`]: what is wrong with it.
+    pub(super) fn layer(&self, ground: &Ground, picture: Picture, now: &[Relief]) -> Result<Vec<Relief>, ReliefError> {
+        if !self.height.is_finite() {
+            return Err(ReliefError::Edit { what: "a stamp needs a height".into() });
         }
-        if picture.width == 0 || picture.pixels.len() != picture.width * picture.height {
-            return Err("the image of the stamp is empty".into());
-        }
-        let (middle, normal) = ground.locate(&self.at).ok_or("the place of the stamp is on no patch")?;
-        let up = DVec3::from(self.up);
-        let up =
-            (up - normal * normal.dot(up)).try_normalize().ok_or("the stamp's up is along the normal; give another")?;
-        let right = up.cross(normal);
-        let pixel = self.width / picture.width as f64;
-        let depth = self.depth.unwrap_or(self.width / 2.0);
-        let value = |p: usize, k: usize| {
-            let (at, frame) = &ground.nodes[p][k];
-            let d = *at - middle;
-            if d.dot(normal).abs() > depth || frame.normal.dot(normal) <= 0.0 {
-                return [0.0, 0.0];
-            }
-            let x = d.dot(right) / pixel + picture.width as f64 / 2.0;
-            let y = picture.height as f64 / 2.0 - d.dot(up) / pixel;
-            picture.at(x, y)
-        };
-        let tall = pixel * picture.height as f64;
-        let reach = (self.width.hypot(tall) / 2.0).max(depth);
-        let near = |p: usize| comes_near(ground, p, &[middle], reach);
-        let mut maps = raised(ground, near, |p, k| value(p, k)[0] * value(p, k)[1] * self.height);
+        let spot = Spot { what: "stamp", at: &self.at, up: self.up, width: self.width, depth: self.depth };
+        let image = Projection::new(ground, picture, &spot)?;
+        let reach = image.reach();
+        let near = |p: usize| comes_near(ground, p, &[image.middle], reach);
+        let height = |p: usize, k: usize| image.at(&ground.nodes[p][k]).into_iter().product::<f64>() * self.height;
+        let mut maps = raised(ground, near, height);
         if self.replace {
             for (p, map) in maps.iter_mut().enumerate().filter(|(p, _)| near(*p)) {
-                let alphas: Vec<f64> = (0..ground.nodes[p].len()).map(|k| value(p, k)[1]).collect();
+                let alphas: Vec<f64> = ground.nodes[p].iter().map(|node| image.at(node)[1]).collect();
                 if alphas.iter().any(|&a| a > 0.0) && map.vectors.is_empty() {
                     map.vectors = vec![DVec3::ZERO; map.rows * map.cols];
                 }

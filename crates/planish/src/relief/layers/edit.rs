@@ -3,9 +3,11 @@
 use super::super::resample::{from_world, world_vectors};
 use super::super::{Displaced, Relief, ReliefError, resample_all};
 use super::bands;
-use super::brush::{Picture, Stamp, Stroke};
+use super::brush::{Stamp, Stroke};
 use super::filter::Filter;
 use super::ground::Ground;
+use super::projection::Pictures;
+use super::quilt::{self, Synthesise};
 use super::region::Region;
 use super::transfer;
 use super::{Layer, Layers};
@@ -39,6 +41,8 @@ pub enum ReliefEdit {
     Erase(Erase),
     /// Repeats the relief of one patch on others.
     Tile(Tile),
+    /// Grows more of the relief of one patch on others, without repeats.
+    Synthesise(Synthesise),
     /// Keeps displacements within the focal radius of the surface.
     Limit(Limit),
     /// Gives the maps other numbers of texels.
@@ -123,6 +127,9 @@ pub struct Tile {
     /// Repeats along `u` and along `v`, every second one mirrored.
     #[serde(default = "once")]
     pub times: [u32; 2],
+    /// Only here.
+    #[serde(default)]
+    pub region: Region,
 }
 
 fn once() -> [u32; 2] {
@@ -175,7 +182,7 @@ pub(crate) fn refused(what: impl Into<String>) -> ReliefError {
 
 /// Makes an edit: adds its maps to the pool of `layers` and returns the new stack, for [`Layers::record`].
 ///
-/// * `picture` - gives the image of a stamp
+/// * `pictures` - gives the image of a stamp or of a mask
 ///
 /// # Errors
 /// [`ReliefError::Edit`] for what cannot be meant; those of the parts; [`ReliefError::Cancelled`].
@@ -183,7 +190,7 @@ pub fn edit(
     layers: &mut Layers,
     (network, surfaces): (&Network, &[Surface]),
     edit: &ReliefEdit,
-    picture: &dyn Fn(&str) -> Result<Picture, String>,
+    pictures: &Pictures,
     observer: &dyn Observer,
 ) -> Result<Layered, ReliefError> {
     let total = layers.sum().ok_or_else(|| refused("the model has no relief; fit it first"))?;
@@ -220,7 +227,7 @@ pub fn edit(
         other => {
             let shapes = total.iter().map(|r| [r.rows, r.cols]).collect();
             let ground = Ground::new(network, surfaces, shapes)?;
-            let (maps, told) = layer_of(other, &ground, &now, picture, observer)?;
+            let (maps, told) = layer_of(other, &ground, &now, pictures, observer)?;
             let name = fresh(&layers.stack, word(other));
             let mut stack = layers.stack.clone();
             stack.push(layers.added(&name, false, maps));
@@ -240,6 +247,7 @@ fn word(edit: &ReliefEdit) -> &'static str {
         ReliefEdit::Stamp(_) => "stamp",
         ReliefEdit::Erase(_) => "erase",
         ReliefEdit::Tile(_) => "tile",
+        ReliefEdit::Synthesise(_) => "synthesise",
         ReliefEdit::Limit(_) => "limit",
         ReliefEdit::Resample(_) => "resample",
         ReliefEdit::Remove(_) => "remove",
@@ -338,37 +346,46 @@ fn layer_of(
     edit: &ReliefEdit,
     ground: &Ground,
     now: &Displaced,
-    picture: &dyn Fn(&str) -> Result<Picture, String>,
+    pictures: &Pictures,
     observer: &dyn Observer,
 ) -> Result<Made, ReliefError> {
     let plain = |maps: Vec<Relief>| Ok((maps, Vec::new()));
+    let weakened = |mut maps: Vec<Relief>, region: &Region| {
+        region.weaken(ground, pictures, &mut maps)?;
+        Ok((maps, Vec::new()))
+    };
+    // What changes what is there, where the region lets it.
+    let within = |region: &Region, change: &(dyn Fn(usize, usize, DVec3) -> DVec3 + Sync)| {
+        within(ground, &region.shares(ground, pictures)?, now.reliefs, change)
+    };
     match edit {
-        ReliefEdit::Stroke(stroke) => plain(stroke.layer(ground).map_err(refused)?),
+        ReliefEdit::Stroke(stroke) => weakened(stroke.layer(ground)?, &stroke.region),
         ReliefEdit::Stamp(stamp) => {
-            let image = picture(&stamp.image).map_err(refused)?;
-            plain(stamp.layer(ground, &image, now.reliefs).map_err(refused)?)
+            let image = pictures(&stamp.image).map_err(refused)?;
+            weakened(stamp.layer(ground, image, now.reliefs)?, &stamp.region)
         }
         ReliefEdit::Blur(Blur { radius, region }) => {
             let soft = blurred(now, *radius, observer)?;
-            plain(within(ground, region, now.reliefs, |p, k, d| soft[p].vectors[k] - d)?)
+            plain(within(region, &|p, k, d| soft[p].vectors[k] - d)?)
         }
         ReliefEdit::Sharpen(Sharpen { radius, amount, region }) => {
             let soft = blurred(now, *radius, observer)?;
-            plain(within(ground, region, now.reliefs, |p, k, d| (d - soft[p].vectors[k]) * *amount)?)
+            plain(within(region, &|p, k, d| (d - soft[p].vectors[k]) * *amount)?)
         }
         ReliefEdit::Threshold(Threshold { height, region }) => {
             if !(*height > 0.0) {
                 return Err(refused("a threshold needs a height above 0"));
             }
-            let low = |_, _, d: DVec3| if d.length() < *height { -d } else { DVec3::ZERO };
-            plain(within(ground, region, now.reliefs, low)?)
+            let low = |_: usize, _: usize, d: DVec3| if d.length() < *height { -d } else { DVec3::ZERO };
+            plain(within(region, &low)?)
         }
-        ReliefEdit::Erase(Erase { region }) => plain(within(ground, region, now.reliefs, |_, _, d| -d)?),
+        ReliefEdit::Erase(Erase { region }) => plain(within(region, &|_, _, d| -d)?),
         ReliefEdit::Scale(Scale { factor, region, .. }) => {
             let region = region.clone().unwrap_or_default();
-            plain(within(ground, &region, now.reliefs, |_, _, d| d * (factor - 1.0))?)
+            plain(within(&region, &|_, _, d| d * (factor - 1.0))?)
         }
-        ReliefEdit::Tile(t) => plain(tiled(ground, now.reliefs, t)?),
+        ReliefEdit::Tile(t) => weakened(tiled(ground, now.reliefs, t)?, &t.region),
+        ReliefEdit::Synthesise(s) => weakened(quilt::synthesised(ground, now.reliefs, s, observer)?, &s.region),
         ReliefEdit::Limit(limit) => limited(ground, now, limit),
         _ => Err(refused("this edit makes no layer")),
     }
@@ -386,19 +403,15 @@ fn blurred(now: &Displaced, radius: f64, observer: &dyn Observer) -> Result<Vec<
     Ok(surfaces.par_iter().zip(shapes).zip(soft).map(|((s, shape), d)| from_world(s, shape, d)).collect())
 }
 
-/// A change of every node, weakened by the region.
+/// A change of every node, by its share.
 fn within(
     ground: &Ground,
-    region: &Region,
+    shares: &[Option<Vec<f64>>],
     now: &[Relief],
-    change: impl Fn(usize, usize, DVec3) -> DVec3 + Sync,
+    change: &(dyn Fn(usize, usize, DVec3) -> DVec3 + Sync),
 ) -> Result<Vec<Relief>, ReliefError> {
-    if let Some(fault) = region.fault(ground) {
-        return Err(refused(fault));
-    }
     let mut maps = ground.nothing();
-    let shares = region.shares(ground);
-    maps.par_iter_mut().zip(&shares).enumerate().for_each(|(p, (map, shares))| {
+    maps.par_iter_mut().zip(shares).enumerate().for_each(|(p, (map, shares))| {
         let Some(shares) = shares else { return };
         let one = |(k, (d, share)): (usize, (&DVec3, &f64))| {
             if *share > 0.0 { change(p, k, *d) * *share } else { DVec3::ZERO }

@@ -28,6 +28,9 @@ pub enum Place {
     },
 }
 
+/// A node: its place on the surface and its frame.
+pub(super) type Texel = (DVec3, Frame);
+
 /// What edits stand on.
 pub struct Ground<'a> {
     /// The network.
@@ -37,7 +40,7 @@ pub struct Ground<'a> {
     /// Nodes of each patch along `v` and along `u`.
     pub shapes: Vec<[usize; 2]>,
     /// For each patch and node its place on the surface and its frame.
-    pub(super) nodes: Vec<Vec<(DVec3, Frame)>>,
+    pub(super) nodes: Vec<Vec<Texel>>,
     pub(super) boxes: Vec<Aabb>,
     seams: Vec<Vec<Member>>,
 }
@@ -134,6 +137,11 @@ impl<'a> Ground<'a> {
                 maps[p].vectors[n] = self.nodes[p][n].1.local_from_world(one);
             }
         }
+    }
+
+    /// The places that more than one node has, each with its nodes.
+    pub(super) fn seams(&self) -> &[Vec<Member>] {
+        &self.seams
     }
 
     /// Maps without any displacement.

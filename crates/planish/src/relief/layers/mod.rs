@@ -2,8 +2,9 @@
 //!
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §7.3 and 7.6: scaling, painting, thresholds,
 //! compositing with an image, transfer.
-//! 1. places and normals of all texels - `ground`      2. where an edit applies - `region`      3. strokes, stamps - `brush`
-//! 4. wavelengths - `filter`, `bands`      5. the edits - `edit`      6. from other patches and models - `transfer`
+//! 1. places and normals of all texels - `ground`      2. where an edit applies - `region`, `projection`
+//! 3. strokes, stamps - `brush`      4. wavelengths - `filter`, `bands`      5. the edits - `edit`
+//! 6. from other patches and models - `transfer`, `warp`      7. more of a patch without repeats - `quilt`
 //!
 //! Departs from [K98]: edits do not change the image but lie above it, so each can be weakened or taken back; seams are
 //! crossed, since distances are taken in space and both sides agree.
@@ -13,18 +14,24 @@ mod brush;
 mod edit;
 mod filter;
 mod ground;
+mod projection;
+mod quilt;
 mod region;
 mod transfer;
+mod warp;
 
 pub use bands::{Band, split};
-pub use brush::{Picture, Stamp, Stroke};
+pub use brush::{Stamp, Stroke};
 pub use edit::{
     Blur, Erase, Layered, Limit, ReliefEdit, Remove, Resample, Scale, Sharpen, Split, Threshold, Tile, edit,
 };
 pub use filter::Filter;
 pub use ground::{Ground, Place};
+pub use projection::{Picture, Pictures};
+pub use quilt::Synthesise;
 pub use region::Region;
 pub use transfer::{paste, tile, transfer};
+pub use warp::{PlacePair, Warp, warp};
 
 use super::Relief;
 use serde::{Deserialize, Serialize};

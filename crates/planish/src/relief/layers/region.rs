@@ -1,55 +1,112 @@
-//! Where an edit applies: patches, a ball in space, a soft border.
+//! Where an edit applies: patches, a ball in space with a soft border, an image as a mask.
 
-use super::ground::{Ground, Place};
+use super::super::{Relief, ReliefError};
+use super::ground::{Ground, Place, Texel};
+use super::projection::{Pictures, Projection, Spot};
+use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A part of the surface.
+/// A part of the surface: what all of its keys name together.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Region {
     /// Only these patches; all if none are named.
     pub patches: Vec<u32>,
-    /// Middle of a ball.
+    /// Middle of a ball, and of the image.
     pub at: Option<Place>,
-    /// Radius of the ball, units of the model.
+    /// Radius of the ball, units of the model; 0 beside an image for no ball.
     pub radius: f64,
     /// Width of the soft border inside the ball, units of the model.
     pub feather: f64,
+    /// File of an image beside the script, laid on the surface as that of a stamp: white, times alpha, is in the region, black
+    /// is not, and grey is in it by its share.
+    pub image: Option<String>,
+    /// Direction that is up in the image, as it appears seen along the normal.
+    pub up: Option<[f64; 3]>,
+    /// Width of the image on the surface, units of the model.
+    pub width: Option<f64>,
+    /// How far above and below its middle the image reaches, units of the model [default: half the width].
+    pub depth: Option<f64>,
     /// All that is not in it.
     pub outside: bool,
 }
 
+/// A region whose place and image were found.
+struct Found {
+    ball: Option<DVec3>,
+    mask: Option<Projection>,
+}
+
 impl Region {
-    /// What cannot be meant.
-    pub(super) fn fault(&self, ground: &Ground) -> Option<String> {
+    /// # Errors
+    /// [`ReliefError::Edit`] for what cannot be meant.
+    fn found(&self, ground: &Ground, pictures: &Pictures) -> Result<Found, ReliefError> {
+        let refused = |what: String| Err(ReliefError::Edit { what });
         if let Some(p) = self.patches.iter().find(|&&p| p as usize >= ground.shapes.len()) {
-            return Some(format!("there is no patch {p} among {}", ground.shapes.len()));
+            return refused(format!("there is no patch {p} among {}", ground.shapes.len()));
         }
-        match &self.at {
-            Some(_) if !(self.radius > 0.0) => Some("a region around a place needs a radius above 0".into()),
-            Some(place) if ground.locate(place).is_none() => Some("the place of the region is on no patch".into()),
-            _ if !(self.feather >= 0.0) => Some("the feather is a width of 0 or more".into()),
-            _ => None,
+        if !(self.feather >= 0.0) {
+            return refused("the feather is a width of 0 or more".into());
+        }
+        let mask = match (&self.image, &self.at, self.up, self.width) {
+            (Some(name), Some(at), Some(up), Some(width)) => {
+                let picture = pictures(name).map_err(|what| ReliefError::Edit { what })?;
+                let spot = Spot { what: "image of the region", at, up, width, depth: self.depth };
+                Some(Projection::new(ground, picture, &spot)?)
+            }
+            (Some(_), ..) => return refused("a region with an image needs at, up and width".into()),
+            (None, _, None, None) if self.depth.is_none() => None,
+            _ => return refused("up, width and depth of a region are those of its image; name the image".into()),
+        };
+        let is_ball = self.at.is_some() && (mask.is_none() || self.radius != 0.0);
+        if is_ball && !(self.radius > 0.0) {
+            return refused("a region around a place needs a radius above 0".into());
+        }
+        let place = self.at.as_ref().map(|place| ground.locate(place));
+        match place {
+            Some(None) => refused("the place of the region is on no patch".into()),
+            Some(Some((middle, _))) if is_ball => Ok(Found { ball: Some(middle), mask }),
+            _ => Ok(Found { ball: None, mask }),
         }
     }
 
     /// The shares of all nodes of the patches, from 0 to 1; `None` where a patch is left out altogether.
-    pub(super) fn shares(&self, ground: &Ground) -> Vec<Option<Vec<f64>>> {
-        let ball = self.at.as_ref().and_then(|place| ground.locate(place)).map(|(p, _)| p);
+    /// * `pictures` - gives the image of a mask
+    /// # Errors
+    /// [`ReliefError::Edit`] for what cannot be meant.
+    pub(super) fn shares(&self, ground: &Ground, pictures: &Pictures) -> Result<Vec<Option<Vec<f64>>>, ReliefError> {
+        let Found { ball, mask } = self.found(ground, pictures)?;
         let share = |p: usize| {
             let named = self.patches.is_empty() || self.patches.contains(&(p as u32));
-            if ball.is_none() && named == self.outside {
-                return None;
-            }
-            let inside = ground.nodes[p].iter().map(|(at, _)| {
-                let near = ball.map_or(1.0, |middle| fade(self.radius - at.distance(middle), self.feather));
-                if named { near } else { 0.0 }
-            });
-            let shares: Vec<f64> = inside.map(|x| if self.outside { 1.0 - x } else { x }).collect();
+            let inside = |node: &Texel| {
+                let near = ball.map_or(1.0, |middle| fade(self.radius - node.0.distance(middle), self.feather));
+                let shown =
+                    mask.as_ref().map_or(1.0, |mask| mask.at(node).into_iter().product::<f64>().clamp(0.0, 1.0));
+                let within = if named { near * shown } else { 0.0 };
+                if self.outside { 1.0 - within } else { within }
+            };
+            let shares: Vec<f64> = ground.nodes[p].iter().map(inside).collect();
             shares.iter().any(|&x| x > 0.0).then_some(shares)
         };
-        (0..ground.shapes.len()).map(share).collect()
+        Ok((0..ground.shapes.len()).map(share).collect())
+    }
+
+    /// What a layer is inside the region: each displacement times its share.
+    /// # Errors
+    /// As [`Region::shares`].
+    pub(super) fn weaken(&self, ground: &Ground, pictures: &Pictures, maps: &mut [Relief]) -> Result<(), ReliefError> {
+        if *self == Region::default() {
+            return Ok(());
+        }
+        for (map, shares) in maps.iter_mut().zip(self.shares(ground, pictures)?) {
+            match shares {
+                Some(shares) => map.vectors.iter_mut().zip(shares).for_each(|(d, share)| *d *= share),
+                None => map.vectors.clear(),
+            }
+        }
+        ground.agree(maps);
+        Ok(())
     }
 }
 

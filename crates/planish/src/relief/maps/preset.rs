@@ -25,7 +25,7 @@ pub struct Preset {
 
 /// The programs, in the order of their names. Channel orders and settings are those of the programs' manuals, but for
 /// glTF, Unreal and ZBrush (common use); Blender's was measured by a bake.
-pub const PRESETS: [Preset; 7] = [
+pub const PRESETS: [Preset; 8] = [
     Preset {
         name: "arnold",
         kind: MapKind::Vector,
@@ -87,6 +87,16 @@ pub const PRESETS: [Preset; 7] = [
         sheets: SheetKind::Atlas,
         upside_down: false,
         wiring: "linear (not sRGB) texture; displacement centre 0.5, magnitude the scale of this file in centimetres",
+    },
+    Preset {
+        name: "usd",
+        kind: MapKind::Scalar,
+        frame: MapFrame::Surface,
+        order: AxisOrder::Tbn,
+        file: "exr",
+        sheets: SheetKind::Udim,
+        upside_down: false,
+        wiring: "relief.usda: UsdPreviewSurface displacement by UsdUVTexture, raw, on the base mesh",
     },
     Preset {
         name: "zbrush",

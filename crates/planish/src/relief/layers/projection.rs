@@ -1,0 +1,106 @@
+//! An image laid on the surface along the normal of a place: what stamps and masks see of it.
+
+use super::ground::{Ground, Place, Texel};
+use crate::relief::ReliefError;
+use glam::{DVec2, DVec3};
+
+/// An image to stamp or to mask with.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Picture {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels from top to bottom.
+    pub height: usize,
+    /// Grey and alpha of each pixel, 0 to 1, from the upper left.
+    pub pixels: Vec<[f32; 2]>,
+}
+
+/// Gives the image of a name, or why there is none.
+pub type Pictures<'a> = dyn Fn(&str) -> Result<Picture, String> + 'a;
+
+impl Picture {
+    /// Grey and alpha at `(x, y)` in pixels from the upper left corner, bilinear; transparent outside.
+    fn at(&self, x: f64, y: f64) -> [f64; 2] {
+        let (x, y) = (x - 0.5, y - 0.5);
+        let (i, j) = (x.floor(), y.floor());
+        let (s, t) = (x - i, y - j);
+        let pixel = |di: f64, dj: f64| {
+            let (i, j) = (i + di, j + dj);
+            let inside = i >= 0.0 && j >= 0.0 && i < self.width as f64 && j < self.height as f64;
+            let [g, a] = if inside { self.pixels[j as usize * self.width + i as usize] } else { [0.0, 0.0] };
+            DVec2::new(g as f64, a as f64)
+        };
+        let low = pixel(0.0, 0.0).lerp(pixel(1.0, 0.0), s);
+        low.lerp(pixel(0.0, 1.0).lerp(pixel(1.0, 1.0), s), t).to_array()
+    }
+}
+
+/// Where an image lies.
+pub(super) struct Spot<'a> {
+    /// What is laid there, for messages: "stamp".
+    pub what: &'a str,
+    /// Its middle.
+    pub at: &'a Place,
+    /// Direction that is up in the image.
+    pub up: [f64; 3],
+    /// Width, units of the model.
+    pub width: f64,
+    /// How far above and below the middle it reaches; half the width unless given.
+    pub depth: Option<f64>,
+}
+
+/// An image in its place.
+pub(super) struct Projection {
+    picture: Picture,
+    /// Its middle on the surface.
+    pub middle: DVec3,
+    normal: DVec3,
+    right: DVec3,
+    up: DVec3,
+    /// Side of a pixel, units of the model.
+    pixel: f64,
+    depth: f64,
+}
+
+impl Projection {
+    /// # Errors
+    /// [`ReliefError::Edit`]: what is wrong with the place or the image.
+    pub fn new(ground: &Ground, picture: Picture, spot: &Spot) -> Result<Projection, ReliefError> {
+        let what = spot.what;
+        let refused = |words: &str| ReliefError::Edit { what: words.replace("{}", what) };
+        if !(spot.width > 0.0 && spot.width.is_finite()) {
+            return Err(refused("the {} needs a width above 0"));
+        }
+        if picture.width == 0 || picture.pixels.len() != picture.width * picture.height {
+            return Err(refused("the image of the {} is empty"));
+        }
+        let depth = spot.depth.unwrap_or(spot.width / 2.0);
+        if !(depth > 0.0) {
+            return Err(refused("the {} needs a depth above 0"));
+        }
+        let (middle, normal) = ground.locate(spot.at).ok_or_else(|| refused("the place of the {} is on no patch"))?;
+        let up = DVec3::from(spot.up);
+        let up = (up - normal * normal.dot(up))
+            .try_normalize()
+            .ok_or_else(|| refused("what is up for the {} is along the normal; give another direction"))?;
+        let pixel = spot.width / picture.width as f64;
+        Ok(Projection { picture, middle, normal, right: up.cross(normal), up, pixel, depth })
+    }
+
+    /// Grey and alpha at a node; nothing further along the normal than the depth, and on what faces away.
+    pub fn at(&self, (at, frame): &Texel) -> [f64; 2] {
+        let d = *at - self.middle;
+        if d.dot(self.normal).abs() > self.depth || frame.normal.dot(self.normal) <= 0.0 {
+            return [0.0, 0.0];
+        }
+        let x = d.dot(self.right) / self.pixel + self.picture.width as f64 / 2.0;
+        let y = self.picture.height as f64 / 2.0 - d.dot(self.up) / self.pixel;
+        self.picture.at(x, y)
+    }
+
+    /// Further from the middle than this there is nothing of it, units of the model.
+    pub fn reach(&self) -> f64 {
+        let [wide, tall] = [self.picture.width, self.picture.height].map(|n| self.pixel * n as f64);
+        (wide.hypot(tall) / 2.0).hypot(self.depth)
+    }
+}
