@@ -30,7 +30,7 @@ struct Script {
 /// A step: an edit, or going back or on.
 #[derive(Debug)]
 enum Step {
-    Edit(ReliefEdit),
+    Edit(Box<ReliefEdit>),
     Undo(usize),
     Redo(usize),
 }
@@ -103,7 +103,7 @@ fn read_script(path: &Path) -> Result<(Vec<(Step, usize)>, View), Failure> {
                 Back::Undo { count } => Step::Undo(count),
                 Back::Redo { count } => Step::Redo(count),
             }),
-            _ => value.try_into().map(Step::Edit),
+            _ => value.try_into().map(|edit| Step::Edit(Box::new(edit))),
         };
         let parsed = parsed.map_err(|e| failed(&format!("step {}: {}", k + 1, e.message()), Some(line)))?;
         steps.push((parsed, line));

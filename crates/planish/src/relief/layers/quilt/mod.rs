@@ -176,23 +176,32 @@ fn order(joints: &[Vec<Joint>], edit: &Synthesise) -> Vec<(usize, u32)> {
 }
 
 /// The open canvas of a patch with what its neighbours have on both sides of their borders.
+///
+/// Source: Franke, Nielson, *Smooth Interpolation of Large Sets of Scattered Data*, IJNME 15, 1980, for the weights of two.
 fn begun(plan: &Plan, canvases: &[Option<Canvas>], p: usize) -> Canvas {
     let here = &plan.charts[p];
     let mut canvas = Canvas::open(here.pixels, plan.overlap);
-    let mut depths = vec![f64::INFINITY; canvas.values.len()];
+    // Where strips of two neighbours cross at a corner, both count: no step where one begins.
+    let mut weights = vec![0.0; canvas.values.len()];
     for joint in plan.joints[p].iter().filter(|j| j.patch != p) {
         let Some(other) = &canvases[joint.patch] else { continue };
         for k in 0..canvas.values.len() {
             let margin = plan.overlap as f64;
             let at = [(k % canvas.width) as f64 - margin, (k / canvas.width) as f64 - margin];
             let Some((there, depth)) = joint.beyond(here, &plan.charts[joint.patch], at) else { continue };
-            if depth.abs() > margin || depth.abs() >= depths[k] {
+            if depth.abs() >= margin || canvas.known[k] == Pixel::Fixed {
                 continue;
             }
-            if let Some(d) = other.sample(there) {
-                depths[k] = depth.abs();
-                canvas.values[k] = super::transfer::turned(d, joint.quarters());
-                canvas.known[k] = if depth <= 0.0 { Pixel::Fixed } else { Pixel::Filled };
+            let Some(d) = other.sample(there) else { continue };
+            let d = super::transfer::turned(d, joint.quarters());
+            if depth <= 0.0 {
+                canvas.values[k] = d;
+                canvas.known[k] = Pixel::Fixed;
+            } else {
+                let weight = ((margin - depth) / depth).powi(2);
+                weights[k] += weight;
+                canvas.values[k] = canvas.values[k].lerp(d, weight / weights[k]);
+                canvas.known[k] = Pixel::Filled;
             }
         }
     }
