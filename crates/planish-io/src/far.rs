@@ -1,9 +1,11 @@
 //! Coordinates of maps: far from the origin against the size of what has them, and what one of their units is.
 
+use crate::rank::ranked;
 use crate::step;
 use glam::DVec3;
 use planish::Units;
 use planish::geom::Aabb;
+use std::io;
 use std::path::Path;
 
 /// Coordinates this many times larger than the shape are far.
@@ -18,32 +20,53 @@ pub fn shift_of(bounds: &Aabb) -> DVec3 {
 
 /// The points of the body of a scan, where others are so far from it that nothing lies between: wild ranges, and returns that a
 /// scanner marks by the origin of a map. `None` if all are of one body.
-///
-/// From the middle of the points (the median of each coordinate) outwards a body has no gap of more than [`FAR`] times; the half
-/// of the points that lies nearest is in it anyway.
 pub fn body(points: &[DVec3]) -> Option<Vec<u32>> {
-    let finite: Vec<u32> = (0..points.len() as u32).filter(|&i| points[i as usize].is_finite()).collect();
-    let median = |k: usize| {
-        let mut values: Vec<f64> = finite.iter().map(|&i| points[i as usize][k]).collect();
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    let finite = || points.iter().copied().filter(|p| p.is_finite());
+    let pass = |see: &mut dyn FnMut(DVec3)| {
+        finite().for_each(see);
+        Ok(())
     };
-    if finite.len() < LEAST {
-        return None;
-    }
-    let middle = DVec3::from_array([0, 1, 2].map(median));
-    let mut away: Vec<f64> = finite.iter().map(|&i| points[i as usize].distance(middle)).collect();
-    away.sort_unstable_by(f64::total_cmp);
-    let half = away.len() / 2;
-    let gap = (half..away.len() - 1).find(|&i| away[i] > 0.0 && away[i + 1] > FAR * away[i])?;
-    let reach = away[gap];
+    let (middle, reach) = reach(finite().count() as u64, &pass).ok()??;
     // What is no number stays: the cleaning counts it.
     let is_in = |i: &u32| !(points[*i as usize].distance(middle) > reach);
     Some((0..points.len() as u32).filter(is_in).collect())
 }
 
+/// Finite points, passed by as often as wanted.
+pub(crate) type Passed<'a> = dyn Fn(&mut dyn FnMut(DVec3)) -> io::Result<()> + 'a;
+
+/// The middle of a scan and how far its body reaches, if anything lies beyond.
+///
+/// From the middle of the points (the median of each coordinate) outwards a body has no gap of more than [`FAR`] times; the half
+/// of the points that lies nearest is in it anyway.
+/// # Errors
+/// Those of the passes.
+pub(crate) fn reach(count: u64, pass: &Passed) -> io::Result<Option<(DVec3, f64)>> {
+    if count < LEAST {
+        return Ok(None);
+    }
+    let middle = DVec3::from_array(ranked(count / 2, &|see| pass(&mut |p| see(p.to_array())))?);
+    // Distances by their power of two: the gap is so wide that some powers between have none.
+    let mut powers = vec![(0u64, f64::INFINITY, 0.0f64); POWERS];
+    pass(&mut |p| {
+        let away = p.distance(middle);
+        let (count, least, most) = &mut powers[(away.to_bits() >> MANTISSA) as usize % POWERS];
+        (*count, *least, *most) = (*count + 1, least.min(away), most.max(away));
+    })?;
+    powers.retain(|p| p.0 > 0);
+    let mut nearer = 0;
+    let gap = powers.windows(2).find(|pair| {
+        nearer += pair[0].0;
+        nearer > count / 2 && pair[0].2 > 0.0 && pair[1].1 > FAR * pair[0].2
+    });
+    Ok(gap.map(|pair| (middle, pair[0].2)))
+}
+
+/// Bits of the mantissa of a number, and powers of two that numbers may have.
+const MANTISSA: u32 = 52;
+const POWERS: usize = 1 << 11;
 /// Points that have a middle worth the name.
-const LEAST: usize = 10;
+const LEAST: u64 = 10;
 
 /// Step between neighbouring numbers of single precision at the largest coordinate, if all coordinates are of single precision;
 /// `None` if any is finer.

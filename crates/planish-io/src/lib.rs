@@ -5,6 +5,7 @@
 //! nothing ([`atomic`]).
 
 pub mod atomic;
+mod bricks;
 mod error;
 mod export;
 mod far;
@@ -22,6 +23,7 @@ mod place;
 mod ply;
 mod polygon;
 pub mod project;
+mod rank;
 mod relief_files;
 pub mod report;
 mod scan;
@@ -34,6 +36,7 @@ mod usd;
 mod usd_material;
 mod weld;
 
+pub use bricks::BrickFolder;
 pub use error::{ReadError, WriteError};
 pub use export::{ExportKind, export, export_kind, export_mesh};
 pub use far::{FileUnits, file_units, shift_of, single_step};

@@ -241,10 +241,20 @@ fn format_for(path: &Path, mesh: &TriMesh) -> Result<MeshFormat, WriteError> {
     Ok(format)
 }
 
-/// The whole file, if it is one: folders, pipes and devices are refused before they are opened.
+/// The whole file, if it is one.
+/// # Errors
+/// As of [`opened`].
+pub fn content(path: &Path) -> Result<Vec<u8>, ReadError> {
+    let mut file = opened(path)?;
+    let mut bytes = Vec::with_capacity(file.metadata()?.len() as usize);
+    file.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// A file to read: folders, pipes and devices are refused before they are opened.
 /// # Errors
 /// [`ReadError::Io`] or [`ReadError::NotAFile`].
-pub fn content(path: &Path) -> Result<Vec<u8>, ReadError> {
+pub(crate) fn opened(path: &Path) -> Result<File, ReadError> {
     // Before it is opened: that alone waits for ever at a pipe that nobody writes to.
     let metadata = std::fs::metadata(path)?;
     if metadata.is_dir() {
@@ -253,10 +263,7 @@ pub fn content(path: &Path) -> Result<Vec<u8>, ReadError> {
     if !metadata.is_file() {
         return Err(ReadError::NotAFile("a pipe or a device"));
     }
-    let mut file = File::open(path)?;
-    let mut bytes = Vec::with_capacity(metadata.len() as usize);
-    file.read_to_end(&mut bytes)?;
-    Ok(bytes)
+    Ok(File::open(path)?)
 }
 
 /// The bytes of a file that another one names or that is no mesh; as [`content`], for errors of other kinds.

@@ -21,7 +21,7 @@ mod rework;
 mod scan;
 mod truth;
 
-pub use bricks::{BRICK_POINTS, mesh_in_bricks, mesh_scan};
+pub use bricks::{BRICK_POINTS, BrickMesh, BrickPlan, BrickWelder, clean_brick, mesh_bricks, mesh_scan};
 pub use deform::{Move, deform, join, matched, moved};
 pub use quality::{
     FOLDED_DEG, SEAM_ANGLE_WARNING_DEG, displaced_mesh, displaced_patches, inner_angles, span_count, surface_mesh,

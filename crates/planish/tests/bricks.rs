@@ -3,12 +3,13 @@
 use glam::DVec3;
 use planish::Silent;
 use planish::cloud::Cloud;
+use planish::cloud::bricks::CloudStore;
 use planish::mesh::{Attribute, CompareParams, Diagnosis, TriMesh, compare, diagnose, self_intersections};
-use planish::pipeline::{ScanError, ScanMeshed, ScanParams, mesh_in_bricks, mesh_scan};
+use planish::pipeline::{ScanError, ScanMeshed, ScanParams, mesh_bricks, mesh_scan};
 use planish::synthetic::{bracket, demo, even_scan, shapes};
 
 fn in_bricks(scan: &Cloud, most: usize) -> ScanMeshed {
-    mesh_in_bricks(scan, most, &ScanParams::default(), &Silent).unwrap()
+    mesh_bricks(&CloudStore::new(scan, most), &ScanParams::default(), &Silent).unwrap()
 }
 
 fn mesh(made: &ScanMeshed) -> &TriMesh {
@@ -58,7 +59,7 @@ fn two_bricks_at_once_give_the_same_bytes_as_one_after_the_other_and_too_little_
     };
     assert!(bits(&made(1)) == bits(&made(2)));
     let params = ScanParams { memory: 2_000_000, ..ScanParams::default() };
-    let refused = mesh_in_bricks(&scan, 3_000, &params, &Silent);
+    let refused = mesh_bricks(&CloudStore::new(&scan, 3_000), &params, &Silent);
     assert!(matches!(refused, Err(ScanError::Memory { points: 12_000, .. })));
 }
 

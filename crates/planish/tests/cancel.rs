@@ -5,6 +5,7 @@
 //! does not ask is late in all.
 #![allow(clippy::print_stdout)]
 
+use planish::cloud::bricks::CloudStore;
 use planish::layout::Known;
 use planish::mesh::{CompareParams, DecimateParams, DecimateTarget, SmoothParams, TriMesh, compare, decimate, smooth};
 use planish::observe::{Cancelled, Observer};
@@ -180,7 +181,8 @@ fn cleaning_and_meshing_of_a_scan_end_within_200_ms() {
     stops("clean", |o| cloud::clean(&scan, &Default::default(), o));
     let params = ScanParams { close: Some(false), ..ScanParams::default() };
     stops("scan to mesh", |o| pipeline::mesh_scan(&scan, &params, o));
-    stops("scan to mesh in bricks", |o| pipeline::mesh_in_bricks(&scan, scan.points.len() / 4, &params, o));
+    let bricks = CloudStore::new(&scan, scan.points.len() / 4);
+    stops("scan to mesh in bricks", |o| pipeline::mesh_bricks(&bricks, &params, o));
     let samples = cloud::clean(&scan, &Default::default(), &Silent).expect("samples");
     stops("points", |o| cloud::project(&scan, &samples, 5.0, &Default::default(), o));
 }

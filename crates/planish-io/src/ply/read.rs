@@ -1,11 +1,13 @@
 //! Vertices, faces and vertex attributes out of a PLY file.
 
 use super::body::Body;
-use super::header::{Element, Header, Kind, Scalar, header};
+use super::header::{Element, Encoding, Header, Kind, Scalar, header};
 use crate::polygon::{Polygons, checked};
 use crate::{Place, ReadError};
 use glam::DVec3;
 use planish::mesh::{Attribute, TriMesh};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
 
 /// Reads a mesh. `nx ny nz` become `"normal"`; `red green blue [alpha]` become `"color"`, whole numbers scaled
 /// to 0..1; `name_0 .. name_k` become one attribute of width `k + 1`; every other number per vertex becomes an
@@ -28,12 +30,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<(TriMesh, Vec<[u32; 2]>), ReadError> 
     let mut body = Body::new(bytes, head.encoding, head.body, head.body_line);
     let mut seen = false;
     for element in &head.elements {
-        // The last number of an ascii file needs no blank after it, hence the one byte.
-        let (needed, left) = (element.count.saturating_mul(element.least_bytes(head.encoding)), body.left(bytes.len()));
-        if needed > left + 1 {
-            let what = format!("\"element {} {}\"", element.name, element.count);
-            return Err(ReadError::Truncated { what, needed, left, place: body.place() });
-        }
+        check_room(element, &head, body.left(bytes.len()), body.place())?;
         if element.properties.is_empty() {
             continue;
         }
@@ -82,11 +79,7 @@ pub(crate) fn read_points(bytes: &[u8]) -> Result<TriMesh, ReadError> {
     let mut mesh = TriMesh::default();
     let mut body = Body::new(bytes, head.encoding, head.body, head.body_line);
     for element in &head.elements[..=at] {
-        let (needed, left) = (element.count.saturating_mul(element.least_bytes(head.encoding)), body.left(bytes.len()));
-        if needed > left + 1 {
-            let what = format!("\"element {} {}\"", element.name, element.count);
-            return Err(ReadError::Truncated { what, needed, left, place: body.place() });
-        }
+        check_room(element, &head, body.left(bytes.len()), body.place())?;
         if element.name == "vertex" {
             layout.read(element, &mut body, &mut mesh, bytes.len())?;
         } else if !element.properties.is_empty() {
@@ -94,6 +87,60 @@ pub(crate) fn read_points(bytes: &[u8]) -> Result<TriMesh, ReadError> {
         }
     }
     Ok(mesh)
+}
+
+/// Reads the vertices alone, so many at once, if they are the first element, binary and without lists; else all at once.
+pub(crate) fn pieces(
+    mut file: BufReader<File>,
+    at_once: usize,
+    take: &mut dyn FnMut(TriMesh) -> Result<(), ReadError>,
+) -> Result<(), ReadError> {
+    let mut bytes = Vec::new();
+    // An end of line follows the last word of the header.
+    while bytes.len() < HEADER_MOST && !bytes.windows(HEADER_END.len()).any(|w| w == HEADER_END) {
+        if file.by_ref().take(HEADER_PIECE).read_to_end(&mut bytes)? == 0 {
+            break;
+        }
+    }
+    let head = header(&bytes);
+    let size = file.get_ref().metadata()?.len();
+    let first = head.as_ref().ok().filter(|h| h.encoding != Encoding::Ascii).and_then(|h| h.elements.first());
+    let fixed = first.filter(|e| e.name == "vertex").and_then(Element::fixed_bytes).filter(|&size| size > 0);
+    let (Ok(head), Some(vertex), Some(record)) = (&head, first, fixed) else {
+        file.read_to_end(&mut bytes)?;
+        return take(read_points(&bytes)?);
+    };
+    let layout = Layout::of(vertex, head)?;
+    check_room(vertex, head, size - head.body as u64, Place::Byte(head.body))?;
+    file.seek(SeekFrom::Start(head.body as u64))?;
+    let mut left = vertex.count as usize;
+    while left > 0 {
+        let count = at_once.min(left);
+        bytes.resize(count * record, 0);
+        file.read_exact(&mut bytes)?;
+        let mut mesh = TriMesh::default();
+        let some = Element { count: count as u64, ..vertex.clone() };
+        layout.read(&some, &mut Body::new(&bytes, head.encoding, 0, 1), &mut mesh, bytes.len())?;
+        take(mesh)?;
+        left -= count;
+    }
+    Ok(())
+}
+
+const HEADER_END: &[u8] = b"end_header";
+/// Bytes of a header that are read at once, and at most: a longer one is read with the rest of the file.
+const HEADER_PIECE: u64 = 1 << 12;
+const HEADER_MOST: usize = 1 << 17;
+
+/// Refuses an element that the rest of a file has no room for.
+fn check_room(element: &Element, head: &Header, left: u64, place: Place) -> Result<(), ReadError> {
+    let needed = element.count.saturating_mul(element.least_bytes(head.encoding));
+    // The last number of an ascii file needs no blank after it, hence the one byte.
+    if needed > left + 1 {
+        let what = format!("\"element {} {}\"", element.name, element.count);
+        return Err(ReadError::Truncated { what, needed, left, place });
+    }
+    Ok(())
 }
 
 /// The two ends of each edge; none if the element is another thing of that name.

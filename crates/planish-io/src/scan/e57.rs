@@ -1,30 +1,33 @@
 //! E57: scans with poses (ASTM E2807). All scans of a file become one cloud, and a cloud of several stations becomes as
 //! many scans, each in the coordinates of its scanner.
 
-use super::{column, foreign, guarded};
+use super::{Bare, PIECE, Take, column, foreign, guarded};
 use crate::{Place, ReadError, WriteError};
 use e57::{
     CartesianCoordinate, E57Reader, E57Writer, Quaternion, Record, RecordName, RecordValue, Transform, Translation,
 };
 use glam::DVec3;
 use planish::cloud::Cloud;
-use std::io::Cursor;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
-pub(super) fn read(bytes: Vec<u8>) -> Result<Cloud, ReadError> {
-    if !bytes.starts_with(b"ASTM-E57") {
+pub(super) fn pieces(mut file: BufReader<File>, take: &mut Take) -> Result<Bare, ReadError> {
+    let mut mark = [0; 8];
+    if file.read_exact(&mut mark).is_err() || mark != *b"ASTM-E57" {
         return Err(ReadError::WrongFormat {
             expected: "E57",
             found: "something else",
             hint: "name a file that begins with ASTM-E57".into(),
         });
     }
-    let size = bytes.len() as u64;
+    let size = file.get_ref().metadata()?.len();
+    file.rewind()?;
     guarded(move || {
-        E57Reader::validate_crc(Cursor::new(&bytes)).map_err(|e| foreign(format!("a page is damaged: {e}")))?;
-        let mut file = E57Reader::new(Cursor::new(&bytes)).map_err(foreign)?;
-        let mut cloud = Cloud::default();
-        let (mut color, mut intensity) = (Vec::new(), Vec::new());
+        E57Reader::validate_crc(&mut file).map_err(|e| foreign(format!("a page is damaged: {e}")))?;
+        file.rewind()?;
+        let mut file = E57Reader::new(file).map_err(foreign)?;
+        let mut scanners = Vec::new();
         let (mut has_color, mut has_intensity) = (false, false);
         for (k, scan) in file.pointclouds().into_iter().enumerate() {
             // A point takes at least one bit.
@@ -39,33 +42,32 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Cloud, ReadError> {
                 scan.prototype.iter().any(|r| r.name == RecordName::RowIndex || r.name == RecordName::ColumnIndex);
             let origin = origin.or(grid.then_some(DVec3::ZERO));
             let station = origin.map_or(u32::MAX, |o| {
-                cloud.scanners.push(o);
-                cloud.scanners.len() as u32 - 1
+                scanners.push(o);
+                scanners.len() as u32 - 1
             });
             let mut points = file.pointcloud_simple(&scan).map_err(foreign)?;
             points.apply_pose(true);
             points.spherical_to_cartesian(true);
-            for point in points {
-                let p = point.map_err(foreign)?;
-                let CartesianCoordinate::Valid { x, y, z } = p.cartesian else { continue };
-                cloud.points.push(DVec3::new(x, y, z));
-                cloud.seen_by.push(station);
-                has_color |= p.color.is_some();
-                has_intensity |= p.intensity.is_some();
-                color.extend(p.color.map_or([0.0; 3], |c| [c.red, c.green, c.blue]));
-                intensity.push(p.intensity.unwrap_or(0.0));
+            let mut rest = points.peekable();
+            while rest.peek().is_some() {
+                let mut piece = Cloud { scanners: scanners.clone(), ..Cloud::default() };
+                let (mut color, mut intensity) = (Vec::new(), Vec::new());
+                for point in rest.by_ref().take(PIECE) {
+                    let p = point.map_err(foreign)?;
+                    let CartesianCoordinate::Valid { x, y, z } = p.cartesian else { continue };
+                    piece.points.push(DVec3::new(x, y, z));
+                    piece.seen_by.push(station);
+                    has_color |= p.color.is_some();
+                    has_intensity |= p.intensity.is_some();
+                    color.extend(p.color.map_or([0.0; 3], |c| [c.red, c.green, c.blue]));
+                    intensity.push(p.intensity.unwrap_or(0.0));
+                }
+                piece.attributes = vec![column("color", 3, color), column("intensity", 1, intensity)];
+                take(piece)?;
             }
         }
-        if cloud.scanners.is_empty() {
-            cloud.seen_by.clear();
-        }
-        if has_color {
-            cloud.attributes.push(column("color", 3, color));
-        }
-        if has_intensity {
-            cloud.attributes.push(column("intensity", 1, intensity));
-        }
-        Ok(cloud)
+        let bare = [("color", has_color), ("intensity", has_intensity)];
+        Ok(bare.into_iter().filter(|b| !b.1).map(|b| b.0).collect())
     })
 }
 

@@ -1,57 +1,63 @@
 //! LAS and LAZ: airborne and terrestrial laser scans.
 
-use super::{column, foreign, guarded};
+use super::{Bare, PIECE, Take, column, foreign, guarded};
 use crate::{Place, ReadError, WriteError};
 use glam::DVec3;
 use las::point::Format;
 use las::{Builder, Color, Point, Reader, Transform, Vector, Writer};
 use planish::cloud::Cloud;
-use std::io::{Cursor, Write};
-
-/// Points read at once.
-const PIECE: u64 = 1 << 16;
+use std::fs::File;
+use std::io::{BufReader, Cursor, Read, Seek, SeekFrom, Write};
 
 /// Bytes of the first point of a compressed chunk, which is not compressed: the shortest format has 20.
 const CHUNK: u64 = 20;
 
 /// Refuses compressed points whose table names more chunks than the file has room for: the library that reads them takes memory
 /// for as many as it is told.
-fn check_chunks(bytes: &[u8]) -> Result<(), ReadError> {
-    let piece = |at: u64| bytes.get(at as usize..).unwrap_or_default();
-    let word = |at: u64| piece(at).first_chunk().map(|b| u32::from_le_bytes(*b));
-    let long = |at: u64| piece(at).first_chunk().map(|b| i64::from_le_bytes(*b));
+fn check_chunks(file: &mut (impl Read + Seek), size: u64) -> Result<(), ReadError> {
+    let mut piece = |at: u64, bytes: &mut [u8]| -> bool {
+        file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(bytes)).is_ok()
+    };
+    let mut format = [0; 1];
     // The upper bits of the point format tell that the points are compressed.
-    if bytes.get(104).is_none_or(|format| format & 0xc0 == 0) {
+    if !piece(104, &mut format) || format[0] & 0xc0 == 0 {
         return Ok(());
     }
-    let size = bytes.len() as u64;
+    let (mut word, mut long) = ([0; 4], [0; 8]);
+    if !piece(96, &mut word) || !piece(u64::from(u32::from_le_bytes(word)), &mut long) {
+        return Ok(());
+    }
     // A writer that could not go back leaves the place of the table at the end of the file.
-    let table = match word(96).and_then(|points| long(points as u64)) {
-        Some(-1) => long(size.saturating_sub(8)),
-        found => found,
-    };
-    let Some(chunks) = table.and_then(|at| word(u64::try_from(at).ok()?.checked_add(4)?)) else { return Ok(()) };
-    let needed = chunks as u64 * CHUNK;
+    if i64::from_le_bytes(long) == -1 && !piece(size.saturating_sub(8), &mut long) {
+        return Ok(());
+    }
+    let Ok(table) = u64::try_from(i64::from_le_bytes(long)) else { return Ok(()) };
+    if !table.checked_add(4).is_some_and(|at| piece(at, &mut word)) {
+        return Ok(());
+    }
+    let chunks = u32::from_le_bytes(word);
+    let needed = u64::from(chunks) * CHUNK;
     if needed > size {
-        let place = Place::Byte(table.unwrap_or_default() as usize);
+        let place = Place::Byte(table as usize);
         return Err(ReadError::Truncated { what: format!("{chunks} chunks of points"), needed, left: size, place });
     }
     Ok(())
 }
 
-pub(super) fn read(bytes: Vec<u8>, classes: &[u8]) -> Result<Cloud, ReadError> {
-    if !bytes.starts_with(b"LASF") {
+pub(super) fn pieces(mut file: BufReader<File>, classes: &[u8], take: &mut Take) -> Result<Bare, ReadError> {
+    let mut mark = [0; 4];
+    if file.read_exact(&mut mark).is_err() || mark != *b"LASF" {
         return Err(ReadError::WrongFormat {
             expected: "LAS",
             found: "something else",
             hint: "name a file that begins with LASF".into(),
         });
     }
-    let size = bytes.len() as u64;
-    check_chunks(&bytes)?;
-    let classes = classes.to_vec();
+    let size = file.get_ref().metadata()?.len();
+    check_chunks(&mut file, size)?;
+    file.seek(SeekFrom::Start(0))?;
     guarded(move || {
-        let mut reader = Reader::new(Cursor::new(bytes)).map_err(foreign)?;
+        let mut reader = Reader::new(file).map_err(foreign)?;
         let count = reader.header().number_of_points();
         // Uncompressed records are all there; a compressed point takes more than a hundredth of a byte.
         let record = if reader.header().point_format().is_compressed {
@@ -63,13 +69,13 @@ pub(super) fn read(bytes: Vec<u8>, classes: &[u8]) -> Result<Cloud, ReadError> {
             let (what, needed) = (format!("{count} points"), (count as f64 * record) as u64);
             return Err(ReadError::Truncated { what, needed, left: size, place: Place::Byte(0) });
         }
-        let mut cloud = Cloud::default();
-        let (mut intensity, mut class, mut color) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut done, mut taken) = (0, 0);
         let mut has_color = false;
-        let mut done = 0;
         while done < count {
-            let wanted = PIECE.min(count - done);
+            let wanted = (PIECE as u64).min(count - done);
             let data = reader.read_points(wanted).map_err(foreign)?;
+            let mut piece = Cloud::default();
+            let (mut intensity, mut class, mut color) = (Vec::new(), Vec::new(), Vec::new());
             let mut got = 0;
             for point in data.points() {
                 let p = point.map_err(foreign)?;
@@ -78,7 +84,7 @@ pub(super) fn read(bytes: Vec<u8>, classes: &[u8]) -> Result<Cloud, ReadError> {
                 if !classes.is_empty() && !classes.contains(&c) {
                     continue;
                 }
-                cloud.points.push(DVec3::new(p.x, p.y, p.z));
+                piece.points.push(DVec3::new(p.x, p.y, p.z));
                 intensity.push(p.intensity as f32 / 65535.0);
                 class.push(c as f32);
                 let rgb = p.color.unwrap_or_default();
@@ -94,20 +100,19 @@ pub(super) fn read(bytes: Vec<u8>, classes: &[u8]) -> Result<Cloud, ReadError> {
                 });
             }
             done += got;
+            taken += piece.points.len();
+            piece.attributes =
+                vec![column("intensity", 1, intensity), column("classification", 1, class), column("color", 3, color)];
+            take(piece)?;
         }
-        if count > 0 && cloud.points.is_empty() {
+        if count > 0 && taken == 0 {
             return Err(ReadError::Header {
                 what: format!("none of the {count} points is of the wanted classes"),
                 place: Place::Byte(0),
                 hint: "choose other classes",
             });
         }
-        cloud.attributes.push(column("intensity", 1, intensity));
-        cloud.attributes.push(column("classification", 1, class));
-        if has_color {
-            cloud.attributes.push(column("color", 3, color));
-        }
-        Ok(cloud)
+        Ok(if has_color { Bare::new() } else { vec!["color"] })
     })
 }
 

@@ -17,7 +17,8 @@ use crate::{Place, ReadError, WriteError, atomic, ply};
 use glam::DVec3;
 use planish::Units;
 use planish::cloud::Cloud;
-use planish::mesh::Attribute;
+use planish::mesh::{Attribute, TriMesh};
+use std::io::BufReader;
 use std::path::Path;
 
 /// What the readers of scans are told.
@@ -71,27 +72,11 @@ pub fn read_body(path: impl AsRef<Path>, options: &ScanOptions) -> Result<(Cloud
 }
 
 fn read_in_place(path: &Path, options: &ScanOptions) -> Result<Cloud, ReadError> {
-    let extension = lower(path);
-    let bytes = crate::mesh_file::content(path)?;
-    if bytes.is_empty() {
-        return Err(ReadError::Empty);
-    }
-    let cloud = match extension.as_str() {
-        "e57" => e57::read(bytes)?,
-        "las" | "laz" => las::read(bytes, &options.classes)?,
-        "pcd" => pcd::read(&bytes)?,
-        "ply" => {
-            let mesh = ply::read_points(&bytes)?;
-            Cloud { points: mesh.points, attributes: mesh.attributes, ..Cloud::default() }
-        }
-        "npy" | "npz" => npy::read(&bytes)?,
-        "conf" => views::read(&bytes, path)?,
-        "xyz" | "txt" | "csv" | "asc" | "pts" => table::read(&bytes, &extension, options.columns.as_deref())?,
-        _ => {
-            let known = SCAN_EXTENSIONS.iter().chain(&["ply", "npy"]).map(|e| format!(".{e}")).collect::<Vec<_>>();
-            return Err(ReadError::UnknownExtension { extension, known: known.join(", ") });
-        }
-    };
+    let mut cloud = Cloud::default();
+    let bare = pieces(path, options, &mut |piece| {
+        append(&mut cloud, piece);
+        Ok(())
+    })?;
     if cloud.points.is_empty() {
         return Err(ReadError::NoPoints);
     }
@@ -99,7 +84,64 @@ fn read_in_place(path: &Path, options: &ScanOptions) -> Result<Cloud, ReadError>
         let (count, limit) = (cloud.points.len() as u64, u32::MAX as u64 - 1);
         return Err(ReadError::TooLarge { what: "points", count, limit, place: Place::Byte(0) });
     }
+    cloud.attributes.retain(|a| !bare.contains(&a.name.as_str()));
+    if cloud.scanners.is_empty() {
+        cloud.seen_by.clear();
+    }
     Ok(cloud)
+}
+
+/// What takes pieces of a scan.
+pub(crate) type Take<'a> = dyn FnMut(Cloud) -> Result<(), ReadError> + 'a;
+
+/// Points that are read at once.
+const PIECE: usize = 1 << 16;
+
+/// Attributes that the format has room for and no point of the file has.
+pub(crate) type Bare = Vec<&'static str>;
+
+/// Reads a scan piece by piece, where the format allows; else it is one piece. All pieces have the same attributes, and the last
+/// one has all scanners.
+/// # Errors
+/// As of [`read_scan`], or what `take` says.
+pub(crate) fn pieces(path: &Path, options: &ScanOptions, take: &mut Take) -> Result<Bare, ReadError> {
+    let extension = lower(path);
+    let file = BufReader::new(crate::mesh_file::opened(path)?);
+    if file.get_ref().metadata()?.len() == 0 {
+        return Err(ReadError::Empty);
+    }
+    let whole = || crate::mesh_file::content(path);
+    let cloud = match extension.as_str() {
+        "e57" => return e57::pieces(file, take),
+        "las" | "laz" => return las::pieces(file, &options.classes, take),
+        "ply" => {
+            let mut points = |mesh: TriMesh| {
+                take(Cloud { points: mesh.points, attributes: mesh.attributes, ..Cloud::default() })
+            };
+            return ply::pieces(file, PIECE, &mut points).map(|()| Bare::new());
+        }
+        "pcd" => pcd::read(&whole()?)?,
+        "npy" | "npz" => npy::read(&whole()?)?,
+        "conf" => views::read(&whole()?, path)?,
+        "xyz" | "txt" | "csv" | "asc" | "pts" => table::read(&whole()?, &extension, options.columns.as_deref())?,
+        _ => {
+            let known = SCAN_EXTENSIONS.iter().chain(&["ply", "npy"]).map(|e| format!(".{e}")).collect::<Vec<_>>();
+            return Err(ReadError::UnknownExtension { extension, known: known.join(", ") });
+        }
+    };
+    take(cloud).map(|()| Bare::new())
+}
+
+/// Adds a piece of a scan to the rest.
+fn append(cloud: &mut Cloud, piece: Cloud) {
+    if cloud.points.is_empty() {
+        *cloud = piece;
+        return;
+    }
+    cloud.points.extend(piece.points);
+    cloud.attributes.iter_mut().zip(piece.attributes).for_each(|(all, more)| all.values.extend(more.values));
+    cloud.seen_by.extend(piece.seen_by);
+    cloud.scanners = piece.scanners;
 }
 
 /// Moves a cloud with large coordinates near the origin by whole numbers, so that single precision loses nothing
@@ -173,6 +215,7 @@ fn foreign(what: impl std::fmt::Display) -> ReadError {
 }
 
 /// Runs a reader of a library that might panic on damaged data, and tells that as an error.
-fn guarded<T>(work: impl FnOnce() -> Result<T, ReadError> + std::panic::UnwindSafe) -> Result<T, ReadError> {
-    std::panic::catch_unwind(work).unwrap_or_else(|_| Err(foreign("the content contradicts itself")))
+fn guarded<T>(work: impl FnOnce() -> Result<T, ReadError>) -> Result<T, ReadError> {
+    // What it was writing to is not looked at after an error.
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)).unwrap_or_else(|_| Err(foreign("the content contradicts itself")))
 }

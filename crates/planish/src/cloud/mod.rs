@@ -141,6 +141,9 @@ pub enum CloudError {
         /// Number of points.
         points: usize,
     },
+    /// What was kept of the scan on the way cannot be had.
+    #[error(transparent)]
+    Store(#[from] bricks::StoreError),
     /// The observer wants no result any more.
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),

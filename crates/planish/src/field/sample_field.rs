@@ -7,6 +7,7 @@ use super::Field;
 use crate::cloud::{Blend, Blended, Cell, Dipoles, Samples};
 use crate::geom::Aabb;
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// What a cell says changes by at most this much per length.
@@ -34,7 +35,7 @@ pub struct SampleField {
 }
 
 /// What a field of samples is measured by.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct FieldScale {
     /// Box of the centres of all samples, world units.
     pub bounds: Aabb,

@@ -31,6 +31,11 @@ impl Aabb {
         self.size().length()
     }
 
+    /// True if the two share a point.
+    pub fn meets(&self, other: &Aabb) -> bool {
+        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
+    }
+
     /// Midpoint of the box.
     pub fn center(&self) -> DVec3 {
         (self.min + self.max) / 2.0

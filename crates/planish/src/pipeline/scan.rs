@@ -80,7 +80,7 @@ impl Default for ScanParams {
 }
 
 /// What is known of all samples of a scan together.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ScanFacts {
     /// Number of samples.
     pub samples: usize,

@@ -6,19 +6,24 @@
 //! 3. [`Sides`]: bricks see the same surface in their halos, so these tell how the pieces of one are turned against those of the
 //!    next; then bodies have their outside as in one piece
 //!
+//! Points and samples lie in a [`BrickStore`]: in memory, or in files.
+//!
 //! See `docs/methods/bricks.md`.
 
 mod partition;
 mod sides;
+mod store;
 
 pub use partition::{Brick, Partition};
 pub use sides::Sides;
+pub use store::{BrickStore, CloudStore, StoreError, points_of};
 
 use super::local::nest::MOST_NESTED;
 use super::{Cell, CleanParams, Cloud, CloudError, FEWEST_POINTS, Quadric, Samples, clean};
 use crate::geom::{Aabb, KdTree};
 use crate::observe::{Observer, Part};
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// A halo is this many of the widest supports wide: fits hear points within two of theirs, a cell asks samples within two of its
 /// own.
@@ -31,20 +36,14 @@ const PILOT_POINTS: usize = 30_000;
 
 /// Width of the halo around bricks, world units: from the supports of a few places of the scan.
 /// # Errors
-/// [`CloudError`] if there are no samples in any of them, or if cancelled.
-pub fn halo(
-    cloud: &Cloud,
-    partition: &Partition,
-    params: &CleanParams,
-    observer: &dyn Observer,
-) -> Result<f64, CloudError> {
+/// [`CloudError`] if there are no samples in any of them, if the points cannot be read, or if cancelled.
+pub fn halo(store: &dyn BrickStore, params: &CleanParams, observer: &dyn Observer) -> Result<f64, CloudError> {
     let mut widest: f64 = 0.0;
     let mut failed = None;
-    let count = partition.bricks.len();
+    let count = store.bricks().len();
     let pilots = PILOTS.min(count);
     for k in 0..pilots {
-        let brick = &partition.bricks[k * (count - 1) / (pilots - 1).max(1)];
-        let own: Vec<DVec3> = partition.order[brick.range.clone()].iter().map(|&i| cloud.points[i as usize]).collect();
+        let own = store.around(k * (count - 1) / (pilots - 1).max(1), 0.0)?.points;
         let parts = Partition::new(&own, PILOT_POINTS);
         let pilot = &parts.bricks[parts.bricks.len() / 2];
         let points = parts.order[pilot.range.clone()].iter().map(|&i| own[i as usize]).collect();
@@ -65,7 +64,7 @@ pub fn halo(
 }
 
 /// A sample as its neighbours in other bricks see it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Stand {
     center: DVec3,
     normal: DVec3,
@@ -78,7 +77,7 @@ struct Stand {
 }
 
 /// A cell without the room for sheets that it has not.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Packed {
     center: DVec3,
     support: f64,
@@ -89,18 +88,17 @@ struct Packed {
     piece: u32,
 }
 
-/// The samples of a brick.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct BrickSamples {
-    cells: Vec<Packed>,
-    sheets: Vec<Quadric>,
-    /// Samples in the brick, and those in its halo.
-    own: Vec<Stand>,
-    beyond: Vec<Stand>,
-    /// Bodies; in a brick mostly parts of one.
-    pieces: u32,
-    /// Whether the file told of the outside.
-    told: bool,
+/// What is known of the samples of a brick together.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BrickFacts {
+    /// Samples in the brick.
+    pub samples: usize,
+    /// Box of their centres.
+    pub bounds: Aabb,
+    /// Box of the samples in its halo.
+    beyond: Aabb,
+    /// Widest support of its cells, world units.
+    pub widest: f64,
     /// Standard deviation and distance of the points, world units: the middle of all places.
     pub noise: f64,
     /// See `noise`.
@@ -111,92 +109,36 @@ pub struct BrickSamples {
     pub gap: f64,
     /// Sum of the confidence of its samples.
     pub confidence: f64,
+    /// Bodies; in a brick mostly parts of one.
+    pieces: u32,
+    /// Whether the file told of the outside.
+    told: bool,
 }
 
-impl BrickSamples {
-    /// The samples of one brick; none if its points are too few or no surface.
-    /// * `cloud` - its points and those of its halo
-    /// # Errors
-    /// [`CloudError::Cancelled`].
-    pub fn clean(
-        cloud: &Cloud,
-        brick: &Brick,
-        params: &CleanParams,
-        observer: &dyn Observer,
-    ) -> Result<BrickSamples, CloudError> {
-        if cloud.points.len() < FEWEST_POINTS {
-            return Ok(BrickSamples::default());
-        }
-        match clean(cloud, params, observer) {
-            Ok(samples) => Ok(BrickSamples::of(&samples, brick, is_told(cloud, params))),
-            Err(CloudError::Cancelled(c)) => Err(c.into()),
-            Err(_) => Ok(BrickSamples::default()),
-        }
-    }
+/// Where the samples of a brick stand.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BrickStands {
+    /// In the brick, and in its halo.
+    own: Vec<Stand>,
+    beyond: Vec<Stand>,
+}
 
-    fn of(samples: &Samples, brick: &Brick, told: bool) -> BrickSamples {
-        let mut made = BrickSamples {
-            pieces: samples.closed.len() as u32,
-            told,
-            noise: samples.noise,
-            spacing: samples.spacing,
-            normal_noise_deg: samples.normal_noise_deg,
-            gap: samples.gap,
-            ..BrickSamples::default()
-        };
-        for s in &samples.samples {
-            let stand = Stand {
-                center: s.center,
-                normal: s.normal,
-                area: s.area,
-                radius: s.radius,
-                plate: s.plate,
-                piece: s.segment,
-            };
-            if brick.holds(s.center) {
-                made.own.push(stand);
-                made.confidence += s.confidence;
-            } else {
-                made.beyond.push(stand);
-            }
-        }
-        let tree = KdTree::new(&samples.samples.iter().map(|s| s.center).collect::<Vec<_>>());
-        for cell in samples.cells.iter().filter(|c| brick.holds(c.center)) {
-            let piece = tree.closest(cell.center).map_or(0, |i| samples.samples[i as usize].segment);
-            let Cell { center, support, trust, sheets, count, concave } = *cell;
-            let first_sheet = made.sheets.len() as u32;
-            made.cells.push(Packed { center, support, trust, first_sheet, count, concave, piece });
-            made.sheets.extend(&sheets[..count as usize]);
-        }
-        made
-    }
-
-    /// Number of samples in the brick.
-    pub fn len(&self) -> usize {
-        self.own.len()
-    }
-
-    /// True if there are none.
-    pub fn is_empty(&self) -> bool {
-        self.own.is_empty()
-    }
-
-    /// Box of the centres of its samples.
-    pub fn bounds(&self) -> Aabb {
-        Aabb::of(self.own.iter().map(|s| &s.center))
-    }
-
-    /// Widest support of its cells, world units.
-    pub fn widest(&self) -> f64 {
-        self.cells.iter().map(|c| c.support).fold(0.0, f64::max)
-    }
-
-    /// Centre, and outward normal times area, of its samples.
-    /// * `signs` - as of [`BrickSamples::reaching`]
+impl BrickStands {
+    /// Centre, and outward normal times area, of the samples in the brick.
+    /// * `signs` - as of [`BrickCells::reaching`]
     pub fn dipoles(&self, signs: &[f64]) -> impl Iterator<Item = (DVec3, DVec3)> {
         self.own.iter().map(|s| (s.center, signs[s.piece as usize] * s.area * s.normal))
     }
+}
 
+/// How the sheets join in a brick: its share of the field.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BrickCells {
+    cells: Vec<Packed>,
+    sheets: Vec<Quadric>,
+}
+
+impl BrickCells {
     /// Adds the cells that reach into a box, each with the outside that its piece has.
     /// * `signs` - for each piece 1, or -1 if it is inside out
     pub fn reaching(&self, aabb: &Aabb, signs: &[f64], into: &mut Vec<Cell>) {
@@ -216,6 +158,85 @@ impl BrickSamples {
             cell.sheets[..sheets.len()].copy_from_slice(sheets);
             into.push(if signs[c.piece as usize] < 0.0 { cell.flipped() } else { cell });
         }
+    }
+}
+
+/// The samples of a brick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrickSamples {
+    /// All of them together.
+    pub facts: BrickFacts,
+    /// Where they stand.
+    pub stands: BrickStands,
+    /// How they join.
+    pub cells: BrickCells,
+}
+
+impl BrickSamples {
+    /// The samples of one brick; none if its points are too few or no surface.
+    /// * `cloud` - its points and those of its halo
+    /// # Errors
+    /// [`CloudError::Cancelled`].
+    pub fn clean(
+        cloud: &Cloud,
+        brick: &Brick,
+        params: &CleanParams,
+        observer: &dyn Observer,
+    ) -> Result<BrickSamples, CloudError> {
+        let none = || BrickSamples::of(&Samples::default(), brick, false);
+        if cloud.points.len() < FEWEST_POINTS {
+            return Ok(none());
+        }
+        match clean(cloud, params, observer) {
+            Ok(samples) => Ok(BrickSamples::of(&samples, brick, is_told(cloud, params))),
+            Err(CloudError::Cancelled(c)) => Err(c.into()),
+            Err(_) => Ok(none()),
+        }
+    }
+
+    fn of(samples: &Samples, brick: &Brick, told: bool) -> BrickSamples {
+        let mut stands = BrickStands::default();
+        let mut confidence = 0.0;
+        for s in &samples.samples {
+            let stand = Stand {
+                center: s.center,
+                normal: s.normal,
+                area: s.area,
+                radius: s.radius,
+                plate: s.plate,
+                piece: s.segment,
+            };
+            if brick.holds(s.center) {
+                stands.own.push(stand);
+                confidence += s.confidence;
+            } else {
+                stands.beyond.push(stand);
+            }
+        }
+        let tree = KdTree::new(&samples.samples.iter().map(|s| s.center).collect::<Vec<_>>());
+        let mut kept = BrickCells::default();
+        for cell in samples.cells.iter().filter(|c| brick.holds(c.center)) {
+            let piece = tree.closest(cell.center).map_or(0, |i| samples.samples[i as usize].segment);
+            let Cell { center, support, trust, sheets, count, concave } = *cell;
+            let first_sheet = kept.sheets.len() as u32;
+            kept.cells.push(Packed { center, support, trust, first_sheet, count, concave, piece });
+            kept.sheets.extend(&sheets[..count as usize]);
+        }
+        let around = |stands: &[Stand]| Aabb::of(stands.iter().map(|s| &s.center));
+        let facts = BrickFacts {
+            samples: stands.own.len(),
+            bounds: around(&stands.own),
+            beyond: around(&stands.beyond),
+            widest: kept.cells.iter().map(|c| c.support).fold(0.0, f64::max),
+            noise: samples.noise,
+            spacing: samples.spacing,
+            normal_noise_deg: samples.normal_noise_deg,
+            gap: samples.gap,
+            confidence,
+            pieces: samples.closed.len() as u32,
+            told,
+        };
+        BrickSamples { facts, stands, cells: kept }
     }
 }
 

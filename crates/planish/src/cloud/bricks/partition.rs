@@ -5,9 +5,10 @@
 
 use crate::geom::Aabb;
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// A box of space with the points in it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Brick {
     /// The box: points on its lower faces are in it, those on its upper ones are not. Infinite where no brick is beyond.
     pub aabb: Aabb,
@@ -41,10 +42,14 @@ pub struct Partition {
 impl Partition {
     /// Parts the finite ones of `points` into bricks of at most `most`, but for points that lie in one place.
     pub fn new(points: &[DVec3], most: usize) -> Partition {
+        Partition::within(points, most, Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY })
+    }
+
+    /// As [`Partition::new`], for bricks that fill a box.
+    pub fn within(points: &[DVec3], most: usize, aabb: Aabb) -> Partition {
         let mut order: Vec<u32> = (0..points.len() as u32).filter(|&i| points[i as usize].is_finite()).collect();
-        let all = Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY };
         let mut bricks = Vec::new();
-        divide(points, &mut order, 0, all, most.max(1), &mut bricks);
+        divide(points, &mut order, 0, aabb, most.max(1), &mut bricks);
         Partition { bricks, order }
     }
 

@@ -4,7 +4,7 @@
 //! its own: whether the normals of the two agree is a vote of their bodies. The votes are solved as those of samples are
 //! ([X03] §7, [`super::super::orient`]); then bodies get their outside from a thinned set of all samples.
 
-use super::{Brick, BrickSamples, Stand};
+use super::{BrickFacts, BrickStore, Stand, StoreError};
 use crate::cloud::Quadric;
 use crate::cloud::local::fitted::Fit;
 use crate::cloud::orient::link::{Vote, components};
@@ -12,6 +12,7 @@ use crate::cloud::orient::{Hints, contracted, outward};
 use crate::geom::KdTree;
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Samples near one of another brick that may be the same place of the surface.
@@ -25,7 +26,7 @@ const SAME_PLACE_COSINE: f64 = 0.8;
 const MOST_ASKED: usize = 1 << 17;
 
 /// Which way the pieces of all bricks look.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sides {
     /// For each brick and piece of it 1, or -1 if it is inside out.
     pub signs: Vec<Vec<f64>>,
@@ -37,20 +38,23 @@ pub struct Sides {
 
 impl Sides {
     /// Settles the sides of all pieces.
-    /// * `bricks` - with the samples of each
-    pub fn new(bricks: &[Brick], samples: &[BrickSamples]) -> Sides {
+    /// * `store` - with the samples of all bricks
+    /// # Errors
+    /// If they cannot be read.
+    pub fn new(store: &dyn BrickStore) -> Result<Sides, StoreError> {
+        let count = store.bricks().len();
+        let facts = (0..count).map(|b| store.facts(b)).collect::<Result<Vec<BrickFacts>, _>>()?;
         let mut first = vec![0u32];
-        samples.iter().for_each(|s| first.push(first[first.len() - 1] + s.pieces));
+        facts.iter().for_each(|f| first.push(first[first.len() - 1] + f.pieces));
         // What a file tells of the outside is one more piece, which everything told agrees with.
-        let told = first[samples.len()];
+        let told = first[count];
         let mut sums: BTreeMap<(u32, u32), f64> = BTreeMap::new();
-        let met: Vec<Vec<(u32, u32, f64)>> =
-            (0..bricks.len()).into_par_iter().map(|b| meetings(b, bricks, samples, &first)).collect();
-        for (i, j, agree) in met.into_iter().flatten() {
+        let met = (0..count).into_par_iter().map(|b| meetings(b, store, &facts, &first));
+        for (i, j, agree) in met.collect::<Result<Vec<_>, _>>()?.into_iter().flatten() {
             *sums.entry((i.min(j), i.max(j))).or_insert(0.0) += agree;
         }
-        for (brick, from) in samples.iter().zip(&first).filter(|(s, _)| s.told) {
-            brick.own.iter().for_each(|s| *sums.entry((from + s.piece, told)).or_insert(0.0) += 1.0);
+        for b in (0..count).filter(|&b| facts[b].told) {
+            store.stands(b)?.own.iter().for_each(|s| *sums.entry((first[b] + s.piece, told)).or_insert(0.0) += 1.0);
         }
         let vote = |((a, b), sum): (&(u32, u32), &f64)| Vote {
             a: *a,
@@ -66,24 +70,32 @@ impl Sides {
         let turned =
             body.iter().zip(&sign).map(|(b, s)| if *b == body[told as usize] { s * sign[told as usize] } else { *s });
         sign = turned.collect();
-        let (closed, inside_out) = outside(samples, &first, &body, &sign);
+        let asked = Asked::new(store, &facts, &first)?;
+        let (closed, inside_out) = outside(&asked, &body, &sign);
         sign.iter_mut().zip(&body).filter(|(_, b)| inside_out[**b as usize]).for_each(|(s, _)| *s = -*s);
         let signs = first.windows(2).map(|w| sign[w[0] as usize..w[1] as usize].to_vec()).collect();
         let mut bodies: Vec<u32> = body[..told as usize].to_vec();
         bodies.sort_unstable();
         bodies.dedup();
-        Sides { signs, closed, bodies: bodies.len() }
+        Ok(Sides { signs, closed, bodies: bodies.len() })
     }
 }
 
 /// Where samples in halos of others stand in a brick: both pieces, and whether they agree (1) or not (-1).
-fn meetings(b: usize, bricks: &[Brick], samples: &[BrickSamples], first: &[u32]) -> Vec<(u32, u32, f64)> {
-    let own = &samples[b].own;
+fn meetings(
+    b: usize,
+    store: &dyn BrickStore,
+    facts: &[BrickFacts],
+    first: &[u32],
+) -> Result<Vec<(u32, u32, f64)>, StoreError> {
+    let here = &store.bricks()[b];
+    let stands = store.stands(b)?;
+    let own = &stands.own;
     let tree = KdTree::new(&own.iter().map(|s| s.center).collect::<Vec<_>>());
     let mut near = Vec::new();
     let mut found = Vec::new();
-    for a in (0..bricks.len()).filter(|&a| a != b) {
-        for s in samples[a].beyond.iter().filter(|s| bricks[b].holds(s.center)) {
+    for a in (0..facts.len()).filter(|&a| a != b && facts[a].beyond.meets(&here.aabb)) {
+        for s in store.stands(a)?.beyond.iter().filter(|s| here.holds(s.center)) {
             tree.nearest_within(s.center, SAME_PLACE_ASKED, SAME_PLACE_RADII * s.radius, &mut near);
             let aside = |t: &Stand| (t.center - s.center).dot(s.normal).abs();
             let same = near.iter().map(|n| &own[n.1 as usize]).filter(|t| {
@@ -95,18 +107,38 @@ fn meetings(b: usize, bricks: &[Brick], samples: &[BrickSamples], first: &[u32])
             }
         }
     }
-    found
+    Ok(found)
+}
+
+/// Samples that tell where the outside is.
+struct Asked {
+    /// Every `step`-th of all, with its piece.
+    stands: Vec<(Stand, usize)>,
+    step: usize,
+}
+
+impl Asked {
+    fn new(store: &dyn BrickStore, facts: &[BrickFacts], first: &[u32]) -> Result<Asked, StoreError> {
+        let count: usize = facts.iter().map(|f| f.samples).sum();
+        let step = count.div_ceil(MOST_ASKED).max(1);
+        let mut stands = Vec::new();
+        let mut before = 0usize;
+        for (b, from) in (0..facts.len()).zip(first) {
+            let own = &store.stands(b)?.own;
+            let skipped = before.next_multiple_of(step) - before;
+            stands.extend(own.iter().skip(skipped).step_by(step).map(|s| (*s, (from + s.piece) as usize)));
+            before += own.len();
+        }
+        Ok(Asked { stands, step })
+    }
 }
 
 /// Whether the largest body is closed, and for each body, by its label, whether it is inside out.
-fn outside(samples: &[BrickSamples], first: &[u32], body: &[u32], sign: &[f64]) -> (bool, Vec<bool>) {
+fn outside(asked: &Asked, body: &[u32], sign: &[f64]) -> (bool, Vec<bool>) {
     let told = body[body.len() - 1];
-    let count: usize = samples.iter().map(BrickSamples::len).sum();
-    let step = count.div_ceil(MOST_ASKED).max(1);
-    let all = samples.iter().zip(first).flat_map(|(s, from)| s.own.iter().map(move |t| (t, (from + t.piece) as usize)));
-    let asked: Vec<(&Stand, usize)> = all.step_by(step).collect();
+    let Asked { stands: asked, step } = asked;
     let fits: Vec<Fit> = asked.iter().map(|(s, _)| as_fit(s)).collect();
-    let areas: Vec<f64> = asked.iter().map(|(s, _)| step as f64 * s.area).collect();
+    let areas: Vec<f64> = asked.iter().map(|(s, _)| *step as f64 * s.area).collect();
     let before: Vec<f64> = asked.iter().map(|(_, piece)| sign[*piece]).collect();
     let known: Vec<DVec3> = asked
         .iter()

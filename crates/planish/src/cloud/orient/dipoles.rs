@@ -5,6 +5,7 @@
 //! series there (their §3.2): of the two sides of a plate the first cancels, and the number is off by a tenth with that alone.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// A group counts as one from this many of its radii on: off by .03 at most, .01 in the mean of squares, for thin plates
@@ -16,14 +17,14 @@ const ROUGH: f64 = 0.02;
 const SAMPLES_PER_LEAF: usize = 8;
 
 /// A tree of dipoles.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Dipoles {
     nodes: Vec<Node>,
     centers: Vec<DVec3>,
     moments: Vec<DVec3>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Node {
     center: DVec3,
     radius: f64,
@@ -142,7 +143,7 @@ impl Node {
 }
 
 /// Sum of m x: xx, yy, zz, yz, zx, xy of its symmetric part, without trace.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Second([f64; 6]);
 
 impl Second {
@@ -165,7 +166,7 @@ impl Second {
 }
 
 /// Sum of m x x: xxx, yyx, zzx, yyy, zzy, xxy, zzz, xxz, yyz, xyz of its symmetric part, without trace.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Third([f64; 10]);
 
 impl Third {

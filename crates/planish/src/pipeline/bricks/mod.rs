@@ -13,8 +13,10 @@
 mod weld;
 
 use super::scan::{self, MEASURED_POINTS, ScanError, ScanFacts, ScanMeshed, ScanParams};
-use crate::cloud::bricks::{BrickSamples, Partition, Sides, halo};
-use crate::cloud::{Cell, Cloud, CloudError, Dipoles, Samples};
+use crate::cloud::bricks::{
+    Brick, BrickFacts, BrickSamples, BrickStore, CloudStore, Sides, StoreError, halo, points_of,
+};
+use crate::cloud::{Cell, CleanParams, Cloud, CloudError, Dipoles, Samples};
 use crate::contour::{self, ContourCounts, ContourError, Extracted, Meshed, MeshingError};
 use crate::field::{FieldScale, Lattice, SampleField, Spacing, Thin};
 use crate::geom::Aabb;
@@ -22,6 +24,7 @@ use crate::mesh::TriMesh;
 use crate::observe::{Observer, Part};
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use weld::{Piece, Welder};
 
@@ -29,8 +32,8 @@ use weld::{Piece, Welder};
 pub const BRICK_POINTS: usize = 1 << 19;
 /// Bytes of a brick at work, for each of its points: measured at 840.
 const WORK_BYTES: u64 = 1000;
-/// Bytes for each point of the scan that stay: the point, its number, its share of the samples and of the mesh.
-const KEPT_BYTES: u64 = 100;
+/// Bytes of the mesh for each point of the scan.
+const MESH_BYTES: u64 = 40;
 /// A brick is meshed so many cells beyond its box: lines are found and made even by what is around, and where neighbours find
 /// others their triangles do not fit.
 const MESH_HALO: usize = 24;
@@ -42,72 +45,59 @@ const CELL_BITS: i32 = 20;
 /// [`ScanError`].
 pub fn mesh_scan(cloud: &Cloud, params: &ScanParams, observer: &dyn Observer) -> Result<ScanMeshed, ScanError> {
     if cloud.points.len() > BRICK_POINTS {
-        mesh_in_bricks(cloud, BRICK_POINTS, params, observer)
+        mesh_bricks(&CloudStore::new(cloud, BRICK_POINTS), params, observer)
     } else {
         scan::mesh_at_once(cloud, params, observer)
     }
 }
 
-/// Meshes a scan in bricks of at most `most` points.
+/// Meshes a scan that lies in bricks.
 /// # Errors
 /// [`ScanError`].
-pub fn mesh_in_bricks(
-    cloud: &Cloud,
-    most: usize,
+pub fn mesh_bricks(
+    store: &dyn BrickStore,
     params: &ScanParams,
     observer: &dyn Observer,
 ) -> Result<ScanMeshed, ScanError> {
-    let partition = Partition::new(&cloud.points, most);
-    let at_once = bricks_at_once(&partition, params.memory)?;
+    let at_once = bricks_at_once(store, params.memory)?;
     let part = |from: f64, to: f64| Part::new(observer, from, to - from);
-    let halo = halo(cloud, &partition, &params.clean, &part(0.0, 0.03))?;
-    let count = partition.bricks.len();
-    let mut samples = Vec::with_capacity(count);
-    let cleaned = |k: usize, o: &dyn Observer| {
-        let near = cloud.select(&partition.around(&cloud.points, k, halo));
-        Ok(BrickSamples::clean(&near, &partition.bricks[k], &params.clean, o)?)
-    };
-    in_groups(count, at_once, &part(0.03, 0.6), cleaned, |brick| samples.push(brick))?;
-    let sides = Sides::new(&partition.bricks, &samples);
-    let facts = facts_of(&partition, &samples, &sides);
-    if facts.samples == 0 {
-        return Err(CloudError::NoSurface { points: partition.order.len() }.into());
-    }
+    let halo = halo(store, &params.clean, &part(0.0, 0.03))?;
+    let count = store.bricks().len();
+    let cleaned = |k: usize, o: &dyn Observer| Ok(clean_brick(store, k, halo, &params.clean, o)?);
+    in_groups(count, at_once, &part(0.03, 0.6), cleaned, |()| {})?;
+    let plan = BrickPlan::new(store, halo, params)?;
     observer.check()?;
-    let whole = Whole::new(cloud, (partition, halo), (samples, sides), facts, params)?;
-    let mut welder = Welder::new(whole.lattice.step.x);
-    let mut counts = ContourCounts::default();
-    let (mut mended, mut lids) = (0, 0);
-    let meshed = |k: usize, o: &dyn Observer| whole.brick(k, params, o);
-    in_groups(count, at_once, &part(0.62, 0.97), meshed, |made| {
-        let Some(brick) = made else { return };
-        counts += brick.counts;
-        mended += brick.mended;
-        lids += brick.lids;
-        welder.add(brick.piece);
-    })?;
-    let welded = welder.finish();
-    let (mut mesh, mut tags) = (welded.mesh, welded.tags);
-    if mesh.triangles.is_empty() {
-        return Err(MeshingError::from(ContourError::Nothing { cells: whole.lattice.cells }).into());
-    }
-    let to_points = scan::distances(&welded.reached);
-    let specks = scan::drop_specks(&mut mesh, &mut tags, &welded.reached);
-    tags.mark(&mut mesh);
+    let mut welding = BrickWelder::new(&plan);
+    let meshed = |k: usize, o: &dyn Observer| plan.mesh(store, k, params, o);
+    in_groups(count, at_once, &part(0.62, 0.97), meshed, |made| welding.add(made))?;
+    let made = welding.finish()?;
     observer.progress(1.0);
-    let extracted = Extracted { mesh, tags, counts };
-    let meshed = Meshed { extracted, lattice: whole.lattice, mended, thin: Thin::default() };
-    let closed = whole.closed;
-    Ok(ScanMeshed { samples: Samples::default(), facts, meshed, bricks: count, specks, closed, lids, to_points })
+    Ok(made)
+}
+
+/// Cleans a brick and keeps its samples.
+/// * `halo` - as of [`halo`]
+/// # Errors
+/// [`CloudError`].
+pub fn clean_brick(
+    store: &dyn BrickStore,
+    brick: usize,
+    halo: f64,
+    params: &CleanParams,
+    observer: &dyn Observer,
+) -> Result<(), CloudError> {
+    let near = store.around(brick, halo)?;
+    let samples = BrickSamples::clean(&near, &store.bricks()[brick], params, observer)?;
+    Ok(store.keep(brick, samples)?)
 }
 
 /// How many bricks may be worked at once.
 /// # Errors
 /// [`ScanError::Memory`] if there is none.
-fn bricks_at_once(partition: &Partition, memory: u64) -> Result<usize, ScanError> {
-    let points = partition.order.len();
-    let largest = partition.bricks.iter().map(|b| b.range.len()).max().unwrap_or(0) as u64;
-    let kept = KEPT_BYTES * points as u64;
+fn bricks_at_once(store: &dyn BrickStore, memory: u64) -> Result<usize, ScanError> {
+    let points = points_of(store.bricks());
+    let largest = store.bricks().iter().map(|b| b.range.len()).max().unwrap_or(0) as u64;
+    let kept = (store.held() + MESH_BYTES) * points as u64;
     let one = WORK_BYTES * largest;
     if kept + one > memory {
         return Err(ScanError::Memory { points, needed: kept + one, allowed: memory });
@@ -137,40 +127,12 @@ fn in_groups<T: Send>(
     Ok(())
 }
 
-/// The facts of all bricks together: of middles the middle, by the samples that each has.
-fn facts_of(partition: &Partition, samples: &[BrickSamples], sides: &Sides) -> ScanFacts {
-    let count: usize = samples.iter().map(BrickSamples::len).sum();
-    let share = |part: f64, of: &dyn Fn(&BrickSamples) -> f64| {
-        let mut all: Vec<(f64, usize)> = samples.iter().filter(|s| !s.is_empty()).map(|s| (of(s), s.len())).collect();
-        all.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        let mut before = 0;
-        let reached = |a: &&(f64, usize)| {
-            before += a.1;
-            before as f64 > part * count as f64
-        };
-        all.iter().find(reached).map_or(f64::INFINITY, |a| a.0)
-    };
-    ScanFacts {
-        samples: count,
-        confidence: samples.iter().map(|s| s.confidence).sum::<f64>() / count.max(1) as f64,
-        segments: sides.bodies,
-        noise: share(0.5, &|s| s.noise),
-        spacing: share(0.5, &|s| s.spacing),
-        normal_noise_deg: share(0.5, &|s| s.normal_noise_deg),
-        gap: share(0.05, &|s| s.gap),
-        diagonal: bounds(partition.bricks.iter().map(|b| b.bounds)).diagonal(),
-    }
-}
-
-fn bounds(boxes: impl Iterator<Item = Aabb>) -> Aabb {
-    Aabb::of(&boxes.flat_map(|b| [b.min, b.max]).collect::<Vec<_>>())
-}
-
-/// What every brick needs to be meshed.
-struct Whole<'a> {
-    cloud: &'a Cloud,
-    partition: Partition,
-    samples: Vec<BrickSamples>,
+/// What every brick needs to be meshed: what was settled for all of them.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct BrickPlan {
+    bricks: Vec<Brick>,
+    /// Of each brick the box that its cells reach.
+    reach: Vec<Aabb>,
     sides: Sides,
     facts: ScanFacts,
     scale: FieldScale,
@@ -181,42 +143,62 @@ struct Whole<'a> {
     halo: f64,
 }
 
-/// The mesh of a brick.
-struct Made {
-    piece: Piece,
+/// The mesh of a brick; nothing where no surface passes it.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct BrickMesh {
+    piece: Option<Piece>,
     counts: ContourCounts,
     mended: usize,
     lids: usize,
 }
 
-impl<'a> Whole<'a> {
-    fn new(
-        cloud: &'a Cloud,
-        (partition, halo): (Partition, f64),
-        (samples, sides): (Vec<BrickSamples>, Sides),
-        facts: ScanFacts,
-        params: &ScanParams,
-    ) -> Result<Whole<'a>, ScanError> {
+impl BrickPlan {
+    /// Settles what one brick cannot know: sides, lattice, whether holes are closed.
+    /// * `store` - with the samples of all bricks
+    /// * `halo` - that they were made with
+    /// # Errors
+    /// [`ScanError`] if there are no samples, or if they cannot be read.
+    pub fn new(store: &dyn BrickStore, halo: f64, params: &ScanParams) -> Result<BrickPlan, ScanError> {
+        let bricks = store.bricks().to_vec();
+        let bad = |e: StoreError| ScanError::Cloud(e.into());
+        let each = (0..bricks.len()).map(|k| store.facts(k)).collect::<Result<Vec<BrickFacts>, _>>().map_err(bad)?;
+        let sides = Sides::new(store).map_err(bad)?;
+        let facts = facts_of(&bricks, &each, &sides);
+        if facts.samples == 0 {
+            return Err(CloudError::NoSurface { points: points_of(&bricks) }.into());
+        }
         let closed = params.close.unwrap_or(sides.closed);
-        let dipoles = || samples.iter().zip(&sides.signs).flat_map(|(s, signs)| s.dipoles(signs)).collect::<Vec<_>>();
-        let closing = closed.then(|| Arc::new(Dipoles::new(&dipoles())));
-        let widest = samples.iter().map(BrickSamples::widest).fold(0.0, f64::max);
-        let bounds = bounds(samples.iter().filter(|s| !s.is_empty()).map(BrickSamples::bounds));
+        let mut dipoles = Vec::new();
+        for k in (0..bricks.len()).filter(|_| closed) {
+            dipoles.extend(store.stands(k).map_err(bad)?.dipoles(&sides.signs[k]));
+        }
+        let closing = closed.then(|| Arc::new(Dipoles::new(&dipoles)));
+        let widest = each.iter().map(|f| f.widest).fold(0.0, f64::max);
+        let bounds = bounds(each.iter().filter(|f| f.samples > 0).map(|f| f.bounds));
         let scale = FieldScale { bounds, widest, noise_deg: facts.normal_noise_deg };
         let around = Aabb { min: bounds.min - 0.5 * widest, max: bounds.max + 0.5 * widest };
         let spacing = params.cells.unwrap_or_else(|| Spacing::Voxel(facts.voxel()));
         let lattice = exact(&Lattice::around(&around, spacing).map_err(MeshingError::from)?);
         let halo = halo.max(MESH_HALO as f64 * lattice.step.x);
-        Ok(Whole { cloud, partition, samples, sides, facts, scale, lattice, closed, closing, halo })
+        let reach = bricks.iter().zip(&each).map(|(b, f)| b.reach(f.widest)).collect();
+        Ok(BrickPlan { bricks, reach, sides, facts, scale, lattice, closed, closing, halo })
     }
 
-    /// The mesh of a brick; nothing where no surface passes it.
-    fn brick(&self, k: usize, params: &ScanParams, observer: &dyn Observer) -> Result<Option<Made>, ScanError> {
+    /// The mesh of a brick.
+    /// # Errors
+    /// [`ScanError`].
+    pub fn mesh(
+        &self,
+        store: &dyn BrickStore,
+        k: usize,
+        params: &ScanParams,
+        observer: &dyn Observer,
+    ) -> Result<BrickMesh, ScanError> {
         let [low, high] = self.cells_of(k);
         let from = low.map(|n| n.saturating_sub(MESH_HALO));
         let to = [0, 1, 2].map(|a| (high[a] + MESH_HALO).min(self.lattice.cells[a]));
         if (0..3).any(|a| low[a] >= high[a]) {
-            return Ok(None);
+            return Ok(BrickMesh::default());
         }
         let Lattice { step, .. } = self.lattice;
         let lattice = Lattice {
@@ -225,42 +207,36 @@ impl<'a> Whole<'a> {
             cells: [0, 1, 2].map(|a| to[a] - from[a]),
         };
         lattice.check_memory(None, params.memory).map_err(MeshingError::from)?;
+        let here = lattice.bounds();
         let mut cells: Vec<Cell> = Vec::new();
-        for (s, signs) in self.samples.iter().zip(&self.sides.signs) {
-            s.reaching(&lattice.bounds(), signs, &mut cells);
+        for j in (0..self.bricks.len()).filter(|&j| self.reach[j].meets(&here)) {
+            store.cells(j).map_err(CloudError::from)?.reaching(&here, &self.sides.signs[j], &mut cells);
         }
         if cells.is_empty() {
-            return Ok(None);
+            return Ok(BrickMesh::default());
         }
         let field = SampleField::of_cells(&cells, &self.scale, self.closing.clone());
         let mut meshed = match contour::on_lattice(&field, &lattice, &params.contour, observer) {
             Ok(meshed) => meshed,
-            Err(MeshingError::Contour(ContourError::Nothing { .. })) => return Ok(None),
+            Err(MeshingError::Contour(ContourError::Nothing { .. })) => return Ok(BrickMesh::default()),
             Err(e) => return Err(e.into()),
         };
         drop((field, cells));
-        let near: Vec<DVec3> = self
-            .partition
-            .around(&self.cloud.points, k, self.halo)
-            .into_iter()
-            .map(|i| self.cloud.points[i as usize])
-            .collect();
+        let near = store.around(k, self.halo).map_err(CloudError::from)?.points;
         let lids = scan::complete(&mut meshed, &self.facts, (&near, self.closed), params, observer)?;
-        let own: Vec<DVec3> = self.partition.order[self.partition.bricks[k].range.clone()]
-            .iter()
-            .map(|&i| self.cloud.points[i as usize])
-            .collect();
-        let step = self.partition.order.len().div_ceil(MEASURED_POINTS).max(1);
+        let own: Vec<DVec3> = near.into_iter().filter(|p| self.bricks[k].holds(*p)).collect();
+        let step = points_of(&self.bricks).div_ceil(MEASURED_POINTS).max(1);
         let reached = scan::reach(&own, step, &meshed.extracted.mesh, observer)?;
         let inner = [low, high].map(|n| self.lattice.node(n[0], n[1], n[2]));
         let kept = self.kept(&meshed.extracted.mesh, low, high, inner);
         let Extracted { mesh, tags, counts } = meshed.extracted;
-        Ok(Some(Made { piece: Piece::cut(mesh, tags, &kept, &reached), counts, mended: meshed.mended, lids }))
+        let piece = Some(Piece::cut(mesh, tags, &kept, &reached));
+        Ok(BrickMesh { piece, counts, mended: meshed.mended, lids })
     }
 
     /// The cells of a brick: from, and up to, along each axis.
     fn cells_of(&self, k: usize) -> [[usize; 3]; 2] {
-        let Aabb { min, max } = self.partition.bricks[k].aabb;
+        let Aabb { min, max } = self.bricks[k].aabb;
         [min, max].map(|p| {
             [0, 1, 2].map(|a| {
                 let n = ((p[a] - self.lattice.origin[a]) / self.lattice.step[a]).ceil();
@@ -279,6 +255,88 @@ impl<'a> Whole<'a> {
             })
         };
         (0..mesh.triangles.len()).map(middle_in).collect()
+    }
+}
+
+/// The facts of all bricks together: of middles the middle, by the samples that each has.
+fn facts_of(bricks: &[Brick], each: &[BrickFacts], sides: &Sides) -> ScanFacts {
+    let count: usize = each.iter().map(|f| f.samples).sum();
+    let share = |part: f64, of: &dyn Fn(&BrickFacts) -> f64| {
+        let mut all: Vec<(f64, usize)> = each.iter().filter(|f| f.samples > 0).map(|f| (of(f), f.samples)).collect();
+        all.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let mut before = 0;
+        let reached = |a: &&(f64, usize)| {
+            before += a.1;
+            before as f64 > part * count as f64
+        };
+        all.iter().find(reached).map_or(f64::INFINITY, |a| a.0)
+    };
+    ScanFacts {
+        samples: count,
+        confidence: each.iter().map(|f| f.confidence).sum::<f64>() / count.max(1) as f64,
+        segments: sides.bodies,
+        noise: share(0.5, &|f| f.noise),
+        spacing: share(0.5, &|f| f.spacing),
+        normal_noise_deg: share(0.5, &|f| f.normal_noise_deg),
+        gap: share(0.05, &|f| f.gap),
+        diagonal: bounds(bricks.iter().map(|b| b.bounds)).diagonal(),
+    }
+}
+
+fn bounds(boxes: impl Iterator<Item = Aabb>) -> Aabb {
+    Aabb::of(&boxes.flat_map(|b| [b.min, b.max]).collect::<Vec<_>>())
+}
+
+/// Meshes of bricks on their way to be one.
+pub struct BrickWelder<'a> {
+    plan: &'a BrickPlan,
+    welder: Welder,
+    counts: ContourCounts,
+    mended: usize,
+    lids: usize,
+}
+
+impl<'a> BrickWelder<'a> {
+    /// Nothing yet.
+    pub fn new(plan: &'a BrickPlan) -> BrickWelder<'a> {
+        let welder = Welder::new(plan.lattice.step.x);
+        BrickWelder { plan, welder, counts: ContourCounts::default(), mended: 0, lids: 0 }
+    }
+
+    /// Adds the mesh of a brick. They come in the order of the bricks, or the mesh is another one.
+    pub fn add(&mut self, made: BrickMesh) {
+        self.counts += made.counts;
+        self.mended += made.mended;
+        self.lids += made.lids;
+        if let Some(piece) = made.piece {
+            self.welder.add(piece);
+        }
+    }
+
+    /// The mesh of the scan.
+    /// # Errors
+    /// [`ContourError::Nothing`] if no brick has a surface.
+    pub fn finish(self) -> Result<ScanMeshed, ScanError> {
+        let BrickPlan { facts, lattice, closed, bricks, .. } = self.plan;
+        let welded = self.welder.finish();
+        let (mut mesh, mut tags) = (welded.mesh, welded.tags);
+        if mesh.triangles.is_empty() {
+            return Err(MeshingError::from(ContourError::Nothing { cells: lattice.cells }).into());
+        }
+        let to_points = scan::distances(&welded.reached);
+        let specks = scan::drop_specks(&mut mesh, &mut tags, &welded.reached);
+        tags.mark(&mut mesh);
+        let extracted = Extracted { mesh, tags, counts: self.counts };
+        Ok(ScanMeshed {
+            samples: Samples::default(),
+            facts: *facts,
+            meshed: Meshed { extracted, lattice: *lattice, mended: self.mended, thin: Thin::default() },
+            bricks: bricks.len(),
+            specks,
+            closed: *closed,
+            lids: self.lids,
+            to_points,
+        })
     }
 }
 

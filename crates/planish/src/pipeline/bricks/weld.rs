@@ -7,6 +7,7 @@
 use crate::mend::{close_around, part_fans};
 use crate::mesh::{Adjacency, FeatureKind, FeatureTags, NONE, TriMesh, boundary_loops, next};
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, HashSet};
 
 /// Vertices on both sides of a cut are one if they are closer than so many cells.
@@ -17,6 +18,7 @@ const LID_RINGS: usize = 3;
 const MEND_ROUNDS: usize = 6;
 
 /// What a brick keeps of its mesh.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Piece {
     mesh: TriMesh,
     tags: FeatureTags,
