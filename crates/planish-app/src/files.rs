@@ -5,7 +5,8 @@ use planish::cloud::Cloud;
 use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{Model, Units};
 use planish::network::Network;
-use planish::pipeline::Warning;
+use planish::pipeline::{BRICK_POINTS, Warning};
+use planish_io::BrickFolder;
 use planish_io::report::{Input, count};
 use std::path::Path;
 
@@ -64,12 +65,30 @@ pub fn scan(path: &Path, options: &crate::args::ScanArgs) -> Result<Cloud, Failu
 pub fn scan_body(path: &Path, options: &crate::args::ScanArgs) -> Result<(Cloud, Option<Warning>), Failure> {
     let options = planish_io::ScanOptions { columns: options.columns.clone(), classes: options.classes.clone() };
     let (cloud, left_out) = planish_io::read_body(path, &options).map_err(|e| Failure::input(path, e))?;
+    Ok((cloud, far_off(left_out as u64)))
+}
+
+/// Parts a scan into bricks in a folder, and what to tell of points that are too far off to be of it.
+/// # Errors
+/// If the file is no usable scan, or the folder cannot be written.
+pub fn scan_in_bricks(
+    path: &Path,
+    options: &crate::args::ScanArgs,
+    folder: &Path,
+) -> Result<(BrickFolder, Option<Warning>), Failure> {
+    let options = planish_io::ScanOptions { columns: options.columns.clone(), classes: options.classes.clone() };
+    let bricks = BrickFolder::create(path, &options, folder, BRICK_POINTS).map_err(|e| Failure::input(path, e))?;
+    let left_out = bricks.left_out();
+    Ok((bricks, far_off(left_out)))
+}
+
+fn far_off(left_out: u64) -> Option<Warning> {
     let text = format!(
         "{} points lie more than a hundred times further off than the rest and are left out: wild ranges, or returns that the \
          scanner marks as invalid.",
-        count(left_out as u64)
+        count(left_out)
     );
-    Ok((cloud, (left_out > 0).then(|| Warning::new("points_far_off", text, ""))))
+    (left_out > 0).then(|| Warning::new("points_far_off", text, ""))
 }
 
 /// Reads a model.

@@ -52,13 +52,13 @@ impl PyCloud {
 }
 
 /// The parameters of meshing a scan.
-fn scan_params(given: &mut Given, close: Option<bool>, memory: Option<f64>) -> PyResult<ScanParams> {
+pub fn scan_params(given: &mut Given, close: Option<bool>, memory: Option<f64>) -> PyResult<ScanParams> {
     let base = ScanParams { close, memory: bytes(memory)?, ..given.take()? };
     Ok(ScanParams { clean: given.take()?, contour: given.take()?, ..base })
 }
 
 /// A scan's mesh with its figures.
-fn mesh_of(made: ScanMeshed) -> PyMesh {
+pub fn mesh_of(made: ScanMeshed) -> PyMesh {
     let more = json!({
         "noise": made.facts.noise, "spacing": made.facts.spacing, "specks": made.specks, "closed": made.closed,
         "lids": made.lids, "to_points_rms": made.to_points.0, "to_points_mean": made.to_points.1,

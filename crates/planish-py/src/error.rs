@@ -3,6 +3,7 @@
 //! Each error enum of the library has its class here; enums that pass on those of other stages pass on their class, too.
 
 use planish::cloud::CloudError;
+use planish::cloud::bricks::StoreError;
 use planish::contour::{ContourError, MeshingError};
 use planish::curve::CurveError;
 use planish::edit::ApplyError;
@@ -87,6 +88,12 @@ impl Told for MeshingError {
             MeshingError::Contour(e) => e.exception(message),
             MeshingError::Level { .. } => class::ContourError::new_err(message),
         }
+    }
+}
+
+impl Told for StoreError {
+    fn exception(&self, message: String) -> PyErr {
+        class::CloudError::new_err(message)
     }
 }
 

@@ -8,6 +8,7 @@
 //! are in `python/planish/`; its stubs are `python/planish/_planish.pyi`, by hand.
 
 mod array;
+mod bricks;
 mod cloud;
 mod curve;
 mod error;
@@ -36,6 +37,8 @@ use pyo3::prelude::*;
 mod _planish {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use crate::bricks::PyBricks;
     #[pymodule_export]
     use crate::cloud::{PyCloud, PySamples};
     #[pymodule_export]

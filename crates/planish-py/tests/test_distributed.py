@@ -74,6 +74,81 @@ def test_a_killed_worker_costs_only_time(tmp_path: Path) -> None:
         assert (tmp_path / "alone" / name).read_bytes() == (table[0].folder / name).read_bytes(), name
 
 
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("scan") / "scan.ply"
+    planish.virtual_scan(planish.demo_part(triangles=20_000), points=12_000, stations=8, outliers=0.0).write(file)
+    return file
+
+
+def alone(scan: Path, folder: Path) -> planish.Mesh:
+    """Bricks in this process, one after the other, the last one first."""
+    bricks = planish.Bricks.create(scan, folder, most=4_000, close=True)
+    assert bricks.points == len(planish.read(scan).points) and len(bricks) > 2
+    for k in reversed(range(len(bricks))):
+        bricks.clean(k)
+    bricks.settle()
+    for k in reversed(range(len(bricks))):
+        bricks.mesh(k)
+    return bricks.weld()
+
+
+def same(a: planish.Mesh, b: planish.Mesh) -> bool:
+    return bool((a.points == b.points).all() and (a.triangles == b.triangles).all())
+
+
+def test_bricks_on_a_cluster_with_a_killed_worker_are_the_mesh_of_one_process(scan: Path, tmp_path: Path) -> None:
+    here = alone(scan, tmp_path / "here")
+    assert here.diagnose()["watertight"]
+    killed: list[int] = []
+
+    def kill(cluster: Any) -> None:
+        end = time.monotonic() + 60.0
+        while not list((tmp_path / "there").glob("facts-*")) and time.monotonic() < end:
+            time.sleep(0.02)
+        worker = next(iter(cluster.workers.values()))
+        killed.append(worker.process.process.pid)
+        os.kill(killed[0], signal.SIGKILL)
+
+    told: list[tuple[str, float]] = []
+    with distributed_library.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        killer = threading.Thread(target=kill, args=(cluster,))
+        killer.start()
+        there = distributed.mesh(
+            scan,
+            cluster=cluster.scheduler_address,
+            folder=tmp_path / "there",
+            most=4_000,
+            close=True,
+            progress=lambda step, share: told.append((step, share)),
+        )
+        killer.join()
+    assert len(killed) == 1 and same(here, there)
+    assert [step for step, share in told if share == 1.0] == ["clean", "settle", "mesh"]
+
+
+def test_bricks_tell_what_is_wrong_with_folders_and_files(scan: Path, tmp_path: Path) -> None:
+    with pytest.raises(planish.CloudError, match="bricks"):
+        planish.Bricks(tmp_path)
+    with pytest.raises(planish.FileError, match="cannot read it"):
+        planish.Bricks.create(tmp_path / "missing.ply", tmp_path / "new")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine").write_text("mine")
+    with pytest.raises(planish.CloudError, match="is not empty"):
+        planish.Bricks.create(scan, tmp_path / "full")
+    with pytest.raises(TypeError, match="voxels"):
+        planish.Bricks.create(scan, tmp_path / "other", voxels=3)  # type: ignore[call-arg]
+    bricks = planish.Bricks.create(scan, tmp_path / "bricks", most=4_000)
+    with pytest.raises(IndexError, match=f"brick 99: there are {len(bricks)}"):
+        bricks.clean(99)
+    with pytest.raises(planish.CloudError, match="facts-00000"):
+        bricks.settle()
+    with pytest.raises(planish.CloudError, match="plan"):
+        bricks.weld()
+    again = planish.Bricks(tmp_path / "bricks")
+    assert (len(again), again.points) == (len(bricks), bricks.points)
+
+
 def test_wrong_options_are_told_as_elsewhere(parts: list[Path], tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="jobs=0"):
         distributed.run_many(parts, tmp_path, jobs=0)

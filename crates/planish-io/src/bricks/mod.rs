@@ -21,6 +21,8 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// Parts of at most so many points are parted in memory: as much as two bricks at work take.
+const AT_ONCE: u64 = 1 << 22;
 /// The file that tells which bricks there are.
 const MANIFEST: &str = "bricks";
 
@@ -51,7 +53,7 @@ impl BrickFolder {
     /// # Errors
     /// As of [`crate::read_body`], or if the folder cannot be written.
     pub fn create(scan: &Path, options: &ScanOptions, folder: &Path, most: usize) -> Result<BrickFolder, ReadError> {
-        let manifest = part::part(scan, options, folder, most)?;
+        let manifest = part::part(scan, options, folder, (most, AT_ONCE))?;
         let made = BrickFolder { folder: folder.to_path_buf(), manifest };
         made.write(MANIFEST, &made.manifest).map_err(|e| ReadError::Io(std::io::Error::other(e)))?;
         Ok(made)
@@ -193,3 +195,101 @@ impl BrickStore for BrickFolder {
 
 /// The winding number's tree, where holes are closed: an eighth of the points have a sample, of some 100 bytes in it.
 const HELD: u64 = 12;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{read_body, write_scan};
+    use planish::Silent;
+    use planish::cloud::bricks::CloudStore;
+    use planish::pipeline::{ScanMeshed, ScanParams, mesh_bricks};
+    use planish::synthetic::{demo, even_scan};
+
+    const MOST: usize = 700;
+
+    /// The folder of a scan whose parts are parted on disk down to 2000 points, and the same scan as it is read whole.
+    fn both(scan: &Cloud, name: &str) -> (tempfile::TempDir, BrickFolder, Cloud) {
+        let room = tempfile::tempdir().unwrap();
+        let file = room.path().join(name);
+        write_scan(&file, scan).unwrap();
+        let folder = room.path().join("folder");
+        std::fs::create_dir(&folder).unwrap();
+        let manifest = part::part(&file, &ScanOptions::default(), &folder, (MOST, 2000)).unwrap();
+        let made = BrickFolder { folder, manifest };
+        made.write(MANIFEST, &made.manifest).unwrap();
+        let (whole, left_out) = read_body(&file, &ScanOptions::default()).unwrap();
+        assert_eq!((made.left_out(), made.points()), (left_out as u64, whole.points.len() as u64));
+        (room, made, whole)
+    }
+
+    fn scan_of(points: usize) -> Cloud {
+        even_scan(&demo(1, 20_000), points, 0.004, 1)
+    }
+
+    fn scan() -> Cloud {
+        scan_of(9_000)
+    }
+
+    /// All that a brick is made of is the same on disk as in memory.
+    fn same(folder: &BrickFolder, whole: &Cloud) {
+        let memory = CloudStore::new(whole, MOST);
+        assert_eq!(folder.bricks(), memory.bricks());
+        assert!(folder.bricks().len() > 12);
+        for k in 0..folder.bricks().len() {
+            for halo in [0.0, 0.3] {
+                let (disk, memory) = (folder.around(k, halo).unwrap(), memory.around(k, halo).unwrap());
+                assert_eq!(disk.attribute("normal", 3), memory.attribute("normal", 3));
+                assert_eq!((disk.points, disk.shift), (memory.points, memory.shift));
+                assert_eq!((disk.scanners, disk.seen_by), (memory.scanners, memory.seen_by));
+            }
+        }
+    }
+
+    #[test]
+    fn points_at_map_coordinates_with_normals_wild_ones_and_equal_ones_are_parted_as_in_memory() {
+        let mut cloud = scan();
+        let map = DVec3::new(515_380.0, 4_918_360.0, 2_300.0);
+        cloud.points.iter_mut().for_each(|p| *p += map);
+        cloud.points[5] = DVec3::new(0.0, 1e9, 0.0);
+        // More on one plane than a brick has points: a cut between equal numbers.
+        (1000..5000).for_each(|k| cloud.points[k].x = cloud.points[1000].x);
+        let values = (0..3 * cloud.points.len()).map(|k| (k as f32).sin()).collect();
+        cloud.attributes = vec![Attribute { name: "normal".into(), width: 3, values }];
+        let (_room, folder, whole) = both(&cloud, "map.ply");
+        assert_eq!(folder.left_out(), 1);
+        same(&folder, &whole);
+    }
+
+    #[test]
+    fn stations_and_formats_of_scanners_are_parted_as_in_memory() {
+        let mut cloud = scan();
+        cloud.scanners = vec![DVec3::new(9.0, 0.0, 0.0), DVec3::new(0.0, 9.0, 0.0)];
+        cloud.seen_by = (0..cloud.points.len() as u32).map(|i| i % 2).collect();
+        let (_room, folder, whole) = both(&cloud, "stations.e57");
+        assert_eq!(whole.scanners.len(), 2);
+        same(&folder, &whole);
+        let (_room, folder, whole) = both(&scan(), "lines.laz");
+        same(&folder, &whole);
+    }
+
+    #[test]
+    fn a_scan_on_disk_has_the_mesh_of_the_same_in_memory_and_a_damaged_folder_is_told() {
+        let (_room, folder, whole) = both(&scan_of(3_000), "scan.ply");
+        let bits = |made: &ScanMeshed| {
+            let mesh = &made.meshed.extracted.mesh;
+            (mesh.points.iter().map(|p| p.to_array().map(f64::to_bits)).collect::<Vec<_>>(), mesh.triangles.clone())
+        };
+        let params = ScanParams::default();
+        let disk = mesh_bricks(&folder, &params, &Silent).unwrap();
+        let memory = mesh_bricks(&CloudStore::new(&whole, MOST), &params, &Silent).unwrap();
+        assert!(bits(&disk) == bits(&memory));
+        assert_eq!(disk.facts, memory.facts);
+        let again = BrickFolder::open(&folder.folder).unwrap();
+        assert_eq!((again.bricks(), again.facts(3)), (folder.bricks(), folder.facts(3)));
+        std::fs::write(folder.folder.join("cells-00003"), b"no cells").unwrap();
+        let told = folder.cells(3).unwrap_err().0;
+        assert!(told.ends_with("cells-00003: is damaged, or of another version of planish"), "{told}");
+        std::fs::remove_file(folder.folder.join(MANIFEST)).unwrap();
+        assert!(BrickFolder::open(&folder.folder).is_err());
+    }
+}

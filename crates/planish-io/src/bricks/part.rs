@@ -25,8 +25,6 @@ pub(super) struct Record {
 
 /// Bytes of a record.
 const RECORD: usize = 44;
-/// Parts of at most so many points are parted in memory: as much as two bricks at work take.
-const AT_ONCE: u64 = 1 << 22;
 /// Bytes read or written at once.
 const BUFFER: usize = 1 << 20;
 
@@ -105,7 +103,13 @@ struct Part {
 }
 
 /// Parts a scan into bricks and writes the points of each.
-pub(super) fn part(scan: &Path, options: &ScanOptions, folder: &Path, most: usize) -> Result<Manifest, ReadError> {
+/// * `most` - points of a brick, and those that are parted in memory
+pub(super) fn part(
+    scan: &Path,
+    options: &ScanOptions,
+    folder: &Path,
+    most: (usize, u64),
+) -> Result<Manifest, ReadError> {
     let mut manifest = Manifest::default();
     let mut all = Sheaf::new(folder.join("part"))?;
     let mut count = 0u64;
@@ -168,11 +172,11 @@ fn sift(part: &Part, mut take: impl FnMut(&Record) -> io::Result<()>) -> io::Res
 }
 
 /// Parts points until there are few enough to be parted in memory.
-fn divide(part: Part, folder: &Path, aabb: Aabb, most: usize, bricks: &mut Vec<Brick>) -> io::Result<()> {
+fn divide(part: Part, folder: &Path, aabb: Aabb, most: (usize, u64), bricks: &mut Vec<Brick>) -> io::Result<()> {
     let size = part.bounds.size();
     let axis = (0..3).fold(0, |best, a| if size[a] > size[best] { a } else { best });
-    if part.count <= AT_ONCE.max(most as u64) || !(size[axis] > 0.0) {
-        return write(part, folder, aabb, most, bricks);
+    if part.count <= most.1.max(most.0 as u64) || !(size[axis] > 0.0) {
+        return write(part, folder, aabb, most.0, bricks);
     }
     let cut = cut(&part, axis)?;
     let name = |which: &str| part.path.with_file_name(format!("{}{which}", name_of(&part.path)));

@@ -8,5 +8,5 @@ mod header;
 mod read;
 mod write;
 
-pub(crate) use read::{is_points, pieces, read, read_points};
+pub(crate) use read::{is_points, pieces, read, read_points, told};
 pub(crate) use write::{write, write_points};

@@ -62,11 +62,31 @@ pub(crate) fn read(bytes: &[u8]) -> Result<(TriMesh, Vec<[u32; 2]>), ReadError> 
 }
 
 /// True if the file is a PLY whose header has vertices and no faces.
-pub(crate) fn is_points(bytes: &[u8]) -> bool {
-    header(bytes).is_ok_and(|head| {
-        let some = |name: &str| head.elements.iter().any(|e| e.name == name && e.count > 0);
-        some("vertex") && !some("face") && !some("tristrips")
+pub(crate) fn is_points(file: &mut BufReader<File>) -> bool {
+    beginning(file).is_ok_and(|bytes| {
+        header(&bytes).is_ok_and(|head| {
+            let some = |name: &str| head.elements.iter().any(|e| e.name == name && e.count > 0);
+            some("vertex") && !some("face") && !some("tristrips")
+        })
     })
+}
+
+/// How many vertices the header tells of.
+pub(crate) fn told(file: &mut BufReader<File>) -> Result<u64, ReadError> {
+    let head = header(&beginning(file)?)?;
+    Ok(head.elements.iter().find(|e| e.name == "vertex").map_or(0, |e| e.count))
+}
+
+/// The bytes of a file up to the end of its header, about.
+fn beginning(file: &mut BufReader<File>) -> Result<Vec<u8>, ReadError> {
+    let mut bytes = Vec::new();
+    while bytes.len() < HEADER_MOST && !bytes.windows(HEADER_END.len()).any(|w| w == HEADER_END) {
+        // An end of line follows the last word.
+        if file.by_ref().take(HEADER_PIECE).read_to_end(&mut bytes)? == 0 {
+            break;
+        }
+    }
+    Ok(bytes)
 }
 
 /// Reads the vertices alone, as points: coordinates that are not numbers stay, faces are stepped over.
@@ -95,13 +115,7 @@ pub(crate) fn pieces(
     at_once: usize,
     take: &mut dyn FnMut(TriMesh) -> Result<(), ReadError>,
 ) -> Result<(), ReadError> {
-    let mut bytes = Vec::new();
-    // An end of line follows the last word of the header.
-    while bytes.len() < HEADER_MOST && !bytes.windows(HEADER_END.len()).any(|w| w == HEADER_END) {
-        if file.by_ref().take(HEADER_PIECE).read_to_end(&mut bytes)? == 0 {
-            break;
-        }
-    }
+    let mut bytes = beginning(&mut file)?;
     let head = header(&bytes);
     let size = file.get_ref().metadata()?.len();
     let first = head.as_ref().ok().filter(|h| h.encoding != Encoding::Ascii).and_then(|h| h.elements.first());

@@ -12,6 +12,11 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
+/// How many points the scans of the file have by its header.
+pub(super) fn told(file: BufReader<File>) -> Result<u64, ReadError> {
+    guarded(move || Ok(E57Reader::new(file).map_err(foreign)?.pointclouds().iter().map(|scan| scan.records).sum()))
+}
+
 pub(super) fn pieces(mut file: BufReader<File>, take: &mut Take) -> Result<Bare, ReadError> {
     let mut mark = [0; 8];
     if file.read_exact(&mut mark).is_err() || mark != *b"ASTM-E57" {

@@ -44,6 +44,14 @@ fn check_chunks(file: &mut (impl Read + Seek), size: u64) -> Result<(), ReadErro
     Ok(())
 }
 
+/// How many points the header tells of.
+pub(super) fn told(mut file: BufReader<File>) -> Result<u64, ReadError> {
+    let size = file.get_ref().metadata()?.len();
+    check_chunks(&mut file, size)?;
+    file.rewind()?;
+    guarded(move || Ok(Reader::new(file).map_err(foreign)?.header().number_of_points()))
+}
+
 pub(super) fn pieces(mut file: BufReader<File>, classes: &[u8], take: &mut Take) -> Result<Bare, ReadError> {
     let mut mark = [0; 4];
     if file.read_exact(&mut mark).is_err() || mark != *b"LASF" {
@@ -55,7 +63,7 @@ pub(super) fn pieces(mut file: BufReader<File>, classes: &[u8], take: &mut Take)
     }
     let size = file.get_ref().metadata()?.len();
     check_chunks(&mut file, size)?;
-    file.seek(SeekFrom::Start(0))?;
+    file.rewind()?;
     guarded(move || {
         let mut reader = Reader::new(file).map_err(foreign)?;
         let count = reader.header().number_of_points();

@@ -18,6 +18,7 @@ use glam::DVec3;
 use planish::Units;
 use planish::cloud::Cloud;
 use planish::mesh::{Attribute, TriMesh};
+use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -42,10 +43,25 @@ pub fn is_scan(path: &Path) -> bool {
         return true;
     }
     match extension.as_str() {
-        "ply" => crate::mesh_file::content(path).is_ok_and(|bytes| ply::is_points(&bytes)),
+        "ply" => opened(path).is_ok_and(|mut file| ply::is_points(&mut file)),
         "npy" => crate::mesh_file::content(path).is_ok_and(|bytes| npy::is_table(&bytes)),
         _ => false,
     }
+}
+
+/// Points that the header of a scan tells of; `None` for formats without one, and for what is damaged.
+pub fn points_told(path: &Path) -> Option<u64> {
+    let mut file = opened(path).ok()?;
+    match lower(path).as_str() {
+        "e57" => e57::told(file).ok(),
+        "las" | "laz" => las::told(file).ok(),
+        "ply" => ply::told(&mut file).ok(),
+        _ => None,
+    }
+}
+
+fn opened(path: &Path) -> Result<BufReader<File>, ReadError> {
+    crate::mesh_file::opened(path).map(BufReader::new)
 }
 
 /// Reads a scan: E57, LAS, LAZ, PLY, PCD, XYZ, TXT, CSV, ASC, PTS, NPY, NPZ, and CONF with the PLY views that it names.
@@ -106,7 +122,7 @@ pub(crate) type Bare = Vec<&'static str>;
 /// As of [`read_scan`], or what `take` says.
 pub(crate) fn pieces(path: &Path, options: &ScanOptions, take: &mut Take) -> Result<Bare, ReadError> {
     let extension = lower(path);
-    let file = BufReader::new(crate::mesh_file::opened(path)?);
+    let file = opened(path)?;
     if file.get_ref().metadata()?.len() == 0 {
         return Err(ReadError::Empty);
     }

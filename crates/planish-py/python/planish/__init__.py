@@ -19,6 +19,7 @@ take `progress=` (True, or a function of the stage's name and the share done) an
 
 from ._batch import Batch, Row, Run, run, run_many
 from ._planish import (
+    Bricks,
     Cloud,
     CloudError,
     CompareError,
@@ -60,6 +61,7 @@ from ._planish import (
 
 __all__ = [
     "Batch",
+    "Bricks",
     "Cloud",
     "CloudError",
     "CompareError",

@@ -1,14 +1,16 @@
-"""Many files on many machines: `run_many` with a Dask cluster in the place of one machine's cores.
+"""Many files, or one large scan, on many machines: a Dask cluster in the place of one machine's cores.
 
     from planish import distributed
 
     distributed.run_many(["a.ply", "b.e57"], "out", patches=60)                            # a cluster of this machine's own
     distributed.run_many(["a.ply", "b.e57"], "out", cluster="tcp://10.0.0.1:8786")         # any Dask cluster, by its address
+    mesh = distributed.mesh("huge.e57", cluster="tcp://10.0.0.1:8786", folder="/shared/huge")
 
-Each input is one task, and each task is `planish run` in a process of its own on its worker: the products are the same bytes,
-in the same folders, as those of `planish.run_many`, whatever the number of workers. Workers read `sources` and write `output`
-by these paths, so on several machines both lie on a file system that all of them have. A task whose worker dies is started
-again on another one; products appear whole or not at all, and what is finished is skipped.
+`run_many`: each input is one task, and each task is `planish run` in a process of its own on its worker: the products are the same
+bytes, in the same folders, as those of `planish.run_many`, whatever the number of workers. `mesh`: each brick of a scan is a task,
+first for its samples and then for its mesh (`planish.Bricks`); the mesh is the same bytes as on one machine. Workers read and
+write files by these paths, so on several machines they lie on a file system that all of them have. A task whose worker dies is
+started again on another one; files appear whole or not at all, and what is finished is not lost.
 
 A script that starts a cluster of its own needs `if __name__ == "__main__":` around the call, as everything does that starts
 processes. It needs `dask.distributed`, imported when it is asked for.
@@ -17,16 +19,17 @@ processes. It needs `dask.distributed`, imported when it is asked for.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+import sys
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ._batch import Batch, Option, Row, _batch, _flags, _tell
-from ._planish import folder_names
+from ._planish import Bricks, Mesh, RunError, folder_names, set_threads
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-__all__ = ["run_many"]
+__all__ = ["mesh", "run_many"]
 
 #: Workers that may die under one task before it counts as failed.
 _DEATHS = 3
@@ -77,6 +80,89 @@ def _task(source: str, output: str, name: str, options: dict[str, Option]) -> Ro
     return _batch(command, 1, progress=False)[0]
 
 
+def mesh(
+    scan: str | os.PathLike[str],
+    *,
+    cluster: Any = None,
+    jobs: int | None = None,
+    memory: float | None = None,
+    folder: str | os.PathLike[str] | None = None,
+    most: int | None = None,
+    columns: str | None = None,
+    classes: Sequence[int] | None = None,
+    close: bool | None = None,
+    progress: bool | Callable[[str, float], object] = False,
+    **parameters: Any,
+) -> Mesh:
+    """The mesh of a scan that is too large for one process, brick by brick on a cluster.
+
+    * scan: the file
+    * cluster, jobs: as of `run_many`
+    * memory: GB that each worker of a cluster that is made here may take; a brick of the usual size takes about half of one
+    * folder: where the bricks lie meanwhile, empty or not there yet; all workers see it. None makes one for the time of the call
+      beside the others of this machine, which is for a cluster of this machine alone
+    * most, columns, classes, close and the keywords of `Cloud.mesh`: as of `Bricks.create`
+    * progress: True writes the steps to stderr; a function is called with the name of the step and the share done
+
+    Returns the mesh: the same bytes as `Bricks` gives in one process. Raises what `Bricks` raises; RunError if workers died three
+    times under one brick; ImportError without `dask.distributed`.
+    """
+    import pathlib
+    import tempfile
+
+    if jobs is not None and jobs < 1:
+        raise ValueError(f"jobs={jobs}: at least 1 is needed")
+    if most is not None:
+        parameters["most"] = most
+    with _client(cluster, jobs, memory) as client, tempfile.TemporaryDirectory(prefix="planish-") as own:
+        place = str(pathlib.Path(folder if folder is not None else own).absolute())
+        bricks = Bricks.create(scan, place, columns=columns, classes=classes, close=close, **parameters)
+        count = len(bricks)
+        _all(client, "clean", place, range(count), progress)
+        _all(client, "settle", place, [-1], progress)
+        _all(client, "mesh", place, range(count), progress)
+        return bricks.weld()
+
+
+def _all(client: Any, step: str, folder: str, bricks: Iterable[int], progress: bool | Callable[[str, float], object]) -> None:
+    """One step of all bricks; the first that fails stops the others."""
+    from distributed import as_completed
+    from distributed.scheduler import KilledWorker
+
+    work = [client.submit(_brick, step, folder, k, key=f"planish-{step}-{k}-{_stamp()}", pure=False) for k in bricks]
+    try:
+        for done, future in enumerate(as_completed(list(work)), start=1):
+            try:
+                future.result()
+            except KilledWorker as error:
+                raise RunError(f"{step}: {_DEATHS} workers died under one brick ({error})") from error
+            if callable(progress):
+                progress(step, done / len(work))
+            elif progress:
+                print(f"{step} {done} of {len(work)}", file=sys.stderr)
+    except BaseException:
+        for future in work:
+            future.cancel()
+        raise
+
+
+#: The bricks that this worker had last: what was settled for all is read once.
+_held: dict[str, Bricks] = {}
+
+
+def _brick(step: str, folder: str, brick: int) -> None:
+    """A step of one brick, on a worker."""
+    set_threads(1)
+    if folder not in _held:
+        _held.clear()
+        _held[folder] = Bricks(folder)
+    bricks = _held[folder]
+    if step == "settle":
+        bricks.settle()
+    else:
+        getattr(bricks, step)(brick)
+
+
 def _gathered(work: dict[Any, int], paths: list[Path], folder: Path, progress: bool | Callable[[Row], None]) -> Batch:
     """The rows as they come, in the order of the inputs."""
     from distributed import as_completed
@@ -109,7 +195,7 @@ def _stamp() -> str:
 class _client:
     """A client of a cluster, which is closed if it was made here."""
 
-    def __init__(self, cluster: Any, jobs: int | None) -> None:
+    def __init__(self, cluster: Any, jobs: int | None, memory: float | None = None) -> None:
         try:
             import distributed
         except ImportError as error:
@@ -121,7 +207,12 @@ class _client:
             return
         if cluster is None:
             # One task at a time for each worker: the runs have threads of their own.
-            cluster = distributed.LocalCluster(n_workers=jobs or os.cpu_count() or 1, threads_per_worker=1, dashboard_address=None)
+            cluster = distributed.LocalCluster(
+                n_workers=jobs or os.cpu_count() or 1,
+                threads_per_worker=1,
+                memory_limit="auto" if memory is None else int(memory * 1e9),
+                dashboard_address=None,
+            )
             self._own.append(cluster)
         self._client = distributed.Client(cluster)
         self._own.insert(0, self._client)

@@ -11,11 +11,12 @@ use crate::args::Mesh;
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::placed::{self, Placed};
-use crate::products::Staged;
+use crate::products::{self, Staged};
 use crate::progress;
 use crate::summary::Summary;
 use planish::DVec3;
-use planish::cloud;
+use planish::cloud::bricks::StoreError;
+use planish::cloud::{self, CloudError};
 use planish::contour::{self, Meshed, MeshingError, Sampling};
 use planish::field::{Field, Formula, MeshBody, Part, ScalarGrid, Solid, Spacing};
 use planish::geom::Aabb;
@@ -24,7 +25,7 @@ use planish::model::Units;
 use planish::pipeline::{self, Figure, ScanError, ScanMeshed, ScanParams, StageRecord, Warning};
 use planish_io::report::{Input, Report, count, number};
 use planish_io::script::Script;
-use planish_io::{MeshFormat, WriteOptions};
+use planish_io::{BrickFolder, MeshFormat, WriteOptions};
 use std::path::Path;
 
 /// Cells along the longest side unless the user says.
@@ -33,6 +34,8 @@ const RESOLUTION: usize = 129;
 enum Source {
     /// With what to tell of points that are not of it.
     Scan(planish::cloud::Cloud, Option<Warning>),
+    /// A large one, with the room that its bricks lie in while they are worked.
+    Bricks(BrickFolder, Option<Warning>, Staged),
     Mesh(Placed),
     Script(Script),
     Grid(Box<planish::field::ScalarGrid>),
@@ -43,6 +46,7 @@ impl Source {
     fn shift(&self) -> DVec3 {
         match self {
             Source::Scan(scan, _) => scan.shift,
+            Source::Bricks(bricks, ..) => bricks.shift(),
             Source::Mesh(placed) => placed.shift,
             Source::Script(_) | Source::Grid(_) => DVec3::ZERO,
         }
@@ -57,7 +61,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let grid_params = args.volume.params(None)?;
     let ((source, input, units), read) = session.step("read", || read(session, args, params.cells))?;
     match &source {
-        Source::Scan(..) => {}
+        Source::Scan(..) | Source::Bricks(..) => {}
         Source::Grid(_) => {
             args.meshing.refuse_cleaning("--volume-close tells whether the border of a volume closes the surface")?
         }
@@ -76,6 +80,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let (made, record) = session.bars.step("mesh", |o| {
         Ok::<Made, Trouble>(match &source {
             Source::Scan(scan, _) => Made::OfScan(Box::new(pipeline::mesh_scan(scan, &params, o)?)),
+            Source::Bricks(bricks, ..) => Made::OfScan(Box::new(pipeline::mesh_bricks(bricks, &params, o)?)),
             Source::Mesh(placed) => plain(contour::from_mesh(&placed.mesh, sampling, contour, o)?),
             Source::Script(Script::Part(part)) => plain(contour::from_part(part, sampling, contour, o)?),
             Source::Script(Script::Job(milling)) => plain(contour::from_field(milling, sampling, contour, o)?),
@@ -101,14 +106,14 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
             .map_err(|e| write_failure(&args.input, &args.output, e))
     })?;
     let mut report = Report::new("mesh", input);
-    if let Source::Mesh(_) | Source::Scan(..) = &source {
+    if let Source::Mesh(_) | Source::Scan(..) | Source::Bricks(..) = &source {
         let far = shift != DVec3::ZERO;
         report.warnings.extend(session.guessed_units(&args.input, report.input.diagonal, far));
     }
     if let Source::Mesh(placed) = &source {
         report.warnings.extend(placed.warning(units.symbol()));
     }
-    if let Source::Scan(_, far_off) = &source {
+    if let Source::Scan(_, far_off) | Source::Bricks(_, far_off, _) = &source {
         report.warnings.extend(far_off.clone());
     }
     report.warnings.extend(moved);
@@ -155,6 +160,10 @@ fn volume(session: &Session, args: &Mesh, from: Sampled, params: &ScanParams) ->
             Source::Mesh(placed) => {
                 let body = MeshBody::new(placed.mesh).map_err(|e| Trouble::Meshing(e.into()))?;
                 sampled(&Part::Mesh(Box::new(body)), usual)?
+            }
+            Source::Bricks(..) => {
+                let what = "a volume is made of a scan in one piece".into();
+                return Err(Trouble::Scan(CloudError::Store(StoreError(what)).into()));
             }
             Source::Scan(scan, _) => {
                 let samples = cloud::clean(&scan, &params.clean, o).map_err(|e| Trouble::Scan(e.into()))?;
@@ -267,6 +276,22 @@ fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Sourc
             diagonal: size.length(),
         };
         return Ok((Source::Grid(Box::new(grid)), input, units));
+    }
+    let large = planish_io::points_told(path).is_some_and(|n| n > pipeline::BRICK_POINTS as u64);
+    if planish_io::is_scan(path) && large && !planish_io::is_grid(&args.output) {
+        let room = Staged::file(&args.output)?;
+        let folder = room.path("bricks");
+        std::fs::create_dir(&folder).map_err(|e| products::unwritable(&folder, &e))?;
+        let (bricks, far_off) = files::scan_in_bricks(path, &args.scan, &folder)?;
+        let units = session.units_of(path);
+        let input = Input {
+            path: crate::words::told(&path.display().to_string()),
+            kind: "scan".into(),
+            counts: [("points".to_owned(), bricks.points())].into(),
+            units: units.symbol().into(),
+            diagonal: bricks.bounds().diagonal(),
+        };
+        return Ok((Source::Bricks(bricks, far_off, room), input, units));
     }
     if planish_io::is_scan(path) {
         let (scan, far_off) = files::scan_body(path, &args.scan)?;
