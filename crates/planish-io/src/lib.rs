@@ -36,7 +36,7 @@ mod usd;
 mod usd_material;
 mod weld;
 
-pub use bricks::BrickFolder;
+pub use bricks::{BrickFolder, Source};
 pub use error::{ReadError, WriteError};
 pub use export::{ExportKind, export, export_kind, export_mesh};
 pub use far::{FileUnits, file_units, shift_of, single_step};
@@ -56,7 +56,7 @@ pub use relief_files::{
     SIDECAR as RELIEF_SIDECAR, image_facts, is_relief_name, read_relief, relief_names, relief_roundtrip, write_relief,
 };
 pub use scan::{
-    SCAN_EXTENSIONS, ScanOptions, WRITTEN_SCANS, check_columns, is_scan, points_told, read_body, read_scan, write_scan,
+    SCAN_EXTENSIONS, ScanOptions, Take, WRITTEN_SCANS, check_columns, is_scan, points_told, read_body, read_scan, write_scan,
     write_scan_in,
 };
 pub use step::{StepInput, StepSummary, read_step_surfaces, write_step};

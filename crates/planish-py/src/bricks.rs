@@ -1,17 +1,17 @@
 //! A scan in bricks on disk, step by step: what `planish mesh` does with large scans, for those who share the steps out.
 
-use crate::cloud::{mesh_of, scan_params};
+use crate::cloud::{PyCloud, mesh_of, scan_params};
 use crate::error::{told, told_of};
 use crate::objects::PyMesh;
 use crate::params::Given;
 use crate::watch;
 use planish::cloud::bricks::{BrickStore, StoreError, halo};
 use planish::pipeline::{BRICK_POINTS, BrickMesh, BrickPlan, BrickWelder, ScanError, ScanParams, clean_brick};
-use planish_io::{BrickFolder, ScanOptions};
+use planish_io::{BrickFolder, ReadError, ScanOptions};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 /// Names in the folder: how everything is to be made, what was settled for all bricks, and the mesh of each.
@@ -65,6 +65,34 @@ impl PyBricks {
     }
 }
 
+/// Bricks of the pieces that an iterable gives.
+fn of_pieces(scan: &Bound<PyAny>, folder: &Path, most: usize) -> PyResult<BrickFolder> {
+    let pieces = scan.try_iter()?;
+    let mut raised = None;
+    let made = BrickFolder::of_pieces(
+        &mut |take| {
+            for piece in &pieces {
+                let cloud = piece.and_then(|p| Ok(p.cast::<PyCloud>()?.get().cloud.clone()));
+                match cloud {
+                    // Pieces may be moved, each by another shift.
+                    Ok(cloud) => take(cloud.in_place())?,
+                    Err(e) => {
+                        raised = Some(e);
+                        return Err(ReadError::NoPoints);
+                    }
+                }
+            }
+            Ok(())
+        },
+        folder,
+        most,
+    );
+    match raised {
+        Some(raised) => Err(raised),
+        None => made.map_err(|e| told(scan.py(), &e)),
+    }
+}
+
 fn of_store(e: StoreError) -> ScanError {
     ScanError::Cloud(e.into())
 }
@@ -81,10 +109,11 @@ impl PyBricks {
         py.detach(open).map_err(|e| told(py, &e))
     }
 
-    /// Parts the points of a file into bricks in a folder. PLY with binary points, LAS, LAZ and E57 are read piece by piece: memory
+    /// Parts the points of a scan into bricks in a folder. PLY with binary points, LAS, LAZ and E57 are read piece by piece: memory
     /// does not grow with the scan. Raises FileError, CloudError.
     ///
-    /// * scan: the file; folder: made if it is not there, refused unless it is empty
+    /// * scan: the file, or an iterable of `Cloud`s that are its pieces (`neighbours.from_parquet`): all with normals or none
+    /// * folder: made if it is not there, refused unless it is empty
     /// * most: points of a brick; other bricks give a mesh that differs by less than the noise
     /// * columns, classes: as of `read`
     /// * the keywords of `Cloud.mesh`; memory is what one brick's lattice may take
@@ -92,7 +121,7 @@ impl PyBricks {
     #[pyo3(signature = (scan, folder, *, most=BRICK_POINTS, columns=None, classes=None, close=None, memory=None, progress=None, **parameters))]
     fn create(
         py: Python,
-        scan: PathBuf,
+        scan: &Bound<PyAny>,
         folder: PathBuf,
         most: usize,
         columns: Option<String>,
@@ -121,7 +150,12 @@ impl PyBricks {
         };
         empty().map_err(|e| told(py, &e))?;
         let options = ScanOptions { columns, classes: classes.unwrap_or_default() };
-        let made = py.detach(|| BrickFolder::create(&scan, &options, &folder, most)).map_err(|e| told_of(py, &scan, &e))?;
+        let made = match scan.extract::<PathBuf>() {
+            Ok(file) => py
+                .detach(|| BrickFolder::create(&file, &options, &folder, most))
+                .map_err(|e| told_of(py, &file, &e))?,
+            Err(_) => of_pieces(scan, &folder, most)?,
+        };
         watch::run(py, "bricks", progress, |o| {
             let halo = halo(&made, &params.clean, o.one())?;
             let recipe = Recipe { params: params.clone(), halo };

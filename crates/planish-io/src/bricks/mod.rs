@@ -8,7 +8,7 @@
 
 mod part;
 
-use crate::scan::ScanOptions;
+use crate::scan::{ScanOptions, Take, pieces};
 use crate::{ReadError, atomic};
 use glam::DVec3;
 use part::{Record, records};
@@ -25,6 +25,9 @@ use std::sync::Arc;
 const AT_ONCE: u64 = 1 << 22;
 /// The file that tells which bricks there are.
 const MANIFEST: &str = "bricks";
+
+/// Points in pieces.
+pub type Source<'a> = dyn FnMut(&mut Take) -> Result<(), ReadError> + 'a;
 
 /// A folder with a scan in bricks.
 #[derive(Clone, Debug)]
@@ -53,7 +56,15 @@ impl BrickFolder {
     /// # Errors
     /// As of [`crate::read_body`], or if the folder cannot be written.
     pub fn create(scan: &Path, options: &ScanOptions, folder: &Path, most: usize) -> Result<BrickFolder, ReadError> {
-        let manifest = part::part(scan, options, folder, (most, AT_ONCE))?;
+        BrickFolder::of_pieces(&mut |take| pieces(scan, options, take).map(drop), folder, most)
+    }
+
+    /// As [`BrickFolder::create`], for points that come in pieces from elsewhere.
+    /// * `source` - gives each piece to what it is called with; all have the same attributes, and the last one has all scanners
+    /// # Errors
+    /// What the source says, [`ReadError::NoPoints`], or if the folder cannot be written.
+    pub fn of_pieces(source: &mut Source, folder: &Path, most: usize) -> Result<BrickFolder, ReadError> {
+        let manifest = part::part(source, folder, (most, AT_ONCE))?;
         let made = BrickFolder { folder: folder.to_path_buf(), manifest };
         made.write(MANIFEST, &made.manifest).map_err(|e| ReadError::Io(std::io::Error::other(e)))?;
         Ok(made)
@@ -214,7 +225,8 @@ mod tests {
         write_scan(&file, scan).unwrap();
         let folder = room.path().join("folder");
         std::fs::create_dir(&folder).unwrap();
-        let manifest = part::part(&file, &ScanOptions::default(), &folder, (MOST, 2000)).unwrap();
+        let mut source = |take: &mut Take| pieces(&file, &ScanOptions::default(), take).map(drop);
+        let manifest = part::part(&mut source, &folder, (MOST, 2000)).unwrap();
         let made = BrickFolder { folder, manifest };
         made.write(MANIFEST, &made.manifest).unwrap();
         let (whole, left_out) = read_body(&file, &ScanOptions::default()).unwrap();

@@ -1,10 +1,9 @@
 //! The points of a file in bricks: as [`Partition::new`] parts them, with files in the place of memory.
 
 use crate::rank::ranked;
-use super::{Manifest, points_file};
+use super::{Manifest, Source, points_file};
 use crate::ReadError;
 use crate::far::{self, shift_of};
-use crate::scan::{ScanOptions, pieces};
 use glam::DVec3;
 use planish::cloud::Cloud;
 use planish::cloud::bricks::{Brick, Partition};
@@ -104,16 +103,11 @@ struct Part {
 
 /// Parts a scan into bricks and writes the points of each.
 /// * `most` - points of a brick, and those that are parted in memory
-pub(super) fn part(
-    scan: &Path,
-    options: &ScanOptions,
-    folder: &Path,
-    most: (usize, u64),
-) -> Result<Manifest, ReadError> {
+pub(super) fn part(source: &mut Source, folder: &Path, most: (usize, u64)) -> Result<Manifest, ReadError> {
     let mut manifest = Manifest::default();
     let mut all = Sheaf::new(folder.join("part"))?;
     let mut count = 0u64;
-    pieces(scan, options, &mut |piece: Cloud| {
+    source(&mut |piece: Cloud| {
         let normals = piece.attribute("normal", 3).map(|a| &a.values);
         manifest.has_normals |= normals.is_some();
         manifest.scanners.clone_from(&piece.scanners);

@@ -108,7 +108,7 @@ fn read_in_place(path: &Path, options: &ScanOptions) -> Result<Cloud, ReadError>
 }
 
 /// What takes pieces of a scan.
-pub(crate) type Take<'a> = dyn FnMut(Cloud) -> Result<(), ReadError> + 'a;
+pub type Take<'a> = dyn FnMut(Cloud) -> Result<(), ReadError> + 'a;
 
 /// Points that are read at once.
 const PIECE: usize = 1 << 16;

@@ -206,7 +206,7 @@ class Bricks:
     def __new__(cls, folder: _Path) -> Self: ...
     @staticmethod
     def create(
-        scan: _Path,
+        scan: _Path | Iterable[Cloud],
         folder: _Path,
         *,
         most: int = 524288,

@@ -24,7 +24,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ._batch import Batch, Option, Row, _batch, _flags, _tell
-from ._planish import Bricks, Mesh, RunError, folder_names, set_threads
+from ._planish import Bricks, Cloud, Mesh, RunError, folder_names, set_threads
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -81,7 +81,7 @@ def _task(source: str, output: str, name: str, options: dict[str, Option]) -> Ro
 
 
 def mesh(
-    scan: str | os.PathLike[str],
+    scan: str | os.PathLike[str] | Iterable[Cloud],
     *,
     cluster: Any = None,
     jobs: int | None = None,
@@ -96,7 +96,7 @@ def mesh(
 ) -> Mesh:
     """The mesh of a scan that is too large for one process, brick by brick on a cluster.
 
-    * scan: the file
+    * scan: the file, or its pieces, as of `Bricks.create`
     * cluster, jobs: as of `run_many`
     * memory: GB that each worker of a cluster that is made here may take; a brick of the usual size takes about half of one
     * folder: where the bricks lie meanwhile, empty or not there yet; all workers see it. None makes one for the time of the call

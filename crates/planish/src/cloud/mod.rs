@@ -71,6 +71,14 @@ impl Cloud {
         self.attributes.iter().find(|a| a.name == name && a.width == width)
     }
 
+    /// The same with the positions of the file: without a shift.
+    pub fn in_place(&self) -> Cloud {
+        let mut cloud = self.clone();
+        cloud.points.iter_mut().chain(&mut cloud.scanners).for_each(|p| *p += cloud.shift);
+        cloud.shift = DVec3::ZERO;
+        cloud
+    }
+
     /// Keeps the points of these indices, in their order.
     pub fn select(&self, ids: &[u32]) -> Cloud {
         let attributes = self
