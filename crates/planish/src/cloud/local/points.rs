@@ -145,7 +145,7 @@ impl Points {
 impl FromIterator<DVec3> for Points {
     fn from_iter<T: IntoIterator<Item = DVec3>>(points: T) -> Points {
         let points = points.into_iter();
-        let mut all = Points::with_capacity(points.size_hint().0);
+        let mut all = Points::with_capacity(points.size_hint().1.unwrap_or(0));
         points.for_each(|p| all.push(p));
         all
     }
