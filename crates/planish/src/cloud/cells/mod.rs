@@ -427,12 +427,16 @@ fn different<'a>(
 ) -> (Vec<&'a Candidate>, Vec<(f64, DVec3)>) {
     let mut asked: Vec<&Candidate> = Vec::new();
     let mut seen: Vec<(f64, DVec3)> = Vec::new();
+    let passes = |&(_, i): &(f64, u32)| {
+        let c = &candidates[i as usize];
+        let (d, n) = c.quadric.distance(place.center);
+        (d.abs() < place.support).then_some((c, d, n))
+    };
+    let passing: Vec<(&Candidate, f64, DVec3)> = near.iter().filter_map(passes).collect();
     for (turn, level) in [OTHER_SHEET, OTHER_FIT] {
-        for &(_, i) in near {
-            let c = &candidates[i as usize];
-            let (d, n) = c.quadric.distance(place.center);
+        for &(c, d, n) in &passing {
             let known = seen.iter().any(|(e, m)| n.dot(*m) > turn && (d - e).abs() < level * place.noise);
-            if !known && d.abs() < place.support {
+            if !known {
                 asked.push(c);
                 seen.push((d, n));
                 if asked.len() == MOST_CANDIDATES {

@@ -41,14 +41,14 @@ impl Nested {
     /// * `wide` - points within [`WIDEST_BALL`] radii
     pub fn refine(&mut self, place: &Place, radius: f64, ball: &Points, mut wide: Points) {
         let mut seen = look(&self.sheets, place, ball);
-        let mut least = worth(&seen, self.concave);
+        let mut least = worth(&Vec::from_iter(&seen), self.concave);
         let mut widths = BALL_WIDTHS.to_vec();
         for _ in 0..REFIT_ROUNDS {
             let own = own(&self.sheets, self.concave, place, &wide);
             let tried = widths.iter().map(|&width| {
                 let better = refined(&self.sheets, place, width * radius, &own);
                 let seen = look(&better, place, ball);
-                (worth(&seen, self.concave), width, better, seen)
+                (worth(&Vec::from_iter(&seen), self.concave), width, better, seen)
             });
             let Some(best) = tried.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|b| b.0 < least) else { break };
             (least, self.sheets, seen) = (best.0, best.2, best.3);
@@ -59,8 +59,7 @@ impl Nested {
             // What better sheets leave nothing to explain for goes: it may lie on another one, turned over.
             while self.sheets.len() > 1 {
                 let fewer = (0..seen.len()).map(|k| {
-                    let mut rest = seen.clone();
-                    rest.remove(k);
+                    let rest = seen.iter().enumerate().filter(|s| s.0 != k).map(|s| s.1).collect::<Vec<_>>();
                     (worth(&rest, without(self.concave, k)), k)
                 });
                 let saved = |f: &(f64, usize)| f.0 - self.prices[f.1];
@@ -72,17 +71,16 @@ impl Nested {
                 seen.remove(k);
             }
         }
-        self.cost = cost(&seen, self.concave);
+        self.cost = cost(&Vec::from_iter(&seen), self.concave);
     }
 }
 
 /// What the points of a ball cost with a nesting.
 pub(crate) fn explained(sheets: &[Sheet], concave: u8, place: &Place, ball: &Points) -> f64 {
-    cost(&look(sheets, place, ball), concave)
+    cost(&Vec::from_iter(&look(sheets, place, ball)), concave)
 }
 
 /// One sheet of a cell as its points see it.
-#[derive(Clone)]
 struct Spread {
     /// Signed distances, in noise levels.
     residuals: Vec<f64>,
@@ -101,22 +99,22 @@ fn look(sheets: &[Sheet], place: &Place, points: &Points) -> Vec<Spread> {
 }
 
 /// What the points cost by the surface they are nearest to.
-fn cost(sheets: &[Spread], concave: u8) -> f64 {
+fn cost(sheets: &[&Spread], concave: u8) -> f64 {
     decided(sheets, concave).0 + folds(sheets, concave)
 }
 
 /// What they cost, and what they owe to luck.
-fn worth(sheets: &[Spread], concave: u8) -> f64 {
+fn worth(sheets: &[&Spread], concave: u8) -> f64 {
     let (cost, lucky) = decided(sheets, concave);
     cost + lucky + folds(sheets, concave)
 }
 
-fn decided(sheets: &[Spread], concave: u8) -> (f64, f64) {
+fn decided(sheets: &[&Spread], concave: u8) -> (f64, f64) {
     let rows: Vec<(&[f64], f64)> = sheets.iter().map(|s| (&s.residuals[..], s.luck)).collect();
     decided_cost(&rows, concave)
 }
 
-fn folds(sheets: &[Spread], concave: u8) -> f64 {
+fn folds(sheets: &[&Spread], concave: u8) -> f64 {
     let faces: Vec<Face> =
         sheets.iter().map(|s| Face { residuals: &s.residuals, sign: 1.0, normal: s.normal }).collect();
     nest::folds(&faces, concave)
@@ -133,8 +131,10 @@ fn own(sheets: &[Sheet], concave: u8, place: &Place, points: &Points) -> Vec<Vec
     let seen = look(sheets, place, points);
     let shares = Chances::new(seen.iter().map(|s| (&s.residuals[..], s.normal)), concave).shares();
     let of = |row: &Vec<f64>| {
-        let felt = points.iter().zip(row).filter(|x| *x.1 > LEAST_SHARE);
-        felt.map(|(p, &share)| (p - place.center, share)).collect()
+        let mut felt = Vec::with_capacity(points.len());
+        let own = points.iter().zip(row).filter(|x| *x.1 > LEAST_SHARE);
+        felt.extend(own.map(|(p, &share)| (p - place.center, share)));
+        felt
     };
     shares.iter().map(of).collect()
 }

@@ -9,9 +9,23 @@ use pulp::{Arch, Simd, WithSimd};
 /// Residuals count up to this many noise levels.
 pub(crate) const RESIDUAL_LIMIT: f64 = 3.0;
 
-/// Squares of distances in noise levels, each at most the square of [`RESIDUAL_LIMIT`].
+/// Squares of distances in noise levels, each at most the square of [`RESIDUAL_LIMIT`]; zeros, which cost nothing, fill the
+/// last lanes.
 pub(crate) fn capped(residuals: &[f64]) -> Vec<f64> {
-    residuals.iter().map(|r| cap(r * r)).collect()
+    filled(residuals.iter().map(|r| cap(r * r)), residuals.len())
+}
+
+/// Every so many of the distances; zeros, which cost nothing, fill the last lanes.
+pub(crate) fn thinned(residuals: &[f64], step: usize) -> Vec<f64> {
+    filled(residuals.iter().step_by(step).copied(), residuals.len().div_ceil(step))
+}
+
+/// A row of `count` values, then zeros to the end of its lanes.
+fn filled(values: impl Iterator<Item = f64>, count: usize) -> Vec<f64> {
+    let mut row = Vec::with_capacity(count.next_multiple_of(LANES));
+    row.extend(values);
+    row.resize(count.next_multiple_of(LANES), 0.0);
+    row
 }
 
 #[inline(always)]

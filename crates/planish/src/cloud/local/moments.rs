@@ -10,6 +10,8 @@ use glam::{DMat3, DVec3};
 
 /// Number of monomials of degree up to four.
 pub(crate) const COUNT: usize = 35;
+/// Of those of degree up to three, which come first.
+pub(crate) const CUBIC_COUNT: usize = 20;
 
 /// Exponents of the ten monomials of degree up to two, in the order of the coefficients of a quadric.
 const QUADRATIC: [[usize; 3]; 10] =

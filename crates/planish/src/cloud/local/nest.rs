@@ -8,7 +8,7 @@
 //! would not do: it lets every point choose its sheet, and noise alone then pays for a second one. For the same reason a
 //! point above which the surface lies m-fold pays 2 ln m: twice the area has half the density of points.
 
-use super::joints::{Join, capped, folded, joined_cost, nearest_cost};
+use super::joints::{Join, capped, folded, joined_cost, nearest_cost, thinned};
 use glam::DVec3;
 
 /// Most sheets that are nested: a corner of four faces.
@@ -110,7 +110,7 @@ pub(crate) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
     };
     let step = asked[0].residuals.len().div_ceil(COMPARED_POINTS).max(1);
     let all: Vec<&[f64]> = asked.iter().map(|a| &a.residuals[..]).collect();
-    let mut thinned: Vec<Vec<f64>> = vec![Vec::new(); asked.len()];
+    let mut compared: Vec<Vec<f64>> = vec![Vec::new(); asked.len()];
     // One sheet after the other, each the best that can be joined to those chosen, in all nestings of the set. The second
     // may come with another first: between the two sides of a plate one sheet alone does best in the middle.
     while best.order.len() < most.min(MOST_NESTED) {
@@ -135,6 +135,10 @@ pub(crate) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
         } else {
             (0..asked.len()).filter(|i| !best.order.contains(i)).for_each(|i| hear(chosen.with(i)));
         }
+        if bound.is_empty() {
+            break;
+        }
+        let ways = ways(chosen.count + 1, free);
         let mut next: Option<Nesting> = None;
         for (union, set) in bound {
             let limit = next.as_ref().map_or(best.total, |n| n.total);
@@ -142,50 +146,34 @@ pub(crate) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
                 break;
             }
             for &i in set.items() {
-                if thinned[i].is_empty() {
-                    thinned[i] = all[i].iter().step_by(step).copied().collect();
+                if compared[i].is_empty() {
+                    compared[i] = thinned(all[i], step);
                 }
             }
             let priced = price(set.items());
-            let mut found: Option<Nesting> = None;
-            for order in orders(set.items()) {
-                let joints = order.len() - 1;
-                let signs = if free { 1u8 << joints } else { 1 };
-                for flips in 0..signs {
-                    for ops in 0..1u8 << joints {
-                        let (flipped, concave) = (flips << 1, ops << 1);
-                        if !free && repeats(set.items(), &order, concave) {
-                            continue;
-                        }
-                        let least = found.as_ref().map_or(f64::INFINITY, |n| n.cost);
-                        let part = nesting_cost(|i| &thinned[i], &order, flipped, concave, least);
-                        if part < least {
-                            found = Some(Nesting {
-                                order: order.clone(),
-                                flipped,
-                                concave,
-                                cost: part,
-                                folds: 0.0,
-                                total: 0.0,
-                            });
-                        }
-                    }
+            let mut found: Option<(f64, &Way)> = None;
+            for way in &ways {
+                let least = found.map_or(f64::INFINITY, |f| f.0);
+                let part = nesting_cost(|k| &compared[set.items[k]], way, least);
+                if part < least {
+                    found = Some((part, way));
                 }
             }
-            let Some(mut found) = found else { continue };
-            found.cost = nesting_cost(|i| all[i], &found.order, found.flipped, found.concave, limit - priced);
-            if found.cost + priced < limit {
+            let Some((_, way)) = found else { continue };
+            let cost = nesting_cost(|k| all[set.items[k]], way, limit - priced);
+            if cost + priced < limit {
+                let order: Vec<usize> = way.order.items().iter().map(|&k| set.items[k]).collect();
                 let face = |(k, &i): (usize, &usize)| Face {
                     residuals: all[i],
-                    sign: sign(found.flipped, k),
+                    sign: sign(way.flipped, k),
                     normal: asked[i].normal,
                 };
-                let faces: Vec<Face> = found.order.iter().enumerate().map(face).collect();
-                found.folds = folds(&faces, found.concave);
-                found.cost += found.folds;
-                found.total = found.cost + priced;
-                if found.total < limit {
-                    next = Some(found);
+                let faces: Vec<Face> = order.iter().enumerate().map(face).collect();
+                let folds = folds(&faces, way.concave);
+                let cost = cost + folds;
+                let total = cost + priced;
+                if total < limit {
+                    next = Some(Nesting { order, flipped: way.flipped, concave: way.concave, cost, folds, total });
                 }
             }
         }
@@ -197,23 +185,48 @@ pub(crate) fn nest(asked: &[Seen], free: bool, most: usize) -> Option<Nesting> {
     Some(best)
 }
 
+/// A way to nest a few sheets.
+struct Way {
+    /// Places of the sheets among them, from the innermost outwards.
+    order: Set,
+    /// Bit k: sheet `order[k]` counts with the other sign.
+    flipped: u8,
+    /// Bit k: sheet `order[k]` is joined by the minimum.
+    concave: u8,
+}
+
+/// All ways to nest `count` sheets.
+/// * `free` - with all signs; else with their own, and only those that give different functions
+fn ways(count: usize, free: bool) -> Vec<Way> {
+    let joints = count - 1;
+    let signs = if free { 1u8 << joints } else { 1 };
+    let mut ways = Vec::new();
+    for order in orders(&[0, 1, 2, 3][..count]) {
+        for (flips, ops) in (0..signs).flat_map(|flips| (0..1u8 << joints).map(move |ops| (flips, ops))) {
+            if free || !repeats(&order, ops << 1) {
+                ways.push(Way { order: Set::of(&order), flipped: flips << 1, concave: ops << 1 });
+            }
+        }
+    }
+    ways
+}
+
 /// Does an order give the same function as one that comes before it in [`orders`]? Neighbours that are joined alike commute.
-fn repeats(items: &[usize], order: &[usize], concave: u8) -> bool {
-    let place = |k: usize| items.iter().position(|&i| i == order[k]);
+fn repeats(order: &[usize], concave: u8) -> bool {
     (2..order.len()).any(|k| {
         let alike = (concave >> k ^ concave >> (k - 1)) & 1 == 0;
-        alike && (place(k) > place(k - 1) || (k == 2 && place(k) > place(0)))
+        alike && (order[k] > order[k - 1] || (k == 2 && order[k] > order[0]))
     })
 }
 
 /// Cost of a nesting of these sheets, or something above `limit`, if it is.
-fn nesting_cost<'a>(row: impl Fn(usize) -> &'a [f64], order: &[usize], flipped: u8, concave: u8, limit: f64) -> f64 {
+fn nesting_cost<'a>(row: impl Fn(usize) -> &'a [f64], way: &Way, limit: f64) -> f64 {
     let mut signed = [([].as_slice(), Join::Greatest(1.0)); MOST_NESTED];
-    for (k, (s, &i)) in signed.iter_mut().zip(order).enumerate() {
-        let sign = sign(flipped, k);
-        *s = (row(i), if concave >> k & 1 == 1 { Join::Least(sign) } else { Join::Greatest(sign) });
+    for (k, (s, &i)) in signed.iter_mut().zip(way.order.items()).enumerate() {
+        let sign = sign(way.flipped, k);
+        *s = (row(i), if way.concave >> k & 1 == 1 { Join::Least(sign) } else { Join::Greatest(sign) });
     }
-    joined_cost(&signed[..order.len()], limit)
+    joined_cost(&signed[..way.order.count], limit)
 }
 
 fn sign(flipped: u8, k: usize) -> f64 {
@@ -229,34 +242,38 @@ pub(crate) fn joined(values: impl IntoIterator<Item = f64>, concave: u8) -> (usi
 
 /// What the points pay for lying above several sheets of the surface at once: twice the logarithm of how many.
 pub(crate) fn folds(sheets: &[Face], concave: u8) -> f64 {
-    let m = sheets.len();
-    if let [a, b] = sheets {
-        let turn = (a.sign * a.normal).dot(b.sign * b.normal);
-        let above =
-            folded([(a.residuals, a.sign), (b.residuals, b.sign)], turn, concave >> 1 & 1 == 1, ON_SURFACE_NOISE);
-        return above as f64 * 2.0 * turn.abs().ln_1p();
-    }
-    let mut turn = [[0.0; MOST_NESTED]; MOST_NESTED];
-    for j in 0..m {
-        for k in 0..m {
-            turn[j][k] = (sheets[j].sign * sheets[j].normal).dot(sheets[k].sign * sheets[k].normal);
+    match *sheets {
+        [] | [_] => 0.0,
+        [a, b] => {
+            let turn = (a.sign * a.normal).dot(b.sign * b.normal);
+            let rows = [(a.residuals, a.sign), (b.residuals, b.sign)];
+            let above = folded(rows, turn, concave >> 1 & 1 == 1, ON_SURFACE_NOISE);
+            above as f64 * 2.0 * turn.abs().ln_1p()
         }
+        [a, b, c] => folds_of([a, b, c], concave),
+        [a, b, c, d, ..] => folds_of::<MOST_NESTED>([a, b, c, d], concave),
     }
+}
+
+/// As [`folds`], of as many sheets as the compiler is told.
+fn folds_of<const M: usize>(sheets: [Face; M], concave: u8) -> f64 {
+    let directions = sheets.map(|s| s.sign * s.normal);
+    let turn = directions.map(|a| directions.map(|b| a.dot(b)));
+    let least: [bool; M] = std::array::from_fn(|j| concave >> j & 1 == 1);
     // Logarithms by the sheet of the point and the set of those above it.
-    let mut known = [[f64::NAN; 1 << MOST_NESTED]; MOST_NESTED];
+    let mut known = [[f64::NAN; 1 << MOST_NESTED]; M];
     let mut price = 0.0;
     for q in 0..sheets[0].residuals.len() {
-        let mut at = [0.0; MOST_NESTED];
-        (0..m).for_each(|k| at[k] = sheets[k].sign * sheets[k].residuals[q]);
+        let at = sheets.map(|s| s.sign * s.residuals[q]);
         // The foot of the point on sheet k is part of the surface if the nesting vanishes there. Sheets at right angles
         // do not lie above each other; a foot on the edge itself would count as if they did.
-        let own = (0..m).fold(0, |a, k| if at[k].abs() < at[a].abs() { k } else { a });
+        let own = (0..M).fold(0, |a, k| if at[k].abs() < at[a].abs() { k } else { a });
         let (mut layers, mut above) = (1.0, 0);
-        for k in (0..m).filter(|&k| k != own) {
+        for k in (0..M).filter(|&k| k != own) {
             let foot = |j: usize| if j == k { 0.0 } else { at[j] - at[k] * turn[j][k] };
             let mut f = foot(0);
-            for j in 1..m {
-                f = if concave >> j & 1 == 1 { f.min(foot(j)) } else { f.max(foot(j)) };
+            for j in 1..M {
+                f = if least[j] { f.min(foot(j)) } else { f.max(foot(j)) };
             }
             if f.abs() < ON_SURFACE_NOISE {
                 layers += turn[k][own].abs();

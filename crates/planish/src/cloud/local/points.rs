@@ -5,7 +5,7 @@
 //! See `docs/decisions/0014-pulp.md`.
 
 use super::height::{Frame, Height};
-use super::moments::{COUNT, Moments, PARENTS};
+use super::moments::{COUNT, CUBIC_COUNT, Moments, PARENTS};
 use super::weights::kernel;
 use crate::cloud::Quadric;
 use glam::DVec3;
@@ -145,7 +145,7 @@ impl Points {
 impl FromIterator<DVec3> for Points {
     fn from_iter<T: IntoIterator<Item = DVec3>>(points: T) -> Points {
         let points = points.into_iter();
-        let mut all = Points::with_capacity(points.size_hint().0);
+        let mut all = Points::with_capacity(points.size_hint().1.unwrap_or(0));
         points.for_each(|p| all.push(p));
         all
     }
@@ -313,29 +313,41 @@ impl WithSimd for Sums<'_> {
     fn with_simd<S: Simd>(self, _: S) -> Moments {
         let n = self.weights.len();
         let mut lanes = [[0.0; LANES]; COUNT];
-        let mut column = [[0.0; BLOCK]; COUNT];
+        // No monomial is a multiple of one of degree four.
+        let mut column = [[0.0; BLOCK]; CUBIC_COUNT];
         let mut at = [[0.0; BLOCK]; 3];
         for first in (0..n).step_by(BLOCK) {
             let count = BLOCK.min(n - first);
+            // Places past the end weigh nothing.
+            let whole = count.next_multiple_of(LANES);
             column[0][count..].fill(0.0);
             column[0][..count].copy_from_slice(&self.weights[first..first + count]);
             for (at, of) in at.iter_mut().zip(self.at) {
                 at[..count].copy_from_slice(&of[first..first + count]);
             }
-            for chunk in column[0].chunks_exact(LANES) {
+            for chunk in column[0][..whole].chunks_exact(LANES) {
                 (0..LANES).for_each(|l| lanes[0][l] += chunk[l]);
             }
-            for k in 1..COUNT {
+            for k in 1..CUBIC_COUNT {
                 let (before, after) = column.split_at_mut(k);
                 let (parent, axis) = PARENTS[k];
-                let (own, parent, axis) = (&mut after[0], &before[parent], &at[axis]);
+                let factors = before[parent][..whole].chunks_exact(LANES).zip(at[axis][..whole].chunks_exact(LANES));
                 let mut sums = lanes[k];
-                for first in (0..BLOCK).step_by(LANES) {
+                for (own, (parent, axis)) in after[0][..whole].chunks_exact_mut(LANES).zip(factors) {
                     for l in 0..LANES {
-                        let product = parent[first + l] * axis[first + l];
-                        own[first + l] = product;
+                        let product = parent[l] * axis[l];
+                        own[l] = product;
                         sums[l] += product;
                     }
+                }
+                lanes[k] = sums;
+            }
+            for k in CUBIC_COUNT..COUNT {
+                let (parent, axis) = PARENTS[k];
+                let factors = column[parent][..whole].chunks_exact(LANES).zip(at[axis][..whole].chunks_exact(LANES));
+                let mut sums = lanes[k];
+                for (parent, axis) in factors {
+                    (0..LANES).for_each(|l| sums[l] += parent[l] * axis[l]);
                 }
                 lanes[k] = sums;
             }
