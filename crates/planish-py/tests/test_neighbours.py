@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -64,3 +66,31 @@ def test_a_mesh_and_a_cloud_go_to_open3d_and_back() -> None:
     back = neighbours.from_open3d(cloud.to_open3d())
     same(back, cloud)
     assert np.allclose(back.attributes["normal"], mesh.points)
+
+
+def test_a_parquet_file_comes_in_pieces_and_is_meshed_in_bricks(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    ball = planish.sphere(level=5)
+    x, y, z = ball.points.T
+    file = tmp_path / "ball.parquet"
+    parquet.write_table(pyarrow.table({"z": z, "east": x, "north": y.astype(np.float32), "who": ["me"] * len(x)}), file)
+    columns = ("east", "north", "z")
+    pieces = list(neighbours.from_parquet(file, columns, normals=columns, piece=4_000))
+    assert [len(piece.points) for piece in pieces] == [4_000, 4_000, len(x) - 8_000]
+    assert np.allclose(np.vstack([piece.points for piece in pieces]), ball.points, atol=1e-6)
+    bricks = planish.Bricks.create(neighbours.from_parquet(file, columns, normals=columns), tmp_path / "bricks", most=6_000)
+    assert (len(bricks), bricks.points) == (2, len(x))
+    for k in range(2):
+        bricks.clean(k)
+    bricks.settle()
+    for k in range(2):
+        bricks.mesh(k)
+    found = bricks.weld().diagnose()
+    assert found["watertight"] and abs(found["volume"] / (4.0 / 3.0 * np.pi) - 1.0) < 0.01
+    with pytest.raises(planish.FileError, match="no column x"):
+        list(neighbours.from_parquet(file))
+    with pytest.raises(planish.FileError, match="me"):
+        list(neighbours.from_parquet(file, ("who", "north", "z")))
+    with pytest.raises(planish.FileError, match="no column up"):
+        planish.Bricks.create(neighbours.from_parquet(file, ("east", "north", "up")), tmp_path / "none")

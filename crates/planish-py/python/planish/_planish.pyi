@@ -1,6 +1,6 @@
 """Stubs of the compiled part, by hand. `mypy.stubtest` holds them against it, and a test the keywords against the schemas."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from os import PathLike
 from typing import Any, Literal, TypeAlias, TypedDict, final
 

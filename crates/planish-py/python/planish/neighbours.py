@@ -1,15 +1,18 @@
 """To and from the objects of other libraries. Each is imported only when it is asked for.
 
-Meshes and clouds: trimesh, Open3D, PyVista, meshio. Surfaces: SciPy's `NdBSpline`, splipy, and dicts in the manner of geomdl.
+Meshes and clouds: trimesh, Open3D, PyVista, meshio; large clouds: Parquet by pyarrow. Surfaces: SciPy's `NdBSpline`, splipy, and dicts in the manner of geomdl.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ._planish import Cloud, Mesh, Surface
+from ._planish import Cloud, FileError, Mesh, Surface
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from os import PathLike
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -134,6 +137,37 @@ def cloud_to_pyvista(cloud: Cloud) -> Any:
     for name, values in cloud.attributes.items():
         made.point_data[name] = values.copy()
     return made
+
+
+def from_parquet(
+    path: str | PathLike[str],
+    points: tuple[str, str, str] = ("x", "y", "z"),
+    *,
+    normals: tuple[str, str, str] | None = None,
+    piece: int = 65536,
+) -> Iterator[Cloud]:
+    """The points of a Parquet file in pieces of so many rows: what `Bricks.create` takes, so that memory does not grow with the file.
+
+    * points, normals: names of the columns; missing values are points that are not numbers, which no stage uses
+
+    Raises FileError if a column is missing or holds no numbers.
+    """
+    import numpy
+    from pyarrow import ArrowInvalid, parquet
+
+    columns = [*points, *(normals or ())]
+    with parquet.ParquetFile(path) as file:
+        names = file.schema_arrow.names
+        missing = [name for name in columns if name not in names]
+        if missing:
+            raise FileError(f"{path}: has no column {missing[0]} - hint: its columns are {', '.join(names)}")
+        for batch in file.iter_batches(batch_size=piece, columns=columns):
+            try:
+                rows = [batch.column(name).cast("float64").to_numpy(zero_copy_only=False) for name in columns]
+            except ArrowInvalid as error:
+                raise FileError(f"{path}: {error} - hint: name columns of numbers") from error
+            table = numpy.column_stack(rows)
+            yield Cloud(table[:, :3], normals=table[:, 3:] if normals else None)
 
 
 def surface_to_scipy(surface: Surface) -> Any:
