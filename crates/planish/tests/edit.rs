@@ -276,6 +276,16 @@ fn the_rest_of_a_network_is_completed_around_curves_that_stay_within_a_millionth
     assert!(editor.network.curves.iter().all(|c| c.kind.is_smooth()));
 }
 
+#[test]
+fn a_mesh_of_few_triangles_is_not_completed_to_more_patches_than_it_has_room_for() {
+    let mesh = shapes::cuboid(DVec3::ONE, 3);
+    let adjacency = Adjacency::new(&mesh);
+    let mut editor = Editor::new(&mesh, &adjacency, Network::default());
+    editor.complete(&LayoutParams { patches: 1000, ..LayoutParams::default() }, &Silent).unwrap();
+    let patches = editor.diagnose().patches.len();
+    assert!(patches <= mesh.triangles.len(), "{patches} patches on {} triangles", mesh.triangles.len());
+}
+
 /// Edits of a session: cuts by planes through places of the mesh, strokes between places, and the rest completed.
 fn cuts_and_strokes(mesh: &TriMesh, seed: u64, boundaries: bool) -> Vec<String> {
     let used: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();

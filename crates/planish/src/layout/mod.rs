@@ -217,7 +217,7 @@ impl From<aligned::Laid> for Layout {
 }
 
 /// Patches that a mesh has room for: finer ones would have no two triangles each to follow.
-fn most_patches(mesh: &TriMesh) -> usize {
+pub fn most_patches(mesh: &TriMesh) -> usize {
     (mesh.triangles.len() / TRIANGLES_PER_PATCH).max(1)
 }
 

@@ -35,7 +35,7 @@ enum Source {
     /// With what to tell of points that are not of it.
     Scan(planish::cloud::Cloud, Option<Warning>),
     /// A large one, with the room that its bricks lie in while they are worked.
-    Bricks(BrickFolder, Option<Warning>, Staged),
+    Bricks { bricks: BrickFolder, far_off: Option<Warning>, _room: Staged },
     Mesh(Placed),
     Script(Script),
     Grid(Box<planish::field::ScalarGrid>),
@@ -46,7 +46,7 @@ impl Source {
     fn shift(&self) -> DVec3 {
         match self {
             Source::Scan(scan, _) => scan.shift,
-            Source::Bricks(bricks, ..) => bricks.shift(),
+            Source::Bricks { bricks, .. } => bricks.shift(),
             Source::Mesh(placed) => placed.shift,
             Source::Script(_) | Source::Grid(_) => DVec3::ZERO,
         }
@@ -61,7 +61,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let grid_params = args.volume.params(None)?;
     let ((source, input, units), read) = session.step("read", || read(session, args, params.cells))?;
     match &source {
-        Source::Scan(..) | Source::Bricks(..) => {}
+        Source::Scan(..) | Source::Bricks { .. } => {}
         Source::Grid(_) => {
             args.meshing.refuse_cleaning("--volume-close tells whether the border of a volume closes the surface")?
         }
@@ -80,7 +80,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let (made, record) = session.bars.step("mesh", |o| {
         Ok::<Made, Trouble>(match &source {
             Source::Scan(scan, _) => Made::OfScan(Box::new(pipeline::mesh_scan(scan, &params, o)?)),
-            Source::Bricks(bricks, ..) => Made::OfScan(Box::new(pipeline::mesh_bricks(bricks, &params, o)?)),
+            Source::Bricks { bricks, .. } => Made::OfScan(Box::new(pipeline::mesh_bricks(bricks, &params, o)?)),
             Source::Mesh(placed) => plain(contour::from_mesh(&placed.mesh, sampling, contour, o)?),
             Source::Script(Script::Part(part)) => plain(contour::from_part(part, sampling, contour, o)?),
             Source::Script(Script::Job(milling)) => plain(contour::from_field(milling, sampling, contour, o)?),
@@ -106,14 +106,14 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
             .map_err(|e| write_failure(&args.input, &args.output, e))
     })?;
     let mut report = Report::new("mesh", input);
-    if let Source::Mesh(_) | Source::Scan(..) | Source::Bricks(..) = &source {
+    if let Source::Mesh(_) | Source::Scan(..) | Source::Bricks { .. } = &source {
         let far = shift != DVec3::ZERO;
         report.warnings.extend(session.guessed_units(&args.input, report.input.diagonal, far));
     }
     if let Source::Mesh(placed) = &source {
         report.warnings.extend(placed.warning(units.symbol()));
     }
-    if let Source::Scan(_, far_off) | Source::Bricks(_, far_off, _) = &source {
+    if let Source::Scan(_, far_off) | Source::Bricks { far_off, .. } = &source {
         report.warnings.extend(far_off.clone());
     }
     report.warnings.extend(moved);
@@ -161,7 +161,7 @@ fn volume(session: &Session, args: &Mesh, from: Sampled, params: &ScanParams) ->
                 let body = MeshBody::new(placed.mesh).map_err(|e| Trouble::Meshing(e.into()))?;
                 sampled(&Part::Mesh(Box::new(body)), usual)?
             }
-            Source::Bricks(..) => {
+            Source::Bricks { .. } => {
                 let what = "a volume is made of a scan in one piece".into();
                 return Err(Trouble::Scan(CloudError::Store(StoreError(what)).into()));
             }
@@ -291,7 +291,7 @@ fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Sourc
             units: units.symbol().into(),
             diagonal: bricks.bounds().diagonal(),
         };
-        return Ok((Source::Bricks(bricks, far_off, room), input, units));
+        return Ok((Source::Bricks { bricks, far_off, _room: room }, input, units));
     }
     if planish_io::is_scan(path) {
         let (scan, far_off) = files::scan_body(path, &args.scan)?;

@@ -10,8 +10,7 @@
 
 use super::{EditError, Editor};
 use crate::curve::without_repeats;
-use crate::layout::LayoutParams;
-use crate::layout::{Known, layout};
+use crate::layout::{Known, LayoutParams, layout, most_patches};
 use crate::mesh::{Adjacency, FacePoint, NONE, next};
 use crate::network::diagnose::{Regions, regions};
 use crate::network::disk::{Disk, Met};
@@ -206,10 +205,11 @@ impl Editor<'_> {
     /// mesh can hold.
     pub fn complete(&mut self, params: &LayoutParams, observer: &dyn Observer) -> Result<(), EditError> {
         let found = regions(self.mesh, self.adjacency, &self.network)?;
+        let asked = params.patches.min(most_patches(self.mesh));
         let mut wrong = None;
         for attempt in 0..COMPLETIONS {
             // With other numbers of patches curves run elsewhere.
-            let patches = params.patches + attempt * params.patches.div_ceil(OTHER_PATCHES);
+            let patches = asked + attempt * asked.div_ceil(OTHER_PATCHES);
             let network = self.completed(&found, &LayoutParams { patches, ..params.clone() }, observer)?;
             match regions(self.mesh, self.adjacency, &network) {
                 Ok(_) => {
