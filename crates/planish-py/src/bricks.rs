@@ -18,6 +18,9 @@ use std::sync::{Arc, OnceLock};
 const RECIPE: &str = "recipe";
 const PLAN: &str = "plan";
 
+// Python sees the default as it is written.
+const _: () = assert!(BRICK_POINTS == 524_288);
+
 fn mesh_name(brick: usize) -> String {
     format!("mesh-{brick:05}")
 }
@@ -118,7 +121,7 @@ impl PyBricks {
     /// * columns, classes: as of `read`
     /// * the keywords of `Cloud.mesh`; memory is what one brick's lattice may take
     #[staticmethod]
-    #[pyo3(signature = (scan, folder, *, most=BRICK_POINTS, columns=None, classes=None, close=None, memory=None, progress=None, **parameters))]
+    #[pyo3(signature = (scan, folder, *, most=524288, columns=None, classes=None, close=None, memory=None, progress=None, **parameters))]
     fn create(
         py: Python,
         scan: &Bound<PyAny>,
