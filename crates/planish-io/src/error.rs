@@ -9,6 +9,14 @@ pub enum ReadError {
     /// The operating system does not give the file.
     #[error("cannot read it: {0} - hint: check the name and the permissions")]
     Io(#[from] io::Error),
+    /// The operating system does not keep what was read of it.
+    #[error("its points cannot be kept in {folder}: {error} - hint: make room there, or write the output elsewhere")]
+    Kept {
+        /// Where they were to lie.
+        folder: String,
+        /// What it says.
+        error: io::Error,
+    },
     /// A folder, a pipe or a device.
     #[error("it is {0}, not a file - hint: name a file; save what comes through a pipe in one")]
     NotAFile(&'static str),

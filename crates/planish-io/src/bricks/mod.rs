@@ -66,7 +66,7 @@ impl BrickFolder {
     pub fn of_pieces(source: &mut Source, folder: &Path, most: usize) -> Result<BrickFolder, ReadError> {
         let manifest = part::part(source, folder, (most, AT_ONCE))?;
         let made = BrickFolder { folder: folder.to_path_buf(), manifest };
-        made.write(MANIFEST, &made.manifest).map_err(|e| ReadError::Io(std::io::Error::other(e)))?;
+        made.write(MANIFEST, &made.manifest).map_err(|e| part::lost(folder, std::io::Error::other(e)))?;
         Ok(made)
     }
 
@@ -286,7 +286,7 @@ mod tests {
 
     #[test]
     fn a_scan_on_disk_has_the_mesh_of_the_same_in_memory_and_a_damaged_folder_is_told() {
-        let (_room, folder, whole) = both(&scan_of(3_000), "scan.ply");
+        let (room, folder, whole) = both(&scan_of(3_000), "scan.ply");
         let bits = |made: &ScanMeshed| {
             let mesh = &made.meshed.extracted.mesh;
             (mesh.points.iter().map(|p| p.to_array().map(f64::to_bits)).collect::<Vec<_>>(), mesh.triangles.clone())
@@ -303,5 +303,8 @@ mod tests {
         assert!(told.ends_with("cells-00003: is damaged, or of another version of planish"), "{told}");
         std::fs::remove_file(folder.folder.join(MANIFEST)).unwrap();
         assert!(BrickFolder::open(&folder.folder).is_err());
+        let (scan, nowhere) = (room.path().join("scan.ply"), room.path().join("nowhere"));
+        let told = BrickFolder::create(&scan, &ScanOptions::default(), &nowhere, MOST).unwrap_err().to_string();
+        assert!(told.starts_with("its points cannot be kept in ") && told.contains("make room there"), "{told}");
     }
 }

@@ -104,8 +104,9 @@ struct Part {
 /// Parts a scan into bricks and writes the points of each.
 /// * `most` - points of a brick, and those that are parted in memory
 pub(super) fn part(source: &mut Source, folder: &Path, most: (usize, u64)) -> Result<Manifest, ReadError> {
+    let lost = |error: io::Error| lost(folder, error);
     let mut manifest = Manifest::default();
-    let mut all = Sheaf::new(folder.join("part"))?;
+    let mut all = Sheaf::new(folder.join("part")).map_err(lost)?;
     let mut count = 0u64;
     source(&mut |piece: Cloud| {
         let normals = piece.attribute("normal", 3).map(|a| &a.values);
@@ -117,7 +118,7 @@ pub(super) fn part(source: &mut Source, folder: &Path, most: (usize, u64)) -> Re
             if point.is_finite() {
                 let normal = normals.map_or([0.0; 3], |n| [n[3 * i], n[3 * i + 1], n[3 * i + 2]]);
                 let seen_by = piece.seen_by.get(i).copied().unwrap_or(if piece.scanners.len() == 1 { 0 } else { u32::MAX });
-                all.push(&Record { index, point, normal, seen_by })?;
+                all.push(&Record { index, point, normal, seen_by }).map_err(lost)?;
             }
         }
         Ok(())
@@ -125,6 +126,13 @@ pub(super) fn part(source: &mut Source, folder: &Path, most: (usize, u64)) -> Re
     if count == 0 {
         return Err(ReadError::NoPoints);
     }
+    sorted_out(all, folder, most, &mut manifest).map_err(lost)?;
+    manifest.points = count - manifest.left_out;
+    Ok(manifest)
+}
+
+/// Leaves out what is far off, moves the rest near the origin and parts it.
+fn sorted_out(all: Sheaf, folder: &Path, most: (usize, u64), manifest: &mut Manifest) -> io::Result<()> {
     let all = all.close()?;
     let pass = |see: &mut dyn FnMut(DVec3)| records(&all.path, &mut |r| see(r.point));
     let reach = far::reach(all.count, &pass)?;
@@ -143,11 +151,14 @@ pub(super) fn part(source: &mut Source, folder: &Path, most: (usize, u64)) -> Re
     })?;
     let body = body.close()?;
     manifest.left_out = all.count - body.count;
-    manifest.points = count - manifest.left_out;
     std::fs::remove_file(&all.path)?;
     let space = Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY };
-    divide(body, folder, space, most, &mut manifest.bricks)?;
-    Ok(manifest)
+    divide(body, folder, space, most, &mut manifest.bricks)
+}
+
+/// That points cannot be kept in a folder.
+pub(super) fn lost(folder: &Path, error: io::Error) -> ReadError {
+    ReadError::Kept { folder: folder.display().to_string(), error }
 }
 
 fn too_many(count: u64) -> ReadError {
