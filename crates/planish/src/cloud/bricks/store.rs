@@ -2,7 +2,7 @@
 
 use super::{Brick, BrickCells, BrickFacts, BrickSamples, BrickStands, Partition};
 use crate::cloud::Cloud;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// What was kept of a scan cannot be had: a disk that is full, a folder that is gone.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -20,7 +20,7 @@ pub trait BrickStore: Sync {
     /// # Errors
     /// If they cannot be read.
     fn around(&self, brick: usize, halo: f64) -> Result<Cloud, StoreError>;
-    /// Keeps the samples of a brick.
+    /// Keeps the samples of a brick, in the place of those that were kept before.
     /// # Errors
     /// If they cannot be written.
     fn keep(&self, brick: usize, samples: BrickSamples) -> Result<(), StoreError>;
@@ -49,9 +49,10 @@ pub fn points_of(bricks: &[Brick]) -> usize {
 pub struct CloudStore<'a> {
     cloud: &'a Cloud,
     partition: Partition,
-    kept: Vec<OnceLock<Kept>>,
+    kept: Vec<Mutex<Option<Kept>>>,
 }
 
+#[derive(Clone)]
 struct Kept {
     facts: BrickFacts,
     stands: Arc<BrickStands>,
@@ -65,12 +66,13 @@ impl<'a> CloudStore<'a> {
     /// A scan in bricks of at most `most` points.
     pub fn new(cloud: &'a Cloud, most: usize) -> CloudStore<'a> {
         let partition = Partition::new(&cloud.points, most);
-        let kept = partition.bricks.iter().map(|_| OnceLock::new()).collect();
+        let kept = partition.bricks.iter().map(|_| Mutex::default()).collect();
         CloudStore { cloud, partition, kept }
     }
 
-    fn kept(&self, brick: usize) -> Result<&Kept, StoreError> {
-        self.kept[brick].get().ok_or_else(|| StoreError(format!("brick {brick} has no samples yet")))
+    fn kept(&self, brick: usize) -> Result<Kept, StoreError> {
+        let kept = self.kept[brick].lock().unwrap_or_else(PoisonError::into_inner);
+        kept.clone().ok_or_else(|| StoreError(format!("brick {brick} has no samples yet")))
     }
 }
 
@@ -86,7 +88,8 @@ impl BrickStore for CloudStore<'_> {
     fn keep(&self, brick: usize, samples: BrickSamples) -> Result<(), StoreError> {
         let BrickSamples { facts, stands, cells } = samples;
         let kept = Kept { facts, stands: Arc::new(stands), cells: Arc::new(cells) };
-        self.kept[brick].set(kept).map_err(|_| StoreError(format!("brick {brick} has samples already")))
+        *self.kept[brick].lock().unwrap_or_else(PoisonError::into_inner) = Some(kept);
+        Ok(())
     }
 
     fn facts(&self, brick: usize) -> Result<BrickFacts, StoreError> {
@@ -94,11 +97,11 @@ impl BrickStore for CloudStore<'_> {
     }
 
     fn stands(&self, brick: usize) -> Result<Arc<BrickStands>, StoreError> {
-        Ok(self.kept(brick)?.stands.clone())
+        Ok(self.kept(brick)?.stands)
     }
 
     fn cells(&self, brick: usize) -> Result<Arc<BrickCells>, StoreError> {
-        Ok(self.kept(brick)?.cells.clone())
+        Ok(self.kept(brick)?.cells)
     }
 
     fn held(&self) -> u64 {
