@@ -36,6 +36,9 @@ PIECES = {
     ("edit.md", "[view]"): "picks on a head of 14 units",
     ("edit.md", '[[step]]\nedit = "relax"'): "a stroke that the page does not draw",
     ("edit.md", '[[step]]\nedit = "drag_curve"'): "a feature curve that the page does not draw",
+    ("relief.md", '[[step]]\nedit = "erase"'): "a mask that is not there",
+    ("relief.md", '[[step]]\nedit = "synthesise"'): "blocks that are too large for the stand-in",
+    ("relief.md", "[[pair]]"): "places on models that are not there",
 }
 
 # Time that a line has; they take a second or two on a machine with nothing else to do.

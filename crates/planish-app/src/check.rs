@@ -4,7 +4,7 @@ use crate::args::relief::ReliefCommand;
 use crate::args::{Command, Export, ExportWord, ScanArgs};
 use crate::failure::Failure;
 use crate::files;
-use planish_io::MeshFormat;
+use planish_io::{ExportKind, MeshFormat};
 
 /// Checks the options of a command.
 /// # Errors
@@ -55,7 +55,8 @@ pub fn check(command: &Command) -> Result<(), Failure> {
 
 /// Checks that the format holds splines where they are asked for.
 fn splines(export: &Export) -> Result<(), Failure> {
-    match MeshFormat::of(&export.output) {
+    let is_mesh = matches!(planish_io::export_kind(&export.output), Ok(ExportKind::Mesh));
+    match MeshFormat::of(&export.output).filter(|_| is_mesh) {
         Some(format) if export.surface == ExportWord::Spline && format != MeshFormat::Obj => {
             let what = format!(".{} holds no splines", format.extension());
             Err(Failure::usage("--surface spline", what).hint("write .obj, .usda or .step"))

@@ -242,14 +242,17 @@ pub fn drawing(mesh: &TriMesh, drawing: &Drawing, view: &View) -> Result<Vec<u8>
 }
 
 /// A displaced surface in clay, with the curves of its network.
+/// * `marked` - vertices that are drawn in red
 /// # Errors
 /// If the picture cannot be drawn.
-pub fn clay(mesh: &TriMesh, curves: Vec<Vec<DVec3>>, view: &View) -> Result<Vec<u8>, Failure> {
+pub fn clay(mesh: &TriMesh, curves: Vec<Vec<DVec3>>, marked: &[bool], view: &View) -> Result<Vec<u8>, Failure> {
     let (toward, up) = (DVec3::from_array(view.toward), DVec3::from_array(view.up));
     let camera = close_up(Camera::fit(&mesh.bounds(), toward, up, ASPECT), mesh);
     let line = |points: Vec<DVec3>| Line { points, color: SEAM_COLOR, width: 1.4 };
     let lines = curves.into_iter().map(line).collect();
-    let look = Look { paint: Paint::Plain(CLAY), lines, hollows: 0.6, background: Some(GROUND), ..Look::default() };
+    let colors: Vec<[u8; 3]> = marked.iter().map(|&red| if red { FEATURE_COLOR } else { CLAY }).collect();
+    let paint = Paint::PerVertex(&colors);
+    let look = Look { paint, lines, hollows: 0.6, background: Some(GROUND), ..Look::default() };
     png(&render::render(mesh, &look, &camera, SIZE.0, SIZE.1).map_err(Failure::fault)?)
 }
 

@@ -88,6 +88,7 @@ fn maps_go_out_and_come_back_as_a_layer_and_wrong_ones_are_told() {
         ("unreal", &["--preset", "unreal", "--max-error", "0.01%"]),
         ("usd", &["--preset", "usd", "--tile", "64"]),
         ("stage", &["--frame", "tangent", "--usd"]),
+        ("blender", &["--preset", "blender", "--tile", "128", "--usd", "--materialx"]),
     ] {
         ok(&[&["relief", "export", "box.planish", "-o", maps], options].concat(), at);
         let told = ok(&["relief", "import", "box.planish", maps, "-o", "same.planish"], at);
@@ -99,6 +100,8 @@ fn maps_go_out_and_come_back_as_a_layer_and_wrong_ones_are_told() {
     assert!(usd("usd").contains("@./relief.<UDIM>.exr@") && usd("usd").contains("UsdPreviewSurface"));
     assert!(usd("stage").contains("ND_displacement_vector3") && usd("stage").contains("@./patch_0005.exr@"));
     assert!(fs::read_to_string(at.join("arnold/relief.json")).unwrap().contains("order XZY"));
+    assert!(usd("blender").contains("ND_combine3_vector3"));
+    assert!(fs::read_to_string(at.join("blender/relief.mtlx")).unwrap().contains("<combine3"));
     // A stroke goes through the files of a second export into the first model.
     script(at, "[[step]]\nedit = \"stroke\"\npath = [{ patch = 0, u = 0.5, v = 0.5 }]\nradius = 0.3\nheight = 0.05\n");
     ok(&["relief", "edit", "box.planish", "edits.toml", "-q", "-o", "a.planish"], at);
@@ -137,10 +140,10 @@ fn maps_go_out_and_come_back_as_a_layer_and_wrong_ones_are_told() {
         (&["--tile", "16", "--sheets", "udim", "--texels", "40"][..], "do not fit on a tile of 16"),
         (&["--texels", "1"], "two texels"),
         (&["--kind", "normal", "--max-error", "1mm"], "does not go with normals"),
-        (&["--file", "png", "--max-error", "1e-12"], "--max-error: the largest error needs"),
-        (&["--frame", "object", "--materialx"], "wires vectors in tangent space"),
-        (&["--kind", "length", "--usd"], "wires scalars, heights"),
-        (&["--preset", "blender", "--usd", "--tile", "64"], "in the order tbn"),
+        (&["--file", "png", "--max-error", "1e-12"], "--max-error: 16-bit whole numbers cannot keep an error of 1e-12"),
+        (&["--frame", "object", "--materialx"], "cannot wire vectors in object space"),
+        (&["--kind", "length", "--usd"], "cannot wire lengths"),
+        (&["--preset", "renderman", "--usd", "--tile", "64"], "add --frame tangent"),
     ] {
         let output = planish(&[&["relief", "export", "a.planish", "-o", "bad"], args].concat(), at);
         assert_eq!(status(&output), 2);
@@ -309,4 +312,114 @@ fn moved_control_points_carry_the_relief_along() {
         assert_eq!(status(&output), 3, "{}", stderr(&output));
         assert!(error_line(&output).contains(words), "{}", stderr(&output));
     }
+}
+
+/// What a command that succeeds tells beside its table.
+fn warned(args: &[&str], folder: &Path) -> String {
+    let output = planish(args, folder);
+    assert_eq!(status(&output), 0, "{args:?}: {}", stderr(&output));
+    stderr(&output)
+}
+
+#[test]
+fn regress_maps_of_an_older_relief_are_told_and_info_reads_folders_of_maps() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    model(at);
+    ok(&["relief", "export", "box.planish", "-q", "-o", "maps", "--file", "png", "--sheets", "atlas"], at);
+    let told = ok(&["info", "maps"], at);
+    assert!(told.contains("maps of a relief") && told.contains("surface, tbn") && told.contains("png"), "{told}");
+    assert_eq!(ok(&["info", "maps/relief.json"], at), told);
+    ok(&["export", "box.planish", "-q", "-o", "plain"], at);
+    assert!(ok(&["info", "plain"], at).contains("displacement maps"));
+    script(at, "[[step]]\nedit = \"stroke\"\npath = [{ patch = 0, u = 0.5, v = 0.5 }]\nradius = 0.3\nheight = 0.05\n");
+    ok(&["relief", "edit", "box.planish", "edits.toml", "-q", "-o", "a.planish"], at);
+    let told = warned(&["relief", "import", "a.planish", "maps", "-o", "b.planish"], at);
+    assert!(told.contains("edited after these maps were exported"), "{told}");
+    let told = warned(&["relief", "import", "box.planish", "maps", "-o", "b.planish"], at);
+    assert!(!told.contains("edited after"), "{told}");
+    // A vector of an image that was blown up.
+    ok(&["relief", "export", "a.planish", "-q", "-o", "far", "--file", "png", "--sheets", "atlas"], at);
+    let sidecar = fs::read_to_string(at.join("far/relief.json")).unwrap();
+    let scale = sidecar.lines().find(|l| l.trim_start().starts_with("\"scale\":")).unwrap();
+    fs::write(at.join("far/relief.json"), sidecar.replace(scale, "  \"scale\": 1e30,")).unwrap();
+    let output = planish(&["relief", "import", "a.planish", "far", "-o", "c.planish"], at);
+    assert_eq!(status(&output), 3);
+    assert!(error_line(&output).contains("would be displaced by"), "{}", stderr(&output));
+}
+
+#[test]
+fn regress_heights_of_an_edited_relief_have_the_edits() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    model(at);
+    script(at, "[[step]]\nedit = \"stroke\"\npath = [{ patch = 0, u = 0.5, v = 0.5 }]\nradius = 0.3\nheight = 0.1\n");
+    ok(&["relief", "edit", "box.planish", "edits.toml", "-q", "-o", "a.planish"], at);
+    let largest = |model: &str, kind: &str| {
+        ok(&["relief", "export", model, "-q", "--force", "-o", "maps", "--kind", kind], at);
+        let sidecar: serde_json::Value =
+            serde_json::from_str(&fs::read_to_string(at.join("maps/relief.json")).unwrap()).unwrap();
+        sidecar["largest"].as_f64().unwrap()
+    };
+    let (height, scalar) = (largest("a.planish", "height"), largest("a.planish", "scalar"));
+    assert!(height > 0.08 && (height - scalar).abs() < 0.01, "{height} {scalar}");
+    assert!(largest("box.planish", "height") < 0.05);
+    let told = ok(&["relief", "import", "a.planish", "maps", "--force", "-o", "same.planish"], at);
+    assert!(told.contains("changed texels"), "maps of the model before the stroke: {told}");
+    largest("a.planish", "height");
+    assert!(
+        ok(&["relief", "import", "a.planish", "maps", "--force", "-o", "same.planish"], at).contains("nothing was")
+    );
+}
+
+#[test]
+fn regress_edits_that_do_nothing_or_too_much_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    model(at);
+    for (text, words) in [
+        ("", "The script has no steps"),
+        (
+            "[[step]]\nedit = \"stroke\"\npath = [{ patch = 0, u = 0.51, v = 0.51 }]\nradius = 1e-5\nheight = 0.1\n",
+            "The stroke of step 1 moves no texel",
+        ),
+    ] {
+        script(at, text);
+        let told = warned(&["relief", "edit", "box.planish", "edits.toml", "--force", "-o", "a.planish"], at);
+        assert!(told.contains(words), "{told}");
+    }
+    // A side of the box bulges out or in; one way or the other the stroke goes to its hollow.
+    fs::write(at.join("moves.toml"), "[[move]]\npatch = 0\ni = 2\nj = 2\nby = [0.3, 0.3, 0.3]\n").unwrap();
+    ok(&["deform", "box.planish", "moves.toml", "-q", "-o", "bulged.planish"], at);
+    let beyond = |height: f64| {
+        let stroke = "[[step]]\nedit = \"stroke\"\npath = [{ patch = 0, u = 0.5, v = 0.5 }]\nradius = 0.5\nheight = ";
+        script(at, &format!("{stroke}{height}\n"));
+        let edit = ["relief", "edit", "bulged.planish", "edits.toml", "--force", "-o", "a.planish"];
+        let told = warned(&[&edit[..], &["--picture", "a.png"]].concat(), at);
+        assert_eq!(told.contains("focal"), warned(&["info", "a.planish"], at).contains("focal"), "{told}");
+        told.contains("beyond its focal radius")
+    };
+    assert!(beyond(0.7) || beyond(-0.7));
+    for (text, words) in [
+        ("edit = \"erase\"\nregion = { radius = 5 }\n", "step 1 (erase, line 1): radius and feather of a region"),
+        ("edit = \"sharpen\"\nradius = 0.1\namount = 1e300\n", "would be displaced by"),
+        ("edit = \"stroke\"\npath = [[99, 99, 9]]\nradius = 1\nheight = 1\n", "further than the model is long"),
+    ] {
+        script(at, &format!("[[step]]\n{text}"));
+        let output = planish(&["relief", "edit", "box.planish", "edits.toml", "-o", "x.planish"], at);
+        assert_eq!(status(&output), 3, "{}", stderr(&output));
+        assert!(error_line(&output).contains(words), "{}", stderr(&output));
+    }
+    let output = planish(&["relief", "part", "box.planish", "-o", "x.planish", "--wavelength", "1e-9"], at);
+    assert_eq!(status(&output), 2, "{}", stderr(&output));
+    assert!(error_line(&output).contains("--wavelength: waves of 1e-9 are too short"), "{}", stderr(&output));
+    // STEP has the splines whatever is said.
+    ok(&["export", "box.planish", "-q", "--surface", "spline", "-o", "x.step"], at);
+    let told = warned(&["relief", "transfer", "box.planish", "box.planish", "--reach", "1e-12", "-o", "t.planish"], at);
+    assert!(!told.contains("No texel"), "{told}");
+    write_box(&at.join("far.ply"), 6);
+    ok(&["transform", "far.ply", "-q", "-o", "moved.ply", "--move", "50,0,0"], at);
+    ok(&["fit", "moved.ply", "-q", "-o", "far.planish", "--control", "5x5"], at);
+    let told = warned(&["relief", "transfer", "box.planish", "far.planish", "--force", "-o", "t.planish"], at);
+    assert!(told.contains("No texel got anything"), "{told}");
 }

@@ -190,7 +190,7 @@ pub enum WriteError {
         place: Place,
     },
     /// Rounded displacements need more digits than the kind of file has.
-    #[error("{0} - hint: allow a larger error, or write EXR")]
+    #[error("{0} - hint: allow a larger error, or write EXR of 32 bits")]
     TooFine(String),
     /// The image library refuses.
     #[error("cannot write the image: {0} - hint: check that the folder is writable and has room")]

@@ -4,6 +4,7 @@
 //! normal in units of the scene, `normal` a vector in tangent space. It has no input for vectors of displacement: those are wired with
 //! the nodes of MaterialX 1.38 that UsdMtlx names, for renderers that take the output `mtlx:displacement`.
 
+use planish::relief::maps::AxisOrder;
 use std::fmt::Write;
 
 /// What a texture is for.
@@ -13,8 +14,8 @@ pub enum UsdTexture {
     Height,
     /// A normal in tangent space.
     Normal,
-    /// A displacement `(T, B, N)` in tangent space.
-    Vector,
+    /// A displacement in tangent space, its parts in this order.
+    Vector(AxisOrder),
 }
 
 /// A material that reads one texture.
@@ -55,7 +56,7 @@ fn one(out: &mut String, path: &str, material: &UsdMaterial) {
                 writeln!(out, "            token outputs:displacement.connect = <{path}/preview.outputs:displacement>");
         }
         UsdTexture::Normal => {}
-        UsdTexture::Vector => {
+        UsdTexture::Vector(_) => {
             let _ = writeln!(
                 out,
                 "            token outputs:mtlx:displacement.connect = <{path}/displacement.outputs:out>"
@@ -65,11 +66,11 @@ fn one(out: &mut String, path: &str, material: &UsdMaterial) {
     let preview = match texture {
         UsdTexture::Height => format!("float inputs:displacement.connect = <{path}/map.outputs:r>"),
         UsdTexture::Normal => format!("normal3f inputs:normal.connect = <{path}/map.outputs:rgb>"),
-        UsdTexture::Vector => "float inputs:roughness = 0.5".into(),
+        UsdTexture::Vector(_) => "float inputs:roughness = 0.5".into(),
     };
     shader(out, "preview", "UsdPreviewSurface", &[&preview, "token outputs:surface", "token outputs:displacement"]);
-    if *texture == UsdTexture::Vector {
-        vector(out, path, material);
+    if let UsdTexture::Vector(order) = texture {
+        vector(out, path, material, *order);
     } else {
         let four = |x: f64, last: f64| format!("({x}, {x}, {x}, {last})");
         let result = if *texture == UsdTexture::Height { "float outputs:r" } else { "float3 outputs:rgb" };
@@ -91,7 +92,7 @@ fn one(out: &mut String, path: &str, material: &UsdMaterial) {
 }
 
 /// The nodes of MaterialX for a displacement by vectors.
-fn vector(out: &mut String, path: &str, material: &UsdMaterial) {
+fn vector(out: &mut String, path: &str, material: &UsdMaterial, order: AxisOrder) {
     let UsdMaterial { file, scale, bias, .. } = material;
     shader(out, "st", "ND_geompropvalue_vector2", &["string inputs:geomprop = \"st\"", "float2 outputs:out"]);
     let lines = [
@@ -106,8 +107,26 @@ fn vector(out: &mut String, path: &str, material: &UsdMaterial) {
         "float3 outputs:out".into(),
     ];
     shader(out, "signed", "ND_subtract_vector3FA", &lines.each_ref().map(String::as_str));
+    let ordered = match order {
+        AxisOrder::Tbn => "signed",
+        AxisOrder::TbnDown => {
+            let from = format!("float3 inputs:in1.connect = <{path}/signed.outputs:out>");
+            let lines = [&from, "float3 inputs:in2 = (1, -1, 1)", "float3 outputs:out"];
+            shader(out, "ordered", "ND_multiply_vector3", &lines);
+            "ordered"
+        }
+        AxisOrder::Tnb => {
+            let from = format!("float3 inputs:in.connect = <{path}/signed.outputs:out>");
+            let lines = [&from, "float outputs:outx", "float outputs:outy", "float outputs:outz"];
+            shader(out, "parts", "ND_separate3_vector3", &lines);
+            let part = |k: u32, axis: char| format!("float inputs:in{k}.connect = <{path}/parts.outputs:out{axis}>");
+            let lines = [part(1, 'x'), part(2, 'z'), part(3, 'y'), "float3 outputs:out".into()];
+            shader(out, "ordered", "ND_combine3_vector3", &lines.each_ref().map(String::as_str));
+            "ordered"
+        }
+    };
     let lines = [
-        format!("float3 inputs:displacement.connect = <{path}/signed.outputs:out>"),
+        format!("float3 inputs:displacement.connect = <{path}/{ordered}.outputs:out>"),
         format!("float inputs:scale = {scale}"),
         "token outputs:out".into(),
     ];

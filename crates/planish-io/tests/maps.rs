@@ -53,6 +53,7 @@ fn options(params: MapParams, file: MapFile) -> MapOptions {
         upside_down: false,
         max_error: None,
         wiring: String::new(),
+        relief: None,
         units: Units::Cm,
         companions: Vec::new(),
     }
@@ -233,10 +234,53 @@ fn one_png_of_rounded_maps_takes_a_third_of_what_half_floats_take() {
     let folder = folder();
     let fine = MapOptions { max_error: Some(1e-7), ..options(params.clone(), MapFile::Png) };
     let told = write_maps(folder.path(), &all, &[], &sheet, &pair.surfaces, &fine).unwrap_err().to_string();
-    assert!(told.contains("and whole numbers have 65535 - hint: allow a larger"), "{told}");
+    assert!(told.contains("16-bit whole numbers cannot keep an error of 1e-7 here; the least they can is "), "{told}");
     let fine = MapOptions { max_error: Some(1e-6), ..options(params.clone(), MapFile::ExrHalf) };
     let told = write_maps(folder.path(), &all, &[], &sheet, &pair.surfaces, &fine).unwrap_err().to_string();
-    assert!(told.contains("too small for half floats - hint: "), "{told}");
+    assert!(told.contains("half floats cannot keep an error of 1e-6 here; the least they can is "), "{told}");
+}
+
+#[test]
+fn regress_a_bound_of_1e_300_is_kept_exactly_by_floats_and_the_least_that_is_told_does_for_the_others() {
+    let pair = pair();
+    for kind in [MapKind::Vector, MapKind::Scalar] {
+        let params = MapParams { kind, ..MapParams::default() };
+        let all = made(&pair, &params);
+        let sheet = packed(&all, &params);
+        let written = |file: MapFile, max_error: f64| {
+            let folder = folder();
+            let options = MapOptions { max_error: Some(max_error), ..options(params.clone(), file) };
+            let sidecar = write_maps(folder.path(), &all, &[], &sheet, &pair.surfaces, &options)?;
+            let back = read_maps(folder.path()).unwrap().maps;
+            assert_eq!(back, as_read(all.clone(), &sidecar));
+            Ok::<_, planish_io::WriteError>(distances(&all, &back).into_iter().fold(0.0, f64::max))
+        };
+        for bound in [1e-300, 1e-20, 1e-12, 1e-8] {
+            assert!(written(MapFile::Exr, bound).unwrap() <= bound, "{bound:e}");
+            for file in [MapFile::ExrHalf, MapFile::Png, MapFile::Tiff] {
+                let told = written(file, bound).unwrap_err().to_string();
+                let (_, least) = told.split_once("the least they can is ").expect(&told);
+                let least: f64 = least.split(' ').next().unwrap().parse().unwrap();
+                let error = written(file, least).unwrap();
+                assert!(error <= least && error > 0.2 * least, "{file:?}: {error:e} of {least:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn regress_maps_in_object_space_do_not_pass_for_maps_in_the_frame_of_the_surface() {
+    let pair = pair();
+    let params = MapParams { frame: MapFrame::Object, ..MapParams::default() };
+    let all = made(&pair, &params);
+    let folder = folder();
+    let options = options(params.clone(), MapFile::Exr);
+    write_maps(folder.path(), &all, &[], &packed(&all, &params), &pair.surfaces, &options).unwrap();
+    let path = folder.path().join("relief.json");
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text.replace("\"object\"", "\"surface\"")).unwrap();
+    let told = read_maps(folder.path()).unwrap_err().to_string();
+    assert!(told.contains("\"vector object tbn\"") && told.contains("\"vector surface tbn\""), "{told}");
 }
 
 #[test]
@@ -333,7 +377,10 @@ fn materialx_names_every_image_and_refuses_what_it_has_no_node_for() {
         }
     }
     assert!(wired(MapParams { frame: MapFrame::Object, ..MapParams::default() }).0.is_none());
-    assert!(wired(MapParams { order: AxisOrder::Tnb, ..MapParams::default() }).0.is_none());
+    let text = wired(MapParams { order: AxisOrder::Tnb, ..MapParams::default() }).0.unwrap();
+    assert!(text.contains("<combine3 ") && text.contains("nodename=\"parts\" output=\"outz\""), "{text}");
+    let text = wired(MapParams { order: AxisOrder::TbnDown, ..MapParams::default() }).0.unwrap();
+    assert!(text.contains("value=\"1, -1, 1\""), "{text}");
 }
 
 #[test]
@@ -355,6 +402,7 @@ fn attributes_stand_in_the_same_places() {
         (sidecar.attributes[0].name.as_str(), &sidecar.attributes[0].files[..]),
         ("color", &["color_atlas.png".to_string()][..])
     );
+    assert_eq!((sidecar.attributes[0].mid_level, sidecar.attributes[0].scale), (0.0, 1.0));
     let picture = read_picture(&folder.path().join("color_atlas.png")).unwrap();
     assert_eq!([picture.width, picture.height], sheet.images[0]);
     assert!(planish_io::relief_names(folder.path()).contains(&"color_atlas.png".to_string()));
@@ -366,4 +414,58 @@ fn attributes_stand_in_the_same_places() {
     let refused = write_maps(&folder, &all, &[(name, colours)], &sheet, &pair.surfaces, &options).unwrap_err();
     assert!(refused.to_string().contains("\"color\" that is not finite"), "{refused}");
     assert!(!folder.exists());
+}
+
+#[test]
+fn regress_attributes_below_0_survive_whole_numbers_and_dark_colours_stay_dark() {
+    let pair = pair();
+    let params = MapParams { sheets: SheetKind::Atlas, ..MapParams::default() };
+    let all = made(&pair, &params);
+    let sheet = packed(&all, &params);
+    let of = |channels: usize, value: fn(usize) -> f32| -> Vec<PatchMap> {
+        let one = |m: &PatchMap| {
+            let values = (0..m.rows * m.cols * channels).map(value).collect();
+            PatchMap { rows: m.rows, cols: m.cols, channels, values }
+        };
+        all.iter().map(one).collect()
+    };
+    let quality = of(1, |k| (k % 121) as f32 - 61.86);
+    let list = [("quality".to_string(), quality.clone()), ("color".to_string(), of(3, |k| (k % 100) as f32 / 255.0))];
+    for (file, extension) in [(MapFile::Png, "png"), (MapFile::Tiff, "tif")] {
+        let folder = folder();
+        let options = options(params.clone(), file);
+        let sidecar = write_maps(folder.path(), &all, &list, &sheet, &pair.surfaces, &options).unwrap();
+        let [scalar, colour] = &sidecar.attributes[..] else { panic!("two attributes") };
+        assert_eq!((colour.mid_level, colour.scale), (0.0, 1.0));
+        let found = |name: &str, spot: &maps::Spot, map: &PatchMap, k: usize| {
+            let picture = read_picture(&folder.path().join(format!("{name}_atlas.{extension}"))).unwrap();
+            let row = sheet.images[0][1] - 1 - (spot.y + k / map.cols);
+            f64::from(picture.pixels[row * picture.width + spot.x + k % map.cols][0])
+        };
+        for (map, spot) in quality.iter().zip(&sheet.spots) {
+            for k in [0, 1, 60, 100] {
+                let value = (found("quality", spot, map, k) - scalar.mid_level) * scalar.scale;
+                assert!((value - f64::from(map.values[k])).abs() < 1e-2, "{value} for {}", map.values[k]);
+            }
+        }
+        // The mean of three numbers of a hundred of 255.
+        let grey = found("color", &sheet.spots[0], &all[0], 1);
+        assert!((grey - 4.0 / 255.0).abs() < 1e-4, "{grey}");
+        let bytes = std::fs::read(folder.path().join(format!("color_atlas.{extension}"))).unwrap();
+        let has = |words: &str| bytes.windows(words.len()).any(|w| w == words.as_bytes());
+        assert!(has("(number - 0) * 1") && !has("* 1 cm"));
+    }
+}
+
+#[test]
+fn what_a_preset_tells_to_type_is_in_the_numbers_of_the_files() {
+    let pair = pair();
+    let params = MapParams { kind: MapKind::Scalar, ..MapParams::default() };
+    let all = made(&pair, &params);
+    let folder = folder();
+    let wiring = "centre {mid_level}, magnitude {scale_cm}".to_string();
+    let options = MapOptions { wiring, units: Units::M, ..options(params.clone(), MapFile::Png) };
+    let sidecar = write_maps(folder.path(), &all, &[], &packed(&all, &params), &pair.surfaces, &options).unwrap();
+    let magnitude: f64 = sidecar.wiring.strip_prefix("centre 0.5, magnitude ").unwrap().parse().unwrap();
+    assert!((magnitude / sidecar.scale / 100.0 - 1.0).abs() < 1e-5, "{magnitude} for {} m", sidecar.scale);
 }

@@ -371,10 +371,10 @@ pub fn refit(
 /// that a bump sits wholly in the map.
 ///
 /// A first surface is fitted with knot spans no shorter than the wavelength, which is too stiff to take part in shorter waves;
-/// what it misses is filtered over all patches, and the surfaces are fitted to the first with the long waves of the rest. Edits
-/// of the relief stay as they are. On an error the model is what it was.
+/// what it misses is filtered over all patches, and the surfaces are fitted to the first with the long waves of the rest, with as
+/// many control points as these need. Edits of the relief stay as they are. On an error the model is what it was.
 /// # Errors
-/// As [`fit`].
+/// As [`fit`]; [`ReliefError::Edit`] for a wavelength that the grids cannot carry, with the shortest that they can.
 ///
 /// Source: [K98] §7.5 and fig. 7.2: a least-squares surface takes part of what seems detail.
 pub fn part_at(
@@ -383,8 +383,29 @@ pub fn part_at(
     params: &PipelineParams,
     observer: &dyn PipelineObserver,
 ) -> Result<Vec<StageRecord>, PipelineError> {
+    let sides = sides(model);
+    let spans = |side: &Side| SPANS_PER_WAVE * side.length / wavelength;
+    let carried = |side: &Side| (side.nodes + 1).saturating_sub(surface::FEWEST_CONTROL) as f64;
+    if !sides.iter().all(|side| spans(side) <= carried(side)) {
+        let shortest = sides.iter().map(|side| SPANS_PER_WAVE * side.length / carried(side)).fold(0.0, f64::max);
+        // Three digits, rounded up: what is told must do.
+        let digits = (2.0 - shortest.log10().floor()).max(0.0) as usize;
+        let digit = 10f64.powi(-(digits as i32));
+        let shortest = format!("{:.digits$}", (shortest / digit).ceil() * digit);
+        let what =
+            format!("waves of {wavelength} are too short for the grids of the patches; the shortest is {shortest}");
+        return Err(ReliefError::Edit { what }.into());
+    }
+    let per_curve = |count: &dyn Fn(&Side) -> f64| {
+        let control = |side: &Side| count(side).max(1.0) as usize + surface::FEWEST_CONTROL - 1;
+        surface::Resolution::PerCurve(sides.iter().map(control).collect())
+    };
+    let stiff = per_curve(&|side| (side.length / wavelength).floor());
+    let fine = per_curve(&|side| spans(side).ceil().min(carried(side)));
+    let stiff = FitParams { resolution: stiff, control_at: Vec::new(), ..params.fit.clone() };
+    let smoothing = params.fit.smoothing.min(PART_SMOOTHING);
+    let fine = FitParams { resolution: fine, control_at: Vec::new(), smoothing, ..params.fit.clone() };
     let mut clock = Clock::new(observer, &WEIGHTS);
-    let stiff = FitParams { resolution: stiff_counts(model, wavelength), ..params.fit.clone() };
     let long = clock.stage(
         "waves",
         |o| -> Result<_, PipelineError> {
@@ -394,18 +415,38 @@ pub fn part_at(
         |grids: &Vec<Grid>| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;
     let grids = std::mem::take(&mut model.grids);
-    let made = surfaces_through(model, (&long, &grids), params, &mut clock);
+    let made = surfaces_through(model, (&long, &grids), &PipelineParams { fit: fine, ..params.clone() }, &mut clock);
     model.grids = grids;
     made.map(|()| clock.records)
 }
 
-/// Control points along each curve with knot spans of `length` or more.
-fn stiff_counts(model: &Model, length: f64) -> surface::Resolution {
-    let spans = |curve: &network::Curve| {
-        let along = crate::geom::polyline::length(curve.points.iter().map(|p| p.position(&model.mesh)));
-        (along / length).floor().max(1.0) as usize
-    };
-    surface::Resolution::PerCurve(model.network.curves.iter().map(|c| spans(c) + surface::FEWEST_CONTROL - 1).collect())
+/// Knot spans of a parted surface for each of the shortest waves that it takes: cubic splines hold these to about a hundredth then,
+/// and waves three times as long to 1e-4.
+const SPANS_PER_WAVE: f64 = 4.0;
+/// Most smoothing of a parted surface. Bends of a wave of four spans count four times the smoothing, against half of the points'
+/// weight: so it loses a hundredth of its height by that, and one three times as long 1e-4.
+const PART_SMOOTHING: f64 = 1e-3;
+
+/// A curve as the grids have it.
+struct Side {
+    /// World units.
+    length: f64,
+    /// Nodes along it.
+    nodes: usize,
+}
+
+/// The curves of a network as the grids beside them have them, in their order.
+fn sides(model: &Model) -> Vec<Side> {
+    let mut sides: Vec<Side> =
+        model.network.curves.iter().map(|_| Side { length: 0.0, nodes: surface::FEWEST_CONTROL }).collect();
+    for (patch, grid) in model.network.patches.iter().zip(&model.grids) {
+        for (k, side) in patch.sides.iter().enumerate() {
+            let nodes = if k % 2 == 0 { grid.cols } else { grid.rows };
+            let points = (0..nodes).map(|i| grid.points[surface::node(grid.rows, grid.cols, k, i, 0)]);
+            sides[side.curve as usize] = Side { length: crate::geom::polyline::length(points), nodes };
+        }
+    }
+    sides
 }
 
 /// Fits surfaces of another resolution to the displaced ones: the same shape with its edits on another level of control points.

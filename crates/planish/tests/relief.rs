@@ -6,9 +6,12 @@ use glam::DVec3;
 use patchworks::*;
 use planish::Silent;
 use planish::mesh::{Adjacency, NONE, TriMesh};
+use planish::model::Model;
 use planish::network::CurveKind;
+use planish::pipeline::{self, PipelineParams};
 use planish::relief::{self, Relief, ReliefError};
 use planish::surface::{self, FitParams, Resolution, Surface};
+use std::f64::consts::TAU;
 
 fn fitted(work: &Patchwork, control: usize) -> (Vec<Surface>, Vec<Relief>) {
     let params = FitParams {
@@ -190,4 +193,42 @@ fn displaced_mesh_is_the_same_to_the_bit_on_1_and_4_threads() {
         })
     };
     assert_eq!(run(1), run(4));
+}
+
+#[test]
+fn regress_parting_at_10_gives_99_percent_of_a_wave_of_30_to_the_surface_and_95_of_one_of_3_to_the_map() {
+    let (long, short) = (|y: f64| (TAU * y / 30.0).sin(), |x: f64| 0.1 * (TAU * x / 3.0).sin());
+    // Two by two patches of 30 x 30, five nodes for each of the short waves.
+    let shape = |u: f64, v: f64| DVec3::new(30.0 * u, 30.0 * v, long(30.0 * v) + short(30.0 * u));
+    let work = sheet(2, 2, [false, false], [51, 51], shape);
+    let mut model = Model { network: work.network, grids: work.grids, ..Model::default() };
+    let params = PipelineParams::default();
+    pipeline::refit(&mut model, &params, &Silent).unwrap();
+    pipeline::part_at(&mut model, 10.0, &params, &Silent).unwrap();
+    // The heights of the surfaces, as shares of both waves by least squares; waves are not parted well at an open border.
+    let (mut sums, mut rest) = ([0.0; 5], 0.0);
+    for surface in &model.surfaces {
+        for k in 0..200 * 200 {
+            let p = surface.point((k % 200) as f64 / 199.0, (k / 200) as f64 / 199.0);
+            if p.x.min(p.y) < 5.0 || p.x.max(p.y) > 55.0 {
+                continue;
+            }
+            let (a, b) = (long(p.y), short(p.x));
+            sums = [sums[0] + a * a, sums[1] + a * b, sums[2] + b * b, sums[3] + a * p.z, sums[4] + b * p.z];
+            rest += (p.z - a).powi(2);
+        }
+    }
+    let [aa, ab, bb, az, bz] = sums;
+    let whole = aa * bb - ab * ab;
+    let (kept, taken) = ((az * bb - bz * ab) / whole, (bz * aa - az * ab) / whole);
+    assert!((kept - 1.0).abs() < 0.01, "{kept} of the long wave is in the surface");
+    assert!(taken.abs() < 0.05, "{taken} of the short wave is in the surface");
+    // What an open border does to the filter reaches a little further.
+    assert!((rest / aa).sqrt() < 0.02, "{}", (rest / aa).sqrt());
+    // What the grids cannot carry is told with the shortest that they can.
+    for wavelength in [1e-9, 0.1, 2.0] {
+        let told = pipeline::part_at(&mut model, wavelength, &params, &Silent).unwrap_err().to_string();
+        let (_, shortest) = told.split_once("the shortest is ").expect(&told);
+        pipeline::part_at(&mut model.clone(), shortest.parse().unwrap(), &params, &Silent).unwrap();
+    }
 }

@@ -481,3 +481,30 @@ fn layers_are_the_same_to_the_bit_on_1_and_4_threads() {
     };
     assert_eq!(run(1), run(4));
 }
+
+#[test]
+fn regress_regions_and_places_that_cannot_be_meant_are_refused_and_idle_edits_tell_so() {
+    let work = flat(2, 17);
+    let mut edited = Edited::new(&work, &heights(&work, |p| 0.01 * p.x));
+    for (json, words) in [
+        (r#"{"edit":"erase","region":{"radius":1}}"#, "give its middle, at"),
+        (r#"{"edit":"erase","region":{"feather":1}}"#, "give its middle, at"),
+        (r#"{"edit":"erase","region":{"radius":1,"at":{"patch":0,"u":1.5,"v":0}}}"#, "u and v go from 0 to 1"),
+        (r#"{"edit":"stroke","path":[[100,100,10]],"radius":1,"height":1}"#, "further than the model is long"),
+        (r#"{"edit":"stroke","path":[{"patch":9,"u":0,"v":0}],"radius":1,"height":1}"#, "there is no patch 9 among 4"),
+        (r#"{"edit":"stroke","path":[],"radius":1,"height":1}"#, "needs places"),
+        (r#"{"edit":"stroke","path":[[1,1,0]],"radius":1,"height":1e30}"#, "and the model is 2.828 long"),
+        (r#"{"edit":"scale","factor":1e300}"#, "would be displaced by"),
+        (r#"{"edit":"scale","factor":1e308}"#, "would be displaced by"),
+    ] {
+        let told = edited.make(json).unwrap_err();
+        assert!(told.contains(words), "{json}: {told}");
+    }
+    let parts = (&work.network, &edited.surfaces[..]);
+    let mut idle = |json: &str| {
+        let made = layers::edit(&mut edited.layers, parts, &of(json), &Edited::picture, &Silent);
+        made.unwrap().idle
+    };
+    assert!(idle(r#"{"edit":"stroke","path":[[0.03,0.03,0]],"radius":1e-4,"height":0.1}"#));
+    assert!(!idle(r#"{"edit":"stroke","path":[[0.03,0.03,0]],"radius":0.2,"height":0.1}"#));
+}

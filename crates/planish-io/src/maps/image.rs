@@ -94,7 +94,12 @@ pub(super) struct Raster {
     pub height: usize,
     pub channels: usize,
     pub values: Vec<f32>,
+    /// What the numbers are, as the head of an EXR tells; empty if nothing is told.
+    pub meaning: String,
 }
+
+/// Name of the entry for [`Raster::meaning`] in the head of an EXR.
+const MEANING: &str = "planishRelief";
 
 /// Writes an image; `note` goes into its metadata.
 pub(super) fn write(path: &Path, raster: &Raster, store: Store, note: &str) -> Result<(), WriteError> {
@@ -160,7 +165,10 @@ fn write_exr(
         AnyChannel::new(name.as_str(), samples)
     });
     let encoding = Encoding { compression, blocks: exr::image::Blocks::ScanLines, line_order: LineOrder::Increasing };
-    let attributes = LayerAttributes { comments: Some(Text::from(note)), ..LayerAttributes::default() };
+    let mut attributes = LayerAttributes { comments: Some(Text::from(note)), ..LayerAttributes::default() };
+    if !raster.meaning.is_empty() {
+        attributes.other.insert(Text::from(MEANING), AttributeValue::Text(Text::from(raster.meaning.as_str())));
+    }
     let channels = AnyChannels::sort(list.collect());
     let layer = Layer::new((raster.width, raster.height), attributes, encoding, channels);
     Image::from_layer(layer).write().to_buffered(out)
@@ -328,7 +336,11 @@ fn read_exr(bytes: &[u8]) -> Result<Raster, String> {
             FlatSamples::U32(_) => return Err("it holds whole numbers; floats are needed".into()),
         }
     }
-    Ok(Raster { width, height, channels: channels.len(), values })
+    let meaning = match image.layer_data.attributes.other.get(&Text::from(MEANING)) {
+        Some(AttributeValue::Text(words)) => words.to_string(),
+        _ => String::new(),
+    };
+    Ok(Raster { width, height, channels: channels.len(), values, meaning })
 }
 
 fn read_png(bytes: &[u8]) -> Result<Raster, String> {
@@ -378,5 +390,5 @@ fn read_tiff(bytes: &[u8]) -> Result<Raster, String> {
 fn without_alpha(width: usize, height: usize, found: usize, numbers: Vec<f32>) -> Raster {
     let channels = if found < 3 { 1 } else { 3 };
     let values = numbers.chunks_exact(found).flat_map(|pixel| pixel[..channels].iter().copied()).collect();
-    Raster { width, height, channels, values }
+    Raster { width, height, channels, values, meaning: String::new() }
 }

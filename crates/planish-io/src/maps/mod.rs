@@ -15,6 +15,7 @@ pub use wiring::{materialx, usd_materials};
 use crate::{Place, ReadError, WriteError};
 use image::{Raster, Store};
 use planish::Units;
+use planish::relief::Relief;
 use planish::relief::layers::Picture;
 use planish::relief::maps::{self, MapKind, MapParams, PatchMap, Sheet, SheetKind};
 use planish::surface::Surface;
@@ -35,8 +36,11 @@ pub struct MapOptions {
     pub upside_down: bool,
     /// Largest error of a displacement that rounding may make, units of the model; `None` rounds as little as the file does.
     pub max_error: Option<f64>,
-    /// How another program wires them.
+    /// How another program wires them. `{mid_level}`, `{scale}` and `{scale_cm}` in it become what the files have, the last one in
+    /// centimetres.
     pub wiring: String,
+    /// Sum over the relief that they were made of ([`relief_sum`]), to tell older maps; `None` if it is not known.
+    pub relief: Option<u32>,
     /// Unit of the model.
     pub units: Units,
     /// Other files that are written beside the maps.
@@ -52,42 +56,42 @@ struct Coding {
 }
 
 impl Coding {
-    /// * `kind` - of the maps; `None` for an attribute
-    fn new(kind: Option<MapKind>, maps: &[PatchMap], file: MapFile) -> Coding {
-        let most = maps.iter().flat_map(|m| &m.values).map(|x| x.abs()).fold(0.0, f32::max) as f64;
-        let most = if most > 0.0 { most } else { 1.0 };
+    fn new(kind: MapKind, maps: &[PatchMap], file: MapFile) -> Coding {
         let (mid_level, scale) = match (file.is_whole(), kind) {
             (false, _) => (0.0, 1.0),
-            (true, Some(MapKind::Normal)) => (0.5, 2.0),
-            (true, Some(MapKind::Length) | None) => (0.0, most),
-            (true, Some(_)) => (0.5, 2.0 * most),
+            (true, MapKind::Normal) => (0.5, 2.0),
+            (true, MapKind::Length) => (0.0, most(maps)),
+            (true, _) => (0.5, 2.0 * most(maps)),
+        };
+        Coding { store: Store::new(file), mid_level, scale }
+    }
+
+    /// That of a vertex attribute: numbers from 0 to 1, as colours are, stay as they are; those below 0 lie below the middle.
+    fn of_attribute(maps: &[PatchMap], file: MapFile) -> Coding {
+        let all = || maps.iter().flat_map(|m| &m.values);
+        let (mid_level, scale) = match file.is_whole() {
+            true if all().any(|&x| x < 0.0) => (0.5, 2.0 * most(maps)),
+            true if all().any(|&x| x > 1.0) => (0.0, most(maps)),
+            _ => (0.0, 1.0),
         };
         Coding { store: Store::new(file), mid_level, scale }
     }
 
     /// That of rounded maps: whole numbers count steps, floats take 16 bits where these hold every number exactly.
-    fn of_steps(rounded: &Rounded, file: MapFile) -> Result<Coding, WriteError> {
+    fn of_steps(rounded: &Rounded, file: MapFile) -> Coding {
         if !file.is_whole() {
             let half = Store { file, bits: 16 };
             let exact = |map: &PatchMap| map.values.iter().all(|&x| half.held(x) == x);
-            let store = match rounded.maps.iter().all(exact) {
-                true => half,
-                false if file == MapFile::Exr => Store::new(file),
-                false => return Err(WriteError::TooFine("the largest error is too small for half floats".into())),
-            };
-            return Ok(Coding { store, mid_level: 0.0, scale: 1.0 });
+            let store = if rounded.maps.iter().all(exact) { half } else { Store::new(MapFile::Exr) };
+            return Coding { store: Store { file, ..store }, mid_level: 0.0, scale: 1.0 };
         }
         let [low, high] = rounded.range;
         let bits = if file == MapFile::Png && high - low <= image::largest(8) as i64 { 8 } else { 16 };
         let steps = image::largest(bits) as i64;
-        if high - low > steps {
-            let what = format!("the largest error needs {} steps, and whole numbers have {steps}", high - low);
-            return Err(WriteError::TooFine(what));
-        }
         // In the middle, or as near to it as the range lets it.
         let zero = (steps / 2 + 1).clamp(-low, steps - high);
         let store = Store { file, bits };
-        Ok(Coding { store, mid_level: zero as f64 / steps as f64, scale: rounded.step * steps as f64 })
+        Coding { store, mid_level: zero as f64 / steps as f64, scale: rounded.step * steps as f64 }
     }
 
     /// What the image holds for a number.
@@ -101,19 +105,92 @@ impl Coding {
     }
 }
 
-/// The maps as they are written, and how: rounded if an error is allowed.
+/// The largest number of some maps, its sign left out; 1 where there is none but 0.
+fn most(maps: &[PatchMap]) -> f64 {
+    let most = maps.iter().flat_map(|m| &m.values).map(|x| x.abs()).fold(0.0, f32::max) as f64;
+    if most > 0.0 { most } else { 1.0 }
+}
+
+/// Maps as they are written, and how.
+struct Prepared<'a> {
+    maps: Cow<'a, [PatchMap]>,
+    coding: Coding,
+    /// The bound by which they were rounded, if they were.
+    max_error: Option<f64>,
+}
+
+/// The maps as they are written: rounded if an error is allowed.
+/// # Errors
+/// `WriteError::TooFine` for a bound that such files cannot keep.
 fn prepared(
     maps: &[PatchMap],
     kind: MapKind,
     file: MapFile,
     max_error: Option<f64>,
-) -> Result<(Cow<'_, [PatchMap]>, Coding), WriteError> {
-    let Some(error) = max_error.filter(|e| *e > 0.0) else {
-        return Ok((Cow::Borrowed(maps), Coding::new(Some(kind), maps, file)));
+) -> Result<Prepared<'_>, WriteError> {
+    let plain = Prepared { maps: Cow::Borrowed(maps), coding: Coding::new(kind, maps, file), max_error: None };
+    let Some(error) = max_error.filter(|e| *e > 0.0) else { return Ok(plain) };
+    if file.is_whole() {
+        let least = rounding::least_whole(maps);
+        if error < least {
+            return Err(too_fine(error, least, "16-bit whole numbers"));
+        }
+    }
+    let rounded = rounding::is_coarse(maps, error, file).then(|| rounding::rounded(maps, error, file));
+    if let Some(rounded) = rounded {
+        let coding = Coding::of_steps(&rounded, file);
+        // 32-bit floats in files of halves would be no files of halves.
+        if file != MapFile::ExrHalf || coding.store.bits == 16 {
+            return Ok(Prepared { maps: Cow::Owned(rounded.maps), coding, max_error: Some(error) });
+        }
+    }
+    // Floats are finer than the bound, or as near as they can be.
+    let least = largest_error(maps, &held(maps, &plain.coding));
+    if least > error {
+        return Err(too_fine(error, least, "half floats"));
+    }
+    Ok(plain)
+}
+
+/// * `least` - the least error that these `numbers` can keep
+fn too_fine(error: f64, least: f64, numbers: &str) -> WriteError {
+    // Two digits, rounded up: what is told must do.
+    let digit = 10f64.powf(least.log10().floor() - 1.0);
+    let least = (least / digit).ceil() * digit;
+    WriteError::TooFine(format!("{numbers} cannot keep an error of {error:e} here; the least they can is {least:.1e}"))
+}
+
+/// The numbers that images hold for those of maps, as they are read.
+fn held(maps: &[PatchMap], coding: &Coding) -> Vec<PatchMap> {
+    let one = |map: &PatchMap| PatchMap {
+        values: map.values.iter().map(|&x| coding.meant(coding.coded(x))).collect(),
+        ..*map
     };
-    let rounded = rounding::rounded(maps, error, file);
-    let coding = Coding::of_steps(&rounded, file)?;
-    Ok((Cow::Owned(rounded.maps), coding))
+    maps.par_iter().map(one).collect()
+}
+
+/// A sum over all displacements, to tell whether a relief is still the one that maps were made of.
+pub fn relief_sum(reliefs: &[Relief]) -> u32 {
+    let mut sum = crc32fast::Hasher::new();
+    for r in reliefs {
+        sum.update(&(r.rows as u64).to_le_bytes());
+        sum.update(&(r.cols as u64).to_le_bytes());
+        r.vectors.iter().flat_map(|d| d.to_array()).for_each(|x| sum.update(&x.to_le_bytes()));
+    }
+    sum.finalize()
+}
+
+/// What the texels of maps are, as it stands in the head of an EXR: kind, and of vectors frame and order.
+fn meaning(params: &MapParams) -> String {
+    let word = |value: serde_json::Result<serde_json::Value>| value.ok().and_then(|v| v.as_str().map(str::to_owned));
+    let of_vectors = || {
+        [word(serde_json::to_value(params.frame)), word(serde_json::to_value(params.order))]
+            .map(Option::unwrap_or_default)
+    };
+    match params.kind.channels() {
+        1 => params.kind.word().into(),
+        _ => format!("{} {}", params.kind.word(), of_vectors().join(" ")),
+    }
 }
 
 /// A sum over the control points, to tell maps of another model.
@@ -179,14 +256,16 @@ pub fn write_maps(
         all_finite(maps, &format!("\"{name}\""), "leave out --attributes, or mend the values of the mesh")?;
     }
     std::fs::create_dir_all(folder)?;
-    let (rounded, coding) = prepared(maps, options.params.kind, options.file, options.max_error)?;
-    let images = write_images(folder, &rounded, sheet, (coding, options.upside_down), None, options.units)?;
+    let Prepared { maps: rounded, coding, max_error } =
+        prepared(maps, options.params.kind, options.file, options.max_error)?;
+    let images = write_images(folder, &rounded, sheet, coding, None, options)?;
     let mut told = Vec::new();
     for (name, maps) in attributes {
-        let coding = Coding::new(None, maps, options.file);
-        let files = write_images(folder, maps, sheet, (coding, options.upside_down), Some(name), options.units)?;
+        let coding = Coding::of_attribute(maps, options.file);
+        let files = write_images(folder, maps, sheet, coding, Some(name), options)?;
         told.push(AttributeEntry {
             name: name.clone(),
+            mid_level: coding.mid_level,
             scale: coding.scale,
             files: files.into_iter().map(|i| i.file).collect(),
         });
@@ -206,13 +285,14 @@ pub fn write_maps(
         bits: Some(coding.store.bits),
         mid_level: coding.mid_level,
         scale: coding.scale,
-        scale_metres: coding.scale * options.units.metres(),
+        scale_metres: (options.params.kind != MapKind::Normal).then(|| coding.scale * options.units.metres()),
         upside_down: options.upside_down,
         uv: "(u (n - 1) + 0.5) / n".into(),
         largest: maps.iter().map(length).fold(0.0, f64::max).sqrt(),
-        max_error: options.max_error,
-        wiring: options.wiring.clone(),
+        max_error,
+        wiring: wired(&options.wiring, &coding, options.units),
         surfaces: surfaces_sum(surfaces),
+        relief: options.relief,
         images,
         patches: maps.iter().zip(&sheet.spots).map(entry).collect(),
         attributes: told,
@@ -222,19 +302,37 @@ pub fn write_maps(
     Ok(sidecar)
 }
 
+/// The words of a preset with the numbers of the files.
+fn wired(words: &str, coding: &Coding, units: Units) -> String {
+    /// Digits that a person types.
+    const DIGITS: usize = 6;
+    let typed = |x: f64| format!("{:.*e}", DIGITS - 1, x).parse::<f64>().unwrap_or(x).to_string();
+    let centimetres = coding.scale * units.metres() / Units::Cm.metres();
+    // Of the mid-level all digits count: 0.5 is not quite that of whole steps.
+    words
+        .replace("{mid_level}", &coding.mid_level.to_string())
+        .replace("{scale_cm}", &typed(centimetres))
+        .replace("{scale}", &typed(coding.scale))
+}
+
 fn write_images(
     folder: &Path,
     maps: &[PatchMap],
     sheet: &Sheet,
-    (coding, upside_down): (Coding, bool),
+    coding: Coding,
     attribute: Option<&str>,
-    units: Units,
+    options: &MapOptions,
 ) -> Result<Vec<ImageEntry>, WriteError> {
-    let note = format!("planish relief: value = (number - {}) * {} {units}", coding.mid_level, coding.scale);
+    let is_length = attribute.is_none() && options.params.kind != MapKind::Normal;
+    let unit = if is_length { format!(" {}", options.units) } else { String::new() };
+    let note = format!("planish relief: value = (number - {}) * {}{unit}", coding.mid_level, coding.scale);
     let one = |(k, &[width, height]): (usize, &[usize; 2])| {
         let mut raster = painted(maps, sheet, k, &coding);
-        if upside_down {
+        if options.upside_down {
             turn(&mut raster);
+        }
+        if attribute.is_none() {
+            raster.meaning = meaning(&options.params);
         }
         let file = image_name(sheet, k, coding.store.file, attribute);
         image::write(&folder.join(&file), &raster, coding.store, &note)?;
@@ -261,7 +359,7 @@ fn painted(maps: &[PatchMap], sheet: &Sheet, image: usize, coding: &Coding) -> R
             }
         }
     }
-    Raster { width, height, channels, values }
+    Raster { width, height, channels, values, meaning: String::new() }
 }
 
 /// What other ways to write the same maps take: bytes of all images and the largest error, as half floats in lossless ZIP and in DWA.
@@ -285,18 +383,15 @@ pub fn other_ways(maps: &[PatchMap], sheet: &Sheet) -> Result<[(u64, f64); 2], W
 pub fn in_one_png(maps: &[PatchMap], kind: MapKind, max_error: f64) -> Result<Option<(u64, f64)>, WriteError> {
     let shapes: Vec<[usize; 2]> = maps.iter().map(|m| [m.rows, m.cols]).collect();
     let Ok(sheet) = maps::pack(&shapes, SheetKind::Atlas, 0, 0) else { return Ok(None) };
-    let Ok((rounded, coding)) = prepared(maps, kind, MapFile::Png, Some(max_error)) else { return Ok(None) };
+    let Ok(Prepared { maps: rounded, coding, .. }) = prepared(maps, kind, MapFile::Png, Some(max_error)) else {
+        return Ok(None);
+    };
     let raster = painted(&rounded, &sheet, 0, &coding);
     if raster.values.len() > image::MOST_ZOPFLI {
         return Ok(None);
     }
     let bytes = image::encoded(&raster, coding.store, "")?.len() as u64;
-    let held = |map: &PatchMap| PatchMap {
-        values: map.values.iter().map(|&x| coding.meant(coding.coded(x))).collect(),
-        ..*map
-    };
-    let held: Vec<PatchMap> = rounded.iter().map(held).collect();
-    Ok(Some((bytes, largest_error(maps, &held))))
+    Ok(Some((bytes, largest_error(maps, &held(&rounded, &coding)))))
 }
 
 /// Largest distance between the texels of two sets of maps of the same shapes.
@@ -335,7 +430,7 @@ pub struct ReadMaps {
 /// Reads the maps in a folder.
 /// # Errors
 /// `ReadError` for a folder without sidecar, or an image that is missing, damaged, of another size or number of channels than
-/// the sidecar says, or with numbers that are not finite.
+/// the sidecar says, with numbers that are not finite, or an EXR whose head tells of another kind, frame or order.
 pub fn read_maps(folder: impl AsRef<Path>) -> Result<ReadMaps, ReadError> {
     let folder = folder.as_ref();
     let sidecar = sidecar::read(folder)?;
@@ -349,6 +444,13 @@ pub fn read_maps(folder: impl AsRef<Path>) -> Result<ReadMaps, ReadError> {
         if (raster.width, raster.height) != (entry.width, entry.height) {
             let [w, h] = [raster.width, raster.height];
             return Err(wrong(format!("it has {w} x {h} pixels, not {} x {}", entry.width, entry.height)));
+        }
+        let meaning = meaning(&sidecar.params);
+        if !raster.meaning.is_empty() && raster.meaning != meaning {
+            return Err(wrong(format!(
+                "its texels are \"{}\", and the sidecar tells of \"{meaning}\"",
+                raster.meaning
+            )));
         }
         if raster.channels < channels {
             return Err(wrong(format!("it has {} channel, not {channels}", raster.channels)));
@@ -391,12 +493,11 @@ fn coding_of(sidecar: &Sidecar) -> Coding {
 pub fn as_read(maps: Vec<PatchMap>, sidecar: &Sidecar) -> Vec<PatchMap> {
     let coding = coding_of(sidecar);
     let maps = match sidecar.max_error.filter(|e| *e > 0.0) {
-        Some(error) => rounding::rounded(&maps, error, sidecar.file).maps,
-        None => maps,
+        // A relief that has grown since may be too large for steps so small.
+        Some(error) if rounding::is_coarse(&maps, error, sidecar.file) => {
+            rounding::rounded(&maps, error, sidecar.file).maps
+        }
+        _ => maps,
     };
-    let again = |mut map: PatchMap| {
-        map.values.iter_mut().for_each(|x| *x = coding.meant(coding.coded(*x)));
-        map
-    };
-    maps.into_par_iter().map(again).collect()
+    held(&maps, &coding)
 }

@@ -28,9 +28,32 @@ pub(super) struct Rounded {
     pub range: [i64; 2],
 }
 
+/// Steps from the least to the largest number that floats may take: single precision holds no finer multiples exactly.
+const MOST_STEPS: f64 = (1u32 << 24) as f64;
+
+/// Numbers of a texel.
+fn channels(maps: &[PatchMap]) -> usize {
+    maps.first().map_or(1, |m| m.channels)
+}
+
+/// True if there is something to round: floats whose digits are coarser than the step are as exact as they can be.
+pub(super) fn is_coarse(maps: &[PatchMap], error: f64, file: MapFile) -> bool {
+    let step = step_of(error, channels(maps), file);
+    step >= f64::from(f32::MIN_POSITIVE) && super::most(maps) <= MOST_STEPS * step
+}
+
+/// The least error that 16-bit whole numbers keep everywhere.
+pub(super) fn least_whole(maps: &[PatchMap]) -> f64 {
+    let all = || maps.iter().flat_map(|m| &m.values).map(|&x| f64::from(x));
+    let (low, high) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));
+    // One step less: both ends are rounded outwards at worst.
+    let step = (high - low) / f64::from(super::image::largest(16) - 1.0);
+    step / 2.0 * (channels(maps) as f64).sqrt() / (1.0 - BOUND_ROOM)
+}
+
 /// Rounds maps so that no texel moves by more than `error`, units of the model.
 pub(super) fn rounded(maps: &[PatchMap], error: f64, file: MapFile) -> Rounded {
-    let step = step_of(error, maps.first().map_or(1, |m| m.channels), file);
+    let step = step_of(error, channels(maps), file);
     let one = |map: &PatchMap| {
         let multiples = multiples(map, error / step, step);
         let range = multiples.iter().fold([0, 0], |[low, high], &k| [low.min(k), high.max(k)]);

@@ -33,20 +33,24 @@ pub struct Sidecar {
     pub mid_level: f64,
     /// See `mid_level`.
     pub scale: f64,
-    /// The same in metres.
-    pub scale_metres: f64,
+    /// The same in metres; of normals, which have no length, nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_metres: Option<f64>,
     /// True where the first row of the images is `v = 0`.
     pub upside_down: bool,
     /// Where a row of `n` texels of a patch is sampled for the parameter `u`.
     pub uv: String,
     /// Largest length of a displacement.
     pub largest: f64,
-    /// Largest error of a displacement by rounding that was asked for, if any.
+    /// Largest error of a displacement that rounding may have made; nothing where numbers are as they are.
     pub max_error: Option<f64>,
     /// How a preset's program wires the map.
     pub wiring: String,
     /// Sum over the surfaces that the maps belong to.
     pub surfaces: u32,
+    /// Sum over the relief that they were made of; sidecars without it do not tell.
+    #[serde(default)]
+    pub relief: Option<u32>,
     /// The images.
     pub images: Vec<ImageEntry>,
     /// The patches, in their order.
@@ -88,7 +92,10 @@ pub struct PatchEntry {
 pub struct AttributeEntry {
     /// Its name.
     pub name: String,
-    /// A value is `(number - mid_level) * scale` with a mid-level of 0.
+    /// A value is `(number - mid_level) * scale`; sidecars without it have 0.
+    #[serde(default)]
+    pub mid_level: f64,
+    /// See `mid_level`.
     pub scale: f64,
     /// Its files, in the order of the images.
     pub files: Vec<String>,

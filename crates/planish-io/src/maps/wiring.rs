@@ -6,17 +6,18 @@ use crate::{UsdMaterial, UsdTexture};
 use planish::relief::maps::{AxisOrder, MapFrame, MapKind, SheetKind};
 use std::fmt::Write;
 
-/// The materials of USD for the maps; `None` for maps that it has no input for: lengths, and vectors and normals in another frame or
-/// order than tangent, bitangent, normal of tangent space.
+/// The materials of USD for the maps; `None` for maps that it has no input for: lengths, vectors and normals in another frame than
+/// tangent space, and normals in another order than tangent, bitangent, normal.
 pub fn usd_materials(sidecar: &Sidecar) -> Option<Vec<UsdMaterial>> {
     let texture = match sidecar.params.kind {
         MapKind::Scalar | MapKind::Height => UsdTexture::Height,
         MapKind::Normal => UsdTexture::Normal,
-        MapKind::Vector => UsdTexture::Vector,
+        MapKind::Vector => UsdTexture::Vector(sidecar.params.order),
         MapKind::Length => return None,
     };
-    let in_tangent_space = sidecar.params.frame == MapFrame::Tangent && sidecar.params.order == AxisOrder::Tbn;
-    if texture != UsdTexture::Height && !in_tangent_space {
+    let in_tangent_space = sidecar.params.frame == MapFrame::Tangent;
+    let in_order = texture != UsdTexture::Normal || sidecar.params.order == AxisOrder::Tbn;
+    if texture != UsdTexture::Height && !(in_tangent_space && in_order) {
         return None;
     }
     let (scale, bias) = (sidecar.scale, -sidecar.mid_level * sidecar.scale);
@@ -40,10 +41,9 @@ pub fn usd_materials(sidecar: &Sidecar) -> Option<Vec<UsdMaterial>> {
     Some(sidecar.images.iter().enumerate().map(one).collect())
 }
 
-/// The document; `None` for maps that MaterialX has no node for: vectors in object space or of another order.
+/// The document; `None` for maps that MaterialX has no node for: vectors in object space.
 pub fn materialx(sidecar: &Sidecar) -> Option<String> {
-    let vector = sidecar.params.kind == MapKind::Vector;
-    if vector && (sidecar.params.frame == MapFrame::Object || sidecar.params.order != AxisOrder::Tbn) {
+    if sidecar.params.kind == MapKind::Vector && sidecar.params.frame == MapFrame::Object {
         return None;
     }
     let mut out = String::from("<?xml version=\"1.0\"?>\n");
@@ -64,54 +64,75 @@ pub fn materialx(sidecar: &Sidecar) -> Option<String> {
     Some(out)
 }
 
+/// A node or a material of the document.
+/// * `indent` - blanks before it
+fn node(out: &mut String, indent: usize, category: &str, [name, kind]: [&str; 2], inputs: &[String]) {
+    let blanks = " ".repeat(indent);
+    let _ = writeln!(out, "{blanks}<{category} name=\"{name}\" type=\"{kind}\">");
+    for input in inputs {
+        let _ = writeln!(out, "{blanks}  <input {input} />");
+    }
+    let _ = writeln!(out, "{blanks}</{category}>");
+}
+
+/// An input that another node feeds.
+fn fed(name: &str, kind: &str, node: &str) -> String {
+    format!("name=\"{name}\" type=\"{kind}\" nodename=\"{node}\"")
+}
+
+/// An input with a value of its own.
+fn fixed(name: &str, kind: &str, value: impl std::fmt::Display) -> String {
+    format!("name=\"{name}\" type=\"{kind}\" value=\"{value}\"")
+}
+
+/// The node that has the vectors of `from` as tangent, bitangent, normal; other nodes are added for it as they are needed.
+fn in_order(out: &mut String, order: AxisOrder, from: &'static str) -> &'static str {
+    match order {
+        AxisOrder::Tbn => return from,
+        AxisOrder::TbnDown => {
+            let inputs = [fed("in1", "vector3", from), fixed("in2", "vector3", "1, -1, 1")];
+            node(out, 4, "multiply", ["ordered", "vector3"], &inputs);
+        }
+        AxisOrder::Tnb => {
+            node(out, 4, "separate3", ["parts", "multioutput"], &[fed("in", "vector3", from)]);
+            let part = |input: &str, output: &str| {
+                format!("name=\"{input}\" type=\"float\" nodename=\"parts\" output=\"{output}\"")
+            };
+            let inputs = [part("in1", "outx"), part("in2", "outz"), part("in3", "outy")];
+            node(out, 4, "combine3", ["ordered", "vector3"], &inputs);
+        }
+    }
+    "ordered"
+}
+
 fn material(out: &mut String, name: &str, file: &str, sidecar: &Sidecar) {
-    let kind = sidecar.params.kind;
+    let (kind, order) = (sidecar.params.kind, sidecar.params.order);
     let word = if kind.channels() == 3 { "vector3" } else { "float" };
     let file = file.replace('<', "&lt;").replace('>', "&gt;");
     let (scale, mid) = (sidecar.scale, sidecar.mid_level);
-    let _ = writeln!(out, "  <nodegraph name=\"{name}_map\">");
-    let _ = writeln!(out, "    <image name=\"image\" type=\"{word}\">");
-    let _ = writeln!(
-        out,
-        "      <input name=\"file\" type=\"filename\" value=\"{file}\" colorspace=\"none\" />\n    </image>"
-    );
-    if kind == MapKind::Normal {
-        // `normalmap` wants numbers from 0 to 1.
-        let (factor, add) = if mid == 0.0 { (0.5, 0.5) } else { (1.0, 0.0) };
-        let _ = writeln!(
-            out,
-            "    <multiply name=\"scaled\" type=\"vector3\">\n      <input name=\"in1\" type=\"vector3\" nodename=\"image\" />\n      <input name=\"in2\" type=\"float\" value=\"{factor}\" />\n    </multiply>"
-        );
-        let _ = writeln!(
-            out,
-            "    <add name=\"coded\" type=\"vector3\">\n      <input name=\"in1\" type=\"vector3\" nodename=\"scaled\" />\n      <input name=\"in2\" type=\"float\" value=\"{add}\" />\n    </add>"
-        );
-        let _ = writeln!(
-            out,
-            "    <normalmap name=\"normal\" type=\"vector3\">\n      <input name=\"in\" type=\"vector3\" nodename=\"coded\" />\n    </normalmap>"
-        );
-        let _ = writeln!(out, "    <output name=\"out\" type=\"vector3\" nodename=\"normal\" />\n  </nodegraph>");
-        let _ = writeln!(
-            out,
-            "  <standard_surface name=\"{name}_surface\" type=\"surfaceshader\">\n    <input name=\"normal\" type=\"vector3\" nodegraph=\"{name}_map\" output=\"out\" />\n  </standard_surface>"
-        );
-        let _ = writeln!(
-            out,
-            "  <surfacematerial name=\"{name}\" type=\"material\">\n    <input name=\"surfaceshader\" type=\"surfaceshader\" nodename=\"{name}_surface\" />\n  </surfacematerial>"
-        );
+    let graph = format!("{name}_map");
+    let result =
+        |name: &str, kind: &str| format!("name=\"{name}\" type=\"{kind}\" nodegraph=\"{graph}\" output=\"out\"");
+    let _ = writeln!(out, "  <nodegraph name=\"{graph}\">");
+    let image = format!("{} colorspace=\"none\"", fixed("file", "filename", file));
+    node(out, 4, "image", ["image", word], &[image]);
+    node(out, 4, "subtract", ["signed", word], &[fed("in1", word, "image"), fixed("in2", "float", mid)]);
+    let last = if word == "vector3" { in_order(out, order, "signed") } else { "signed" };
+    if kind != MapKind::Normal {
+        let _ = writeln!(out, "    <output name=\"out\" type=\"{word}\" nodename=\"{last}\" />\n  </nodegraph>");
+        let (part, shader) = (format!("{name}_displacement"), "displacementshader");
+        node(out, 2, "displacement", [&part, shader], &[result("displacement", word), fixed("scale", "float", scale)]);
+        node(out, 2, "surfacematerial", [name, "material"], &[fed(shader, shader, &part)]);
         return;
     }
-    let _ = writeln!(
-        out,
-        "    <subtract name=\"signed\" type=\"{word}\">\n      <input name=\"in1\" type=\"{word}\" nodename=\"image\" />\n      <input name=\"in2\" type=\"float\" value=\"{mid}\" />\n    </subtract>"
-    );
-    let _ = writeln!(out, "    <output name=\"out\" type=\"{word}\" nodename=\"signed\" />\n  </nodegraph>");
-    let _ = writeln!(
-        out,
-        "  <displacement name=\"{name}_displacement\" type=\"displacementshader\">\n    <input name=\"displacement\" type=\"{word}\" nodegraph=\"{name}_map\" output=\"out\" />\n    <input name=\"scale\" type=\"float\" value=\"{scale}\" />\n  </displacement>"
-    );
-    let _ = writeln!(
-        out,
-        "  <surfacematerial name=\"{name}\" type=\"material\">\n    <input name=\"displacementshader\" type=\"displacementshader\" nodename=\"{name}_displacement\" />\n  </surfacematerial>"
-    );
+    // `normalmap` wants numbers from 0 to 1.
+    let half = [fed("in1", word, last), fixed("in2", "float", scale / 2.0)];
+    node(out, 4, "multiply", ["half", word], &half);
+    node(out, 4, "add", ["coded", word], &[fed("in1", word, "half"), fixed("in2", "float", 0.5)]);
+    let space = if sidecar.params.frame == MapFrame::Object { "object" } else { "tangent" };
+    node(out, 4, "normalmap", ["normal", word], &[fed("in", word, "coded"), fixed("space", "string", space)]);
+    let _ = writeln!(out, "    <output name=\"out\" type=\"{word}\" nodename=\"normal\" />\n  </nodegraph>");
+    let (part, shader) = (format!("{name}_surface"), "surfaceshader");
+    node(out, 2, "standard_surface", [&part, shader], &[result("normal", word)]);
+    node(out, 2, "surfacematerial", [name, "material"], &[fed(shader, shader, &part)]);
 }

@@ -80,6 +80,28 @@ impl Displaced<'_> {
         }
         Ok(self.surfaces.iter().try_for_each(Surface::check)?)
     }
+
+    /// Checks that no place is displaced by more than the model is long: nobody means that.
+    /// # Errors
+    /// [`ReliefError::Edit`] with the patch and both lengths.
+    pub fn check_lengths(&self) -> Result<(), ReliefError> {
+        let most = diagonal(self.surfaces);
+        for (patch, relief) in self.reliefs.iter().enumerate() {
+            // Numbers that are none are not shorter, either.
+            let found = relief.vectors.iter().map(|d| d.length()).find(|length| !(*length <= most));
+            if let Some(length) = found {
+                let size = if most < 1e6 { format!("{most:.3}") } else { format!("{most:.3e}") };
+                let what = format!("patch {patch} would be displaced by {length:.3e}, and the model is {size} long");
+                return Err(ReliefError::Edit { what });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Diagonal of the box around the control points of surfaces.
+pub(crate) fn diagonal(surfaces: &[Surface]) -> f64 {
+    crate::geom::Aabb::of(surfaces.iter().flat_map(|s| &s.control)).diagonal()
 }
 
 /// Errors of the relief stage.

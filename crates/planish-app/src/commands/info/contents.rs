@@ -7,6 +7,8 @@ use planish::DVec3;
 use planish::field::Field;
 use planish::model::Units;
 use planish::network::{CurveKind, Network};
+use planish::relief::maps::MapKind;
+use planish_io::maps::ReadMaps;
 use planish_io::report::{Input, count, number};
 use planish_io::script::Script;
 use planish_io::{RELIEF_SIDECAR, ReadError};
@@ -236,7 +238,39 @@ fn image(path: &Path) -> Result<Contents, Failure> {
     Ok(found)
 }
 
+/// The maps of a folder: those of `planish export`, or of `planish relief export`.
 fn maps(folder: &Path) -> Result<Contents, Failure> {
+    let sidecar = planish_io::read_bytes(&folder.join(RELIEF_SIDECAR)).map_err(|e| Failure::input(folder, e))?;
+    let sidecar: Value = serde_json::from_slice(&sidecar).unwrap_or_default();
+    if sidecar["planish_relief"].as_u64() == Some(1) {
+        return plain_maps(folder);
+    }
+    let ReadMaps { sidecar, maps } = planish_io::maps::read_maps(folder).map_err(|e| Failure::input(folder, e))?;
+    let (params, units) = (&sidecar.params, sidecar.units);
+    let mut found = Contents::new(folder, "maps of a relief", units);
+    let word = |value: serde_json::Result<Value>| {
+        value.ok().and_then(|v| v.as_str().map(|word| word.replace('_', "-"))).unwrap_or_default()
+    };
+    found.count("maps", maps.len());
+    found.count("texels", maps.iter().map(|m| m.rows * m.cols).sum());
+    found.table.row("of", params.kind.word());
+    if params.kind.channels() == 3 {
+        let [frame, order] = [word(serde_json::to_value(params.frame)), word(serde_json::to_value(params.order))];
+        found.table.row("frame, order", format!("{frame}, {order}"));
+    }
+    let file = word(serde_json::to_value(sidecar.file));
+    found.table.row("images", format!("{} of the kind {file}", sidecar.images.len()));
+    if params.kind != MapKind::Normal {
+        found.table.row("largest", format!("{} {units}", number(sidecar.largest)));
+    }
+    let names: Vec<&str> = sidecar.attributes.iter().map(|a| a.name.as_str()).collect();
+    if !names.is_empty() {
+        found.table.row("attributes", names.join(", "));
+    }
+    Ok(found)
+}
+
+fn plain_maps(folder: &Path) -> Result<Contents, Failure> {
     let (reliefs, units) = planish_io::read_relief(folder).map_err(|e: ReadError| Failure::input(folder, e))?;
     let mut found = Contents::new(folder, "displacement maps", units);
     found.count("maps", reliefs.len());

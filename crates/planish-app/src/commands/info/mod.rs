@@ -89,6 +89,7 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
         report.quality.insert("patches.count".into(), Figure::Count(model.network.patches.len() as u64));
         let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
         report.quality.insert("surface.control_points".into(), Figure::Count(control as u64));
+        super::relief::folds(model, &mut report, file)?;
         report.warnings.extend(network_faults(model));
         folds(model, &mut report);
     }

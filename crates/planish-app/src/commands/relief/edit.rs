@@ -2,14 +2,15 @@
 
 use super::super::Session;
 use super::super::edit::read_text;
-use super::{finish, open, wrong};
+use super::{finish, folds, open, wrong};
 use crate::args::relief::ReliefEdit as Args;
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::pictures::{self, View};
 use crate::products::Staged;
 use planish::model::{HistoryEntry, Model};
-use planish::relief::layers::{self, Picture, ReliefEdit};
+use planish::pipeline::Warning;
+use planish::relief::layers::{self, Layered, Picture, ReliefEdit};
 use planish_io::report::Report;
 use serde::Deserialize;
 use std::path::Path;
@@ -59,15 +60,17 @@ pub fn edit(session: &Session, args: &Args) -> Result<Status, Failure> {
     let (mut model, read) = open(session, &args.model)?;
     let mut report = Report::new("relief edit", files::model_facts(&args.model, &model, model.units));
     report.stages.push(read);
-    let (told, record) = session.step("edit", || replay(session, args, &steps, &mut model))?;
+    let warnings = &mut report.warnings;
+    let (told, record) = session.step("edit", || replay(session, args, &steps, &mut model, warnings))?;
     report.stages.push(record);
+    folds(&model, &mut report, &args.model)?;
     if let Some(file) = &args.picture {
         draw(&model, &view, file, args)?;
     }
     finish(session, &args.output, &model, report, told)
 }
 
-/// Draws the displaced surface and the borders of its patches.
+/// Draws the displaced surface and the borders of its patches; red is what is displaced beyond the focal radius.
 fn draw(model: &Model, view: &View, file: &Path, args: &Args) -> Result<(), Failure> {
     let patched = planish::pipeline::displaced_patches(model, &crate::progress::Interrupt)
         .map_err(|e| Failure::input(&args.model, e))?;
@@ -78,7 +81,12 @@ fn draw(model: &Model, view: &View, file: &Path, args: &Args) -> Result<(), Fail
         let column = |i: usize| (0..rows).map(|j| point(nodes, j * cols + i)).collect::<Vec<_>>();
         [row(0), row(rows - 1), column(0), column(cols - 1)]
     });
-    let png = pictures::clay(&patched.mesh, borders.collect(), view)?;
+    let mut beyond = vec![false; patched.mesh.points.len()];
+    for ((nodes, surface), relief) in patched.patches.iter().zip(&model.surfaces).zip(&model.reliefs) {
+        let folded = planish::relief::fold_over(surface, relief).map_err(|e| wrong(&args.model, e))?;
+        folded.into_iter().for_each(|node| beyond[nodes.vertices[node] as usize] = true);
+    }
+    let png = pictures::clay(&patched.mesh, borders.collect(), &beyond, view)?;
     let staged = Staged::file(file)?;
     std::fs::write(staged.file_path(), png).map_err(|e| Failure::usage(file, e))?;
     staged.commit()
@@ -116,8 +124,12 @@ fn replay(
     args: &Args,
     steps: &[(Step, usize)],
     model: &mut Model,
+    warnings: &mut Vec<Warning>,
 ) -> Result<Vec<(String, String)>, Failure> {
     let mut told = Vec::new();
+    if steps.is_empty() {
+        warnings.push(Warning::new("nothing_edited", "The script has no steps.", args.script.display().to_string()));
+    }
     for (k, (step, line)) in steps.iter().enumerate() {
         let number = format!("step {}", k + 1);
         let nothing =
@@ -143,8 +155,13 @@ fn replay(
                     }
                     other => wrong(&args.model, other),
                 })?;
-                told.push((number.clone(), edit.name().into()));
-                told.extend(made.into_iter().map(|line| (String::new(), line)));
+                // What brings nothing back is told by its count.
+                if made.idle && !matches!(**edit, ReliefEdit::Limit(_)) {
+                    let text = format!("The {} of {number} moves no texel: nothing lies where it would.", edit.name());
+                    warnings.push(Warning::new("nothing_edited", text, format!("line {line}")));
+                }
+                told.push((number, edit.name().into()));
+                told.extend(made.told.into_iter().map(|line| (String::new(), line)));
             }
         }
     }
@@ -156,7 +173,7 @@ fn make(
     args: &Args,
     edit: &ReliefEdit,
     model: &mut Model,
-) -> Result<Vec<String>, planish::relief::ReliefError> {
+) -> Result<Layered, planish::relief::ReliefError> {
     let picture = |name: &str| -> Result<Picture, String> {
         let path = args.script.parent().unwrap_or(Path::new("")).join(name);
         planish_io::maps::read_picture(&path).map_err(|e| format!("the image {name}: {e}"))
@@ -165,6 +182,6 @@ fn make(
     let parts = (&model.network, &model.surfaces[..]);
     let made = layers::edit(&mut model.layers, parts, edit, &picture, &session.bars)?;
     let parameters = serde_json::to_string(edit).unwrap_or_default();
-    model.record_relief(HistoryEntry { command: edit.name().into(), parameters }, made.stack);
-    Ok(made.told)
+    model.record_relief(HistoryEntry { command: edit.name().into(), parameters }, made.stack.clone());
+    Ok(made)
 }

@@ -1,7 +1,7 @@
 //! `planish relief export`: maps as images.
 
 use super::super::{Session, commit_report, write_failure};
-use super::{displaced, open, wrong};
+use super::{displaced, folds, open, shape, wrong};
 use crate::args::relief::ReliefExport;
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -11,12 +11,12 @@ use crate::progress::Interrupt;
 use crate::summary::Summary;
 use crate::tolerance::Scale;
 use planish::model::Model;
-use planish::pipeline::{Figure, Warning};
+use planish::pipeline::Figure;
 use planish::relief::Displaced;
 use planish::relief::maps::{self, MapKind, MapParams, PatchMap, Preset, Sheet, SheetKind};
 use planish_io::maps::{
-    MapFile, MapOptions, Sidecar, as_read, in_one_png, largest_error, materialx, other_ways, read_maps, usd_materials,
-    write_maps,
+    MapFile, MapOptions, Sidecar, as_read, in_one_png, largest_error, materialx, other_ways, read_maps, relief_sum,
+    usd_materials, write_maps,
 };
 use planish_io::report::{Report, count, number};
 use planish_io::{MappedMesh, UsdInput, WriteOptions};
@@ -48,7 +48,8 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         return Err(Failure::usage("--max-error", what).hint("write vectors, scalars, lengths or heights"));
     }
     let (made, bake) = session.step("bake", || {
-        maps::render(&displaced(&model), &model.mesh, &params, &Interrupt).map_err(|e| wrong(&args.model, e))
+        let mesh = shape(&model, &params, &args.model)?;
+        maps::render(&displaced(&model), &mesh, &params, &Interrupt).map_err(|e| wrong(&args.model, e))
     })?;
     let shapes: Vec<[usize; 2]> = made.iter().map(|m| [m.rows, m.cols]).collect();
     let sheet = maps::pack(&shapes, params.sheets, params.gutter, params.tile).map_err(|p| {
@@ -65,7 +66,8 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         file,
         upside_down: preset.is_some_and(|p| p.upside_down),
         max_error,
-        wiring: wiring(preset, max_error.is_some() && file.is_whole()),
+        wiring: preset.map_or(String::new(), |p| p.wiring.split_whitespace().collect::<Vec<_>>().join(" ")),
+        relief: Some(relief_sum(&model.reliefs)),
         units: model.units,
         companions: companions.iter().filter(|(asked, _)| *asked).map(|(_, name)| name.to_string()).collect(),
     };
@@ -85,8 +87,8 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         match materialx(&sidecar) {
             Some(text) => super::super::write_text(&folder.join(WIRING), &text)?,
             None => {
-                let what = "wires vectors in tangent space in the order tbn, scalars and normals";
-                return Err(Failure::usage("--materialx", what).hint("leave --frame object and --order tnb away"));
+                let what = "cannot wire vectors in object space";
+                return Err(Failure::usage("--materialx", what).hint("add --frame tangent, or take --kind scalar"));
             }
         }
     }
@@ -123,24 +125,23 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         table.row("maps", format!("{} of {} patches", params.kind.word(), made.len()));
         table.row("images", format!("{} in {}", sidecar.images.len(), args.output.display()));
         table.row("images take", each(bytes));
-        table.row("largest", format!("{} {}", number(sidecar.largest), model.units));
+        let unit = if params.kind == MapKind::Normal { String::new() } else { format!(" {}", model.units) };
+        if params.kind != MapKind::Normal {
+            table.row("largest", format!("{}{unit}", number(sidecar.largest)));
+        }
         for (name, value) in others {
             table.row(format!("as {name}"), value);
         }
-        table.row("error", format!("{} {} at most, of what was written", number(error), model.units));
+        table.row("error", format!("{}{unit} at most, of what was written", number(error)));
+        if !sidecar.wiring.is_empty() {
+            table.row("wiring", sidecar.wiring.clone());
+        }
         if let Some(crack) = crack.filter(|_| max_error.is_some()) {
             table.row("seams", format!("part by {} {} at most", number(crack), model.units));
         }
         table.print();
     }
     Ok(Status::Done)
-}
-
-/// How the preset's program wires the map.
-/// * `steps` - true where the mid-level is that of a whole number of steps
-fn wiring(preset: Option<&Preset>, steps: bool) -> String {
-    let told = preset.map_or(String::new(), |p| p.wiring.split_whitespace().collect::<Vec<_>>().join(" "));
-    if steps && !told.is_empty() { format!("{told}; in place of 0.5 take the mid_level of this file") } else { told }
 }
 
 /// The preset with the given options in place.
@@ -189,8 +190,16 @@ fn scene(
     args: &ReliefExport,
 ) -> Result<(), Failure> {
     let materials = usd_materials(sidecar).ok_or_else(|| {
-        let what = "wires scalars, heights, and vectors and normals in tangent space in the order tbn";
-        Failure::usage("--usd", what).hint("add --frame tangent --order tbn, or take --kind scalar")
+        let what = match sidecar.params.kind {
+            MapKind::Length => "cannot wire lengths",
+            MapKind::Normal => "wires normals in tangent space in the order tbn",
+            _ => "wires vectors in tangent space",
+        };
+        Failure::usage("--usd", what).hint(match sidecar.params.kind {
+            MapKind::Length => "take --kind scalar",
+            MapKind::Normal => "add --frame tangent --order tbn",
+            _ => "add --frame tangent, or take --kind scalar",
+        })
     })?;
     if sidecar.upside_down {
         // Within their tile: what its first row holds is below there.
@@ -233,22 +242,4 @@ fn measured(folder: &Path, made: &[PatchMap], model: &Model, output: &Path) -> R
         _ => None,
     };
     Ok(Measured { bytes, error: largest_error(made, &back.maps), crack })
-}
-
-/// Tells where the relief folds the surface over.
-fn folds(model: &Model, report: &mut Report, path: &Path) -> Result<(), Failure> {
-    let mut found: Vec<(usize, usize)> = Vec::new();
-    for (p, (s, r)) in model.surfaces.iter().zip(&model.reliefs).enumerate() {
-        let here = planish::relief::fold_over(s, r).map_err(|e| wrong(path, e))?.len();
-        found.extend((here > 0).then_some((p, here)));
-    }
-    if found.is_empty() {
-        return Ok(());
-    }
-    let texels: usize = found.iter().map(|f| f.1).sum();
-    let text =
-        format!("{texels} texels displace the surface beyond its focal radius. The edit `limit` brings them back.");
-    let places: Vec<String> = found.iter().take(8).map(|f| f.0.to_string()).collect();
-    report.warnings.push(Warning::new("relief_folds", text, format!("patches {}", places.join(", "))));
-    Ok(())
 }

@@ -1,14 +1,15 @@
 //! `planish relief import`: images that were edited elsewhere become a layer.
 
 use super::super::Session;
-use super::{displaced, finish, open, wrong};
+use super::{displaced, finish, open, shape, wrong};
 use crate::args::relief::ReliefImport;
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::progress::Interrupt;
 use planish::model::{HistoryEntry, Model};
-use planish::relief::{self, Relief, maps};
-use planish_io::maps::{ReadMaps, as_read, read_maps, surfaces_sum};
+use planish::pipeline::Warning;
+use planish::relief::{self, Displaced, Relief, maps};
+use planish_io::maps::{ReadMaps, as_read, read_maps, relief_sum, surfaces_sum};
 use planish_io::report::{Report, count};
 
 pub fn import(session: &Session, args: &ReliefImport) -> Result<Status, Failure> {
@@ -17,13 +18,18 @@ pub fn import(session: &Session, args: &ReliefImport) -> Result<Status, Failure>
     let mut report = Report::new("relief import", files::model_facts(&args.model, &model, model.units));
     let (told, record) = session.step("import", || {
         let found = read_maps(&args.maps).map_err(|e| Failure::input(&args.maps, e))?;
-        take_over(&mut model, args, found)
+        take_over(&mut model, args, found, &mut report.warnings)
     })?;
     report.stages = vec![read, record];
     finish(session, &args.output, &model, report, vec![("imported".into(), told)])
 }
 
-fn take_over(model: &mut Model, args: &ReliefImport, found: ReadMaps) -> Result<String, Failure> {
+fn take_over(
+    model: &mut Model,
+    args: &ReliefImport,
+    found: ReadMaps,
+    warnings: &mut Vec<Warning>,
+) -> Result<String, Failure> {
     let ReadMaps { sidecar, maps: edited } = found;
     let other =
         |what: String| Err(Failure::input(&args.maps, what).hint("import them into the model they were exported from"));
@@ -35,7 +41,8 @@ fn take_over(model: &mut Model, args: &ReliefImport, found: ReadMaps) -> Result<
     }
     let failed = |e| wrong(&args.maps, e);
     let now = displaced(model);
-    let made = maps::render(&now, &model.mesh, &sidecar.params, &Interrupt).map_err(failed)?;
+    let mesh = shape(model, &sidecar.params, &args.model)?;
+    let made = maps::render(&now, &mesh, &sidecar.params, &Interrupt).map_err(failed)?;
     if made.iter().zip(&edited).any(|(a, b)| (a.rows, a.cols) != (b.rows, b.cols)) {
         return other("has maps of another size than the model's relief has now".into());
     }
@@ -53,6 +60,12 @@ fn take_over(model: &mut Model, args: &ReliefImport, found: ReadMaps) -> Result<
         return Ok("nothing was changed".into());
     }
     relief::agree(&model.network, &model.surfaces, &mut reliefs, args.seams.into()).map_err(failed)?;
+    Displaced { reliefs: &reliefs, ..now }.check_lengths().map_err(failed)?;
+    if sidecar.relief.is_some_and(|sum| sum != relief_sum(&model.reliefs)) {
+        let text = "The relief was edited after these maps were exported: where they differ, the maps undo these edits. \
+                    Export again, paint, and import that.";
+        warnings.push(Warning::new("maps_older_than_model", text, args.maps.display().to_string()));
+    }
     model.layers.begin(&model.reliefs);
     let shapes: Vec<[usize; 2]> = reliefs.iter().map(|r| [r.rows, r.cols]).collect();
     model.layers.stack = model.layers.reshaped(&model.network, &model.surfaces, &shapes).map_err(failed)?;

@@ -15,12 +15,16 @@ use crate::args::relief::{Relief, ReliefCommand};
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::products::Staged;
+use crate::progress::Interrupt;
 use crate::summary::Summary;
+use planish::mesh::TriMesh;
 use planish::model::Model;
 use planish::observe::Cancelled;
-use planish::pipeline::StageRecord;
+use planish::pipeline::{StageRecord, Warning};
+use planish::relief::maps::{MapKind, MapParams};
 use planish::relief::{Displaced, ReliefError};
 use planish_io::report::{Report, count};
+use std::borrow::Cow;
 use std::path::Path;
 
 pub fn relief(args: &Relief) -> Result<Status, Failure> {
@@ -49,6 +53,34 @@ fn open(session: &Session, path: &Path) -> Result<(Model, StageRecord), Failure>
 
 fn displaced(model: &Model) -> Displaced<'_> {
     Displaced { network: &model.network, surfaces: &model.surfaces, reliefs: &model.reliefs }
+}
+
+/// The shape that heights are measured to: the mesh that was fitted, or, where the relief was edited since, the displaced surface.
+fn shape<'a>(model: &'a Model, params: &MapParams, path: &Path) -> Result<Cow<'a, TriMesh>, Failure> {
+    if params.kind != MapKind::Height || model.layers.stack.is_empty() {
+        return Ok(Cow::Borrowed(&model.mesh));
+    }
+    let Displaced { network, surfaces, reliefs } = displaced(model);
+    let mesh = planish::relief::displaced_mesh(network, surfaces, reliefs, &Interrupt);
+    mesh.map(Cow::Owned).map_err(|e| wrong(path, e))
+}
+
+/// Tells where the relief folds the surface over.
+pub fn folds(model: &Model, report: &mut Report, path: &Path) -> Result<(), Failure> {
+    let mut found: Vec<(usize, usize)> = Vec::new();
+    for (p, (s, r)) in model.surfaces.iter().zip(&model.reliefs).enumerate() {
+        let here = planish::relief::fold_over(s, r).map_err(|e| wrong(path, e))?.len();
+        found.extend((here > 0).then_some((p, here)));
+    }
+    if found.is_empty() {
+        return Ok(());
+    }
+    let texels: usize = found.iter().map(|f| f.1).sum();
+    let text =
+        format!("{texels} texels displace the surface beyond its focal radius. The edit `limit` brings them back.");
+    let places: Vec<String> = found.iter().take(8).map(|f| f.0.to_string()).collect();
+    report.warnings.push(Warning::new("relief_folds", text, format!("patches {}", places.join(", "))));
+    Ok(())
 }
 
 /// What a failed edit of a relief is to the user.

@@ -8,7 +8,8 @@ use crate::failure::{Failure, Status};
 use crate::files;
 use crate::tolerance::Scale;
 use planish::model::{HistoryEntry, Model};
-use planish::pipeline::{self, PipelineParams};
+use planish::pipeline::{self, PipelineError, PipelineParams};
+use planish::relief::ReliefError;
 use planish_io::report::{Report, number};
 use std::path::Path;
 
@@ -28,8 +29,12 @@ pub fn part(session: &Session, args: &ReliefPart) -> Result<Status, Failure> {
     let params = stored(&args.model, &model)?;
     let mut report = Report::new("relief part", files::model_facts(&args.model, &model, model.units));
     let before = rms(&model);
-    let stages = pipeline::part_at(&mut model, wavelength, &params, &session.bars)
-        .map_err(|e| pipeline_failure(&args.model, None, e))?;
+    let stages = pipeline::part_at(&mut model, wavelength, &params, &session.bars).map_err(|e| match e {
+        PipelineError::Relief(ReliefError::Edit { what }) => {
+            Failure::usage("--wavelength", what).hint("ask for longer ones")
+        }
+        e => pipeline_failure(&args.model, None, e),
+    })?;
     let parameters = serde_json::json!({ "wavelength": wavelength }).to_string();
     model.history.push(HistoryEntry { command: "relief part".into(), parameters });
     report.stages = std::iter::once(read).chain(stages).collect();

@@ -8,6 +8,7 @@ use crate::files;
 use crate::progress::Interrupt;
 use crate::tolerance::Scale;
 use planish::model::{HistoryEntry, Model};
+use planish::pipeline::Warning;
 use planish::relief::Relief;
 use planish::relief::layers::{self, Ground};
 use planish_io::report::{Report, count, number};
@@ -30,7 +31,8 @@ pub fn transfer(session: &Session, args: &ReliefTransfer) -> Result<Status, Fail
     let (mut model, read) = open(session, &args.model)?;
     let from = args.from.as_ref().map(|path| open(session, path)).transpose()?.map(|(model, _)| model);
     let mut report = Report::new("relief transfer", files::model_facts(&args.model, &model, model.units));
-    let ((maps, told), record) = session.step("transfer", || carried(&model, from.as_ref(), args))?;
+    let warnings = &mut report.warnings;
+    let ((maps, told), record) = session.step("transfer", || carried(&model, from.as_ref(), args, warnings))?;
     model.layers.begin(&model.reliefs);
     let stack = model.layers.with("transfer", maps);
     let pairs: Vec<[u32; 3]> = args.pairs.iter().map(|p| [p.from, p.to, p.turns]).collect();
@@ -42,7 +44,12 @@ pub fn transfer(session: &Session, args: &ReliefTransfer) -> Result<Status, Fail
     finish(session, &args.output, &model, report, told)
 }
 
-fn carried(model: &Model, from: Option<&Model>, args: &ReliefTransfer) -> Result<(Vec<Relief>, Vec<String>), Failure> {
+fn carried(
+    model: &Model,
+    from: Option<&Model>,
+    args: &ReliefTransfer,
+    warnings: &mut Vec<Warning>,
+) -> Result<(Vec<Relief>, Vec<String>), Failure> {
     let failed = |e| wrong(&args.model, e);
     let shapes: Vec<[usize; 2]> = model.reliefs.iter().map(|r| [r.rows, r.cols]).collect();
     let ground = Ground::new(&model.network, &model.surfaces, shapes).map_err(failed)?;
@@ -66,6 +73,10 @@ fn carried(model: &Model, from: Option<&Model>, args: &ReliefTransfer) -> Result
         let (maps, missed) =
             layers::transfer(&ground, &displaced(source), warp.as_ref(), reach, &Interrupt).map_err(failed)?;
         let texels: usize = maps.iter().map(|m| m.vectors.len()).sum();
+        if missed == texels {
+            let text = "No texel got anything: there is no detail within reach. A larger --reach looks further.";
+            warnings.push(Warning::new("nothing_transferred", text, ""));
+        }
         let found = count((texels - missed) as u64);
         told.push(format!("{found} texels, {} too far away", count(missed as u64)));
         return Ok((maps, told));

@@ -89,9 +89,11 @@ impl Stroke {
         if !(self.radius > 0.0 && self.radius.is_finite() && self.height.is_finite()) {
             return Err(refused("a stroke needs a radius above 0 and a height"));
         }
-        let path: Option<Vec<(DVec3, DVec3)>> = self.path.iter().map(|place| ground.locate(place)).collect();
-        let path =
-            path.filter(|p| !p.is_empty()).ok_or_else(|| refused("a stroke needs places on patches that are there"))?;
+        if self.path.is_empty() {
+            return Err(refused("a stroke needs places on patches that are there"));
+        }
+        let path: Vec<(DVec3, DVec3)> =
+            self.path.iter().map(|place| ground.locate(place, "the stroke")).collect::<Result<_, _>>()?;
         let points: Vec<DVec3> = path.iter().map(|(p, _)| *p).collect();
         let height = |p: usize, k: usize| {
             let (at, frame) = &ground.nodes[p][k];

@@ -173,6 +173,8 @@ pub struct Layered {
     pub stack: Vec<Layer>,
     /// In words, what there is to tell: bands with their figures, numbers of texels.
     pub told: Vec<String>,
+    /// True if it has made a layer that moves nothing.
+    pub idle: bool,
 }
 
 /// Why an edit of a relief could not be made.
@@ -185,8 +187,23 @@ pub(crate) fn refused(what: impl Into<String>) -> ReliefError {
 /// * `pictures` - gives the image of a stamp or of a mask
 ///
 /// # Errors
-/// [`ReliefError::Edit`] for what cannot be meant; those of the parts; [`ReliefError::Cancelled`].
+/// [`ReliefError::Edit`] for what cannot be meant, and for what displaces a place by more than the model is long; those of the
+/// parts; [`ReliefError::Cancelled`].
 pub fn edit(
+    layers: &mut Layers,
+    (network, surfaces): (&Network, &[Surface]),
+    edit: &ReliefEdit,
+    pictures: &Pictures,
+    observer: &dyn Observer,
+) -> Result<Layered, ReliefError> {
+    let made = stacked(layers, (network, surfaces), edit, pictures, observer)?;
+    let sum = Layers::sum_of(&layers.pool, &made.stack).unwrap_or_default();
+    Displaced { network, surfaces, reliefs: &sum }.check_lengths()?;
+    Ok(made)
+}
+
+/// Makes an edit, whatever lengths come of it.
+fn stacked(
     layers: &mut Layers,
     (network, surfaces): (&Network, &[Surface]),
     edit: &ReliefEdit,
@@ -196,7 +213,7 @@ pub fn edit(
     let total = layers.sum().ok_or_else(|| refused("the model has no relief; fit it first"))?;
     let now = Displaced { network, surfaces, reliefs: &total };
     now.check()?;
-    let done = |stack| Ok(Layered { stack, told: Vec::new() });
+    let done = |stack| Ok(Layered { stack, ..Layered::default() });
     match edit {
         ReliefEdit::Remove(Remove { layer }) => {
             let at = named(&layers.stack, layer)?;
@@ -230,8 +247,9 @@ pub fn edit(
             let (maps, told) = layer_of(other, &ground, &now, pictures, observer)?;
             let name = fresh(&layers.stack, word(other));
             let mut stack = layers.stack.clone();
+            let idle = maps.iter().flat_map(|m| &m.vectors).all(|d| *d == DVec3::ZERO);
             stack.push(layers.added(&name, false, maps));
-            Ok(Layered { stack, told })
+            Ok(Layered { stack, told, idle })
         }
     }
 }
@@ -336,7 +354,7 @@ fn split(layers: &mut Layers, now: &Displaced, split: &Split, observer: &dyn Obs
         stack.push(layers.added(&name, true, band.maps));
     }
     stack.extend(edits);
-    Ok(Layered { stack, told })
+    Ok(Layered { stack, told, idle: false })
 }
 
 type Made = (Vec<Relief>, Vec<String>);

@@ -2,7 +2,8 @@
 
 use super::super::frame::{Frame, at_nodes};
 use super::super::seam::{Member, seam_nodes};
-use super::super::{Relief, ReliefError};
+use super::super::{Relief, ReliefError, diagonal};
+use super::edit::refused;
 use crate::geom::Aabb;
 use crate::network::Network;
 use crate::surface::Surface;
@@ -71,11 +72,25 @@ impl<'a> Ground<'a> {
     }
 
     /// Point and normal of a place: of one in space, those of the nearest node.
-    pub(super) fn locate(&self, place: &Place) -> Option<(DVec3, DVec3)> {
+    /// * `what` - whose place it is, for messages: "the stroke"
+    /// # Errors
+    /// [`ReliefError::Edit`] for a patch that is not there, parameters beyond it, or a place in space that is further from the
+    /// surface than the model is long.
+    pub(super) fn locate(&self, place: &Place, what: &str) -> Result<(DVec3, DVec3), ReliefError> {
         match *place {
             Place::Patch { patch, u, v } => {
-                let surface = self.surfaces.get(patch as usize)?;
-                Some((surface.point(u, v), super::super::frame_at(surface, u, v).normal))
+                let surface = self.surfaces.get(patch as usize).ok_or_else(|| {
+                    refused(format!(
+                        "the place of {what} is on no patch: there is no patch {patch} among {}",
+                        self.surfaces.len()
+                    ))
+                })?;
+                if ![u, v].iter().all(|t| (0.0..=1.0).contains(t)) {
+                    return Err(refused(format!(
+                        "the place of {what} is beyond patch {patch}: u and v go from 0 to 1"
+                    )));
+                }
+                Ok((surface.point(u, v), super::super::frame_at(surface, u, v).normal))
             }
             Place::Space(at) => {
                 let at = DVec3::from(at);
@@ -89,7 +104,14 @@ impl<'a> Ground<'a> {
                 let near = |a: &(DVec3, Frame), b: &(DVec3, Frame)| {
                     a.0.distance_squared(at).total_cmp(&b.0.distance_squared(at))
                 };
-                all.into_iter().flatten().min_by(near).map(|(p, f)| (p, f.normal))
+                let found = all.into_iter().flatten().min_by(near).filter(|_| at.is_finite());
+                let (point, frame) = found.ok_or_else(|| refused(format!("the place of {what} is no place")))?;
+                let (far, size) = (point.distance(at), diagonal(self.surfaces));
+                if far > size {
+                    let far = format!("{far:.3} away from the surface, further than the model is long ({size:.3})");
+                    return Err(refused(format!("the place of {what} is {far}")));
+                }
+                Ok((point, frame.normal))
             }
         }
     }

@@ -112,11 +112,15 @@ impl Layers {
 
     /// The sum of all layers; `None` if there are none.
     pub fn sum(&self) -> Option<Vec<Relief>> {
-        let mut layers = self.stack.iter();
-        let first = layers.next()?;
-        let mut total = scaled(&self.pool[first.maps], first.amount);
-        for layer in layers {
-            add(&mut total, &self.pool[layer.maps], layer.amount);
+        Layers::sum_of(&self.pool, &self.stack)
+    }
+
+    /// The sum of a stack of layers whose maps stand in a pool; `None` if it is empty.
+    fn sum_of(pool: &[Vec<Relief>], stack: &[Layer]) -> Option<Vec<Relief>> {
+        let (first, above) = stack.split_first()?;
+        let mut total = scaled(&pool[first.maps], first.amount);
+        for layer in above {
+            add(&mut total, &pool[layer.maps], layer.amount);
         }
         Some(total)
     }

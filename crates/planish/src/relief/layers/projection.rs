@@ -78,7 +78,7 @@ impl Projection {
         if !(depth > 0.0) {
             return Err(refused("the {} needs a depth above 0"));
         }
-        let (middle, normal) = ground.locate(spot.at).ok_or_else(|| refused("the place of the {} is on no patch"))?;
+        let (middle, normal) = ground.locate(spot.at, &format!("the {what}"))?;
         let up = DVec3::from(spot.up);
         let up = (up - normal * normal.dot(up))
             .try_normalize()

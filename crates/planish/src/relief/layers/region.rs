@@ -49,6 +49,9 @@ impl Region {
         if !(self.feather >= 0.0) {
             return refused("the feather is a width of 0 or more".into());
         }
+        if self.at.is_none() && (self.radius != 0.0 || self.feather != 0.0) {
+            return refused("radius and feather of a region are those of a ball; give its middle, at".into());
+        }
         let mask = match (&self.image, &self.at, self.up, self.width) {
             (Some(name), Some(at), Some(up), Some(width)) => {
                 let picture = pictures(name).map_err(|what| ReliefError::Edit { what })?;
@@ -63,12 +66,8 @@ impl Region {
         if is_ball && !(self.radius > 0.0) {
             return refused("a region around a place needs a radius above 0".into());
         }
-        let place = self.at.as_ref().map(|place| ground.locate(place));
-        match place {
-            Some(None) => refused("the place of the region is on no patch".into()),
-            Some(Some((middle, _))) if is_ball => Ok(Found { ball: Some(middle), mask }),
-            _ => Ok(Found { ball: None, mask }),
-        }
+        let place = self.at.as_ref().map(|place| ground.locate(place, "the region")).transpose()?;
+        Ok(Found { ball: place.filter(|_| is_ball).map(|(middle, _)| middle), mask })
     }
 
     /// The shares of all nodes of the patches, from 0 to 1; `None` where a patch is left out altogether.

@@ -19,7 +19,8 @@ pub struct Preset {
     pub sheets: SheetKind,
     /// True where the first row of the image is `v = 0`.
     pub upside_down: bool,
-    /// How it is wired there, for the sidecar.
+    /// How it is wired there, for the sidecar. `{mid_level}`, `{scale}` and `{scale_cm}` stand for what the files have, the last
+    /// one in centimetres.
     pub wiring: &'static str,
 }
 
@@ -34,7 +35,7 @@ pub const PRESETS: [Preset; 8] = [
         file: "exr",
         sheets: SheetKind::Udim,
         upside_down: false,
-        wiring: "vector_map: order XZY, tangent_space on, color_to_signed off, scale 1; image in linear (raw) colour",
+        wiring: "vector_map: order XZY, tangent_space on, color_to_signed off, scale {scale}; image in linear (raw) colour",
     },
     Preset {
         name: "blender",
@@ -44,8 +45,8 @@ pub const PRESETS: [Preset; 8] = [
         file: "exr",
         sheets: SheetKind::Udim,
         upside_down: false,
-        wiring: "Vector Displacement: space Tangent, midlevel 0, scale 1; image colour space Non-Color, material displacement \
-                 Displacement Only",
+        wiring: "Vector Displacement: space Tangent, midlevel {mid_level}, scale {scale}; image colour space Non-Color, material \
+                 displacement Displacement Only",
     },
     Preset {
         name: "gltf",
@@ -75,7 +76,7 @@ pub const PRESETS: [Preset; 8] = [
         file: "exr",
         sheets: SheetKind::Udim,
         upside_down: false,
-        wiring: "PxrDispTransform: Generic Vector, vectorSpace Object, height 1, remap None; set the displacement bound to \
+        wiring: "PxrDispTransform: Generic Vector, vectorSpace Object, height {scale}, remap None; set the displacement bound to \
                  the largest displacement",
     },
     Preset {
@@ -86,7 +87,8 @@ pub const PRESETS: [Preset; 8] = [
         file: "png",
         sheets: SheetKind::Atlas,
         upside_down: false,
-        wiring: "linear (not sRGB) texture; displacement centre 0.5, magnitude the scale of this file in centimetres",
+        wiring: "linear (not sRGB) texture; displacement centre {mid_level}, magnitude {scale_cm}, which is the scale of this file in \
+                 centimetres",
     },
     Preset {
         name: "usd",
@@ -106,7 +108,8 @@ pub const PRESETS: [Preset; 8] = [
         file: "tiff",
         sheets: SheetKind::Atlas,
         upside_down: true,
-        wiring: "16 bit displacement with mid 0.5, image turned upside down (Flip V); intensity from the scale of this file",
+        wiring: "16 bit displacement with mid {mid_level}, image turned upside down (Flip V); intensity from the scale of this file, \
+                 {scale}",
     },
 ];
 
