@@ -622,7 +622,7 @@ mod tests {
                 let is_step = name.contains(',') || name == "z-to-y|y-to-z";
                 if field.is_none() && !is_number && !is_step {
                     assert!(
-                        ["DIR", "FILE", "FORMAT", "NAMES", "TOKEN", ".json", ".planish"]
+                        ["DIR", "FILE", "FORMAT", "NAMES", "TOKEN", ".json", ".planish", ".toml"]
                             .iter()
                             .any(|n| name.contains(n)),
                         "{name}"

@@ -389,7 +389,7 @@ fn edits_that_cannot_be_meant_tell_why() {
     let mut edited = Edited::new(&work, &heights(&work, |_| 0.1));
     for (json, words) in [
         (r#"{"edit":"stroke","path":[],"radius":1,"height":1}"#, "needs places"),
-        (r#"{"edit":"stroke","path":[{"patch":7,"u":0,"v":0}],"radius":1,"height":1}"#, "on patches that are there"),
+        (r#"{"edit":"stroke","path":[{"patch":7,"u":0,"v":0}],"radius":1,"height":1}"#, "there is no patch 7 among 1"),
         (r#"{"edit":"stroke","path":[[0,0,0]],"radius":0,"height":1}"#, "radius above 0"),
         (r#"{"edit":"erase","region":{"patches":[1]}}"#, "no patch 1 among 1"),
         (r#"{"edit":"erase","region":{"at":[0,0,0]}}"#, "needs a radius"),
@@ -505,6 +505,6 @@ fn regress_regions_and_places_that_cannot_be_meant_are_refused_and_idle_edits_te
         let made = layers::edit(&mut edited.layers, parts, &of(json), &Edited::picture, &Silent);
         made.unwrap().idle
     };
-    assert!(idle(r#"{"edit":"stroke","path":[[0.03,0.03,0]],"radius":1e-4,"height":0.1}"#));
+    assert!(idle(r#"{"edit":"stroke","path":[{"patch":0,"u":0.03,"v":0.03}],"radius":1e-4,"height":0.1}"#));
     assert!(!idle(r#"{"edit":"stroke","path":[[0.03,0.03,0]],"radius":0.2,"height":0.1}"#));
 }
