@@ -56,8 +56,8 @@ pub use relief_files::{
     SIDECAR as RELIEF_SIDECAR, image_facts, is_relief_name, read_relief, relief_names, relief_roundtrip, write_relief,
 };
 pub use scan::{
-    SCAN_EXTENSIONS, ScanOptions, Take, WRITTEN_SCANS, check_columns, is_scan, points_told, read_body, read_scan, write_scan,
-    write_scan_in,
+    SCAN_EXTENSIONS, ScanOptions, Take, WRITTEN_SCANS, check_columns, is_scan, points_told, read_body, read_scan,
+    write_scan, write_scan_in,
 };
 pub use step::{StepInput, StepSummary, read_step_surfaces, write_step};
 pub use usd::{UsdInput, write_usd};

@@ -154,9 +154,9 @@ impl PyBricks {
         empty().map_err(|e| told(py, &e))?;
         let options = ScanOptions { columns, classes: classes.unwrap_or_default() };
         let made = match scan.extract::<PathBuf>() {
-            Ok(file) => py
-                .detach(|| BrickFolder::create(&file, &options, &folder, most))
-                .map_err(|e| told_of(py, &file, &e))?,
+            Ok(file) => {
+                py.detach(|| BrickFolder::create(&file, &options, &folder, most)).map_err(|e| told_of(py, &file, &e))?
+            }
             Err(_) => of_pieces(scan, &folder, most)?,
         };
         watch::run(py, "bricks", progress, |o| {

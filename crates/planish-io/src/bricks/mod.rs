@@ -105,7 +105,8 @@ impl BrickFolder {
     pub fn write<T: Serialize>(&self, name: &str, what: &T) -> Result<(), StoreError> {
         let path = self.folder.join(name);
         let told = |e: &dyn std::fmt::Display| StoreError(format!("{}: cannot be written: {e}", path.display()));
-        atomic::write(&path, |out| postcard::to_io(what, out).map(drop).map_err(std::io::Error::other)).map_err(|e| told(&e))
+        atomic::write(&path, |out| postcard::to_io(what, out).map(drop).map_err(std::io::Error::other))
+            .map_err(|e| told(&e))
     }
 
     /// What was kept in the folder by a name.

@@ -1,9 +1,9 @@
 //! The points of a file in bricks: as [`Partition::new`] parts them, with files in the place of memory.
 
-use crate::rank::ranked;
 use super::{Manifest, Source, points_file};
 use crate::ReadError;
 use crate::far::{self, shift_of};
+use crate::rank::ranked;
 use glam::DVec3;
 use planish::cloud::Cloud;
 use planish::cloud::bricks::{Brick, Partition};
@@ -117,7 +117,8 @@ pub(super) fn part(source: &mut Source, folder: &Path, most: (usize, u64)) -> Re
             count += 1;
             if point.is_finite() {
                 let normal = normals.map_or([0.0; 3], |n| [n[3 * i], n[3 * i + 1], n[3 * i + 2]]);
-                let seen_by = piece.seen_by.get(i).copied().unwrap_or(if piece.scanners.len() == 1 { 0 } else { u32::MAX });
+                let seen_by =
+                    piece.seen_by.get(i).copied().unwrap_or(if piece.scanners.len() == 1 { 0 } else { u32::MAX });
                 all.push(&Record { index, point, normal, seen_by }).map_err(lost)?;
             }
         }
@@ -146,9 +147,7 @@ fn sorted_out(all: Sheaf, folder: &Path, most: (usize, u64), manifest: &mut Mani
     manifest.shift = shift_of(&bounds);
     manifest.scanners.iter_mut().for_each(|s| *s -= manifest.shift);
     let mut body = Sheaf::new(folder.join("body"))?;
-    sift(&all, |r| {
-        if is_in(r.point) { body.push(&Record { point: r.point - manifest.shift, ..*r }) } else { Ok(()) }
-    })?;
+    sift(&all, |r| if is_in(r.point) { body.push(&Record { point: r.point - manifest.shift, ..*r }) } else { Ok(()) })?;
     let body = body.close()?;
     manifest.left_out = all.count - body.count;
     std::fs::remove_file(&all.path)?;

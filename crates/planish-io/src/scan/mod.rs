@@ -131,9 +131,8 @@ pub(crate) fn pieces(path: &Path, options: &ScanOptions, take: &mut Take) -> Res
         "e57" => return e57::pieces(file, take),
         "las" | "laz" => return las::pieces(file, &options.classes, take),
         "ply" => {
-            let mut points = |mesh: TriMesh| {
-                take(Cloud { points: mesh.points, attributes: mesh.attributes, ..Cloud::default() })
-            };
+            let mut points =
+                |mesh: TriMesh| take(Cloud { points: mesh.points, attributes: mesh.attributes, ..Cloud::default() });
             return ply::pieces(file, PIECE, &mut points).map(|()| Bare::new());
         }
         "pcd" => pcd::read(&whole()?)?,
@@ -233,5 +232,6 @@ fn foreign(what: impl std::fmt::Display) -> ReadError {
 /// Runs a reader of a library that might panic on damaged data, and tells that as an error.
 fn guarded<T>(work: impl FnOnce() -> Result<T, ReadError>) -> Result<T, ReadError> {
     // What it was writing to is not looked at after an error.
-    std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)).unwrap_or_else(|_| Err(foreign("the content contradicts itself")))
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(work))
+        .unwrap_or_else(|_| Err(foreign("the content contradicts itself")))
 }

@@ -35,7 +35,11 @@ enum Source {
     /// With what to tell of points that are not of it.
     Scan(planish::cloud::Cloud, Option<Warning>),
     /// A large one, with the room that its bricks lie in while they are worked.
-    Bricks { bricks: BrickFolder, far_off: Option<Warning>, _room: Staged },
+    Bricks {
+        bricks: BrickFolder,
+        far_off: Option<Warning>,
+        _room: Staged,
+    },
     Mesh(Placed),
     Script(Script),
     Grid(Box<planish::field::ScalarGrid>),
