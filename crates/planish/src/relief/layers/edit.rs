@@ -5,7 +5,7 @@ use super::super::{Displaced, Relief, ReliefError, resample_all};
 use super::bands;
 use super::brush::{Stamp, Stroke};
 use super::filter::Filter;
-use super::ground::Ground;
+use super::ground::{Ground, refused};
 use super::projection::Pictures;
 use super::quilt::{self, Synthesise};
 use super::region::Region;
@@ -175,11 +175,6 @@ pub struct Layered {
     pub told: Vec<String>,
     /// True if it has made a layer that moves nothing.
     pub idle: bool,
-}
-
-/// Why an edit of a relief could not be made.
-pub(crate) fn refused(what: impl Into<String>) -> ReliefError {
-    ReliefError::Edit { what: what.into() }
 }
 
 /// Makes an edit: adds its maps to the pool of `layers` and returns the new stack, for [`Layers::record`].

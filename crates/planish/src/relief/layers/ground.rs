@@ -3,7 +3,6 @@
 use super::super::frame::{Frame, at_nodes};
 use super::super::seam::{Member, seam_nodes};
 use super::super::{Relief, ReliefError, diagonal};
-use super::edit::refused;
 use crate::geom::Aabb;
 use crate::network::Network;
 use crate::surface::Surface;
@@ -44,6 +43,11 @@ pub struct Ground<'a> {
     pub(super) nodes: Vec<Vec<Texel>>,
     pub(super) boxes: Vec<Aabb>,
     seams: Vec<Vec<Member>>,
+}
+
+/// Why an edit of a relief could not be made.
+pub(crate) fn refused(what: impl Into<String>) -> ReliefError {
+    ReliefError::Edit { what: what.into() }
 }
 
 impl<'a> Ground<'a> {
