@@ -413,6 +413,16 @@ fn regress_edits_that_do_nothing_or_too_much_are_told() {
     let output = planish(&["relief", "part", "box.planish", "-o", "x.planish", "--wavelength", "1e-9"], at);
     assert_eq!(status(&output), 2, "{}", stderr(&output));
     assert!(error_line(&output).contains("--wavelength: waves of 1e-9 are too short"), "{}", stderr(&output));
+    let told = warned(&["relief", "part", "box.planish", "-o", "wide.planish", "--wavelength", "90%"], at);
+    assert!(told.contains("less than three wavelengths"), "{told}");
+    // What other options change the program of the preset is not told to do.
+    for (more, is_told) in [(&[][..], true), (&["--frame", "object"], false), (&["--kind", "scalar"], false)] {
+        let args = [&["relief", "export", "box.planish", "-q", "--force", "-o", "wired", "--preset", "blender"], more]
+            .concat();
+        ok(&args, at);
+        let sidecar = fs::read_to_string(at.join("wired/relief.json")).unwrap();
+        assert_eq!(sidecar.contains("Vector Displacement"), is_told, "{more:?}");
+    }
     // STEP has the splines whatever is said.
     ok(&["export", "box.planish", "-q", "--surface", "spline", "-o", "x.step"], at);
     let told = warned(&["relief", "transfer", "box.planish", "box.planish", "--reach", "1e-12", "-o", "t.planish"], at);

@@ -59,6 +59,11 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         Failure::usage("--tile", what).hint("raise it, or lower --texels")
     })?;
     let attributes = if args.attributes { attributes(&model, &shapes, &args.model)? } else { Vec::new() };
+    // What options change of a preset its program is to be told otherwise.
+    let as_wanted = |p: &&Preset| {
+        let wanted = (p.kind, p.frame, p.order, MapFile::of_word(p.file).unwrap_or_default());
+        wanted == (params.kind, params.frame, params.order, file)
+    };
     let is_usd = args.usd || preset.is_some_and(|p| p.name == "usd");
     let companions = [(args.base, BASE), (args.materialx, WIRING), (is_usd, SCENE)];
     let options = MapOptions {
@@ -66,7 +71,9 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         file,
         upside_down: preset.is_some_and(|p| p.upside_down),
         max_error,
-        wiring: preset.map_or(String::new(), |p| p.wiring.split_whitespace().collect::<Vec<_>>().join(" ")),
+        wiring: preset
+            .filter(as_wanted)
+            .map_or(String::new(), |p| p.wiring.split_whitespace().collect::<Vec<_>>().join(" ")),
         relief: Some(relief_sum(&model.reliefs)),
         units: model.units,
         companions: companions.iter().filter(|(asked, _)| *asked).map(|(_, name)| name.to_string()).collect(),

@@ -7,8 +7,10 @@ use crate::args::relief::{ReliefLevel, ReliefPart};
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::tolerance::Scale;
+use planish::geom::polyline;
 use planish::model::{HistoryEntry, Model};
-use planish::pipeline::{self, PipelineError, PipelineParams};
+use planish::network::Curve;
+use planish::pipeline::{self, PipelineError, PipelineParams, Warning};
 use planish::relief::ReliefError;
 use planish_io::report::{Report, number};
 use std::path::Path;
@@ -28,6 +30,7 @@ pub fn part(session: &Session, args: &ReliefPart) -> Result<Status, Failure> {
     let wavelength = args.wavelength.length(scale);
     let params = stored(&args.model, &model)?;
     let mut report = Report::new("relief part", files::model_facts(&args.model, &model, model.units));
+    report.warnings.extend(wide(&model, wavelength));
     let before = rms(&model);
     let stages = pipeline::part_at(&mut model, wavelength, &params, &session.bars).map_err(|e| match e {
         PipelineError::Relief(ReliefError::Edit { what }) => {
@@ -61,6 +64,24 @@ pub fn level(session: &Session, args: &ReliefLevel) -> Result<Status, Failure> {
     report.stages = std::iter::once(read).chain(stages).collect();
     let told = vec![("control points".into(), planish_io::report::count(control as u64))];
     finish(session, &args.output, &model, report, told)
+}
+
+/// Sides of patches are at least so many wavelengths long, or most of a patch's own bend counts as short.
+const WAVES_PER_SIDE: f64 = 3.0;
+
+/// What to tell of a wavelength that patches are too small for.
+fn wide(model: &Model, wavelength: f64) -> Option<Warning> {
+    let along = |curve: &Curve| polyline::length(curve.points.iter().map(|p| p.position(&model.mesh)));
+    let mut sides: Vec<f64> = model.network.curves.iter().map(along).collect();
+    sides.sort_unstable_by(f64::total_cmp);
+    let middle = *sides.get(sides.len() / 2)?;
+    let text = format!(
+        "Sides of patches are {} {} long in the middle, less than three wavelengths: where patches bend, their form goes to the map, too.",
+        number(middle),
+        model.units
+    );
+    let step = format!("--wavelength {}{}", number(middle / WAVES_PER_SIDE), model.units);
+    (wavelength * WAVES_PER_SIDE > middle).then(|| Warning::new("wavelength_wide", text, step))
 }
 
 /// Root mean square of the displacements over all texels.
