@@ -80,6 +80,7 @@ fn of_pieces(scan: &Bound<PyAny>, folder: &Path, most: usize) -> PyResult<BrickF
                     // Pieces may be moved, each by another shift.
                     Ok(cloud) => take(cloud.in_place())?,
                     Err(e) => {
+                        // Told in the place of what the reader says then.
                         raised = Some(e);
                         return Err(ReadError::NoPoints);
                     }

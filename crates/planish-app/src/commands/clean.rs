@@ -17,12 +17,17 @@ use std::path::{Path, PathBuf};
 
 /// The facts of a scan as an input.
 pub fn scan_facts(path: &Path, scan: &Cloud, units: planish::model::Units) -> Input {
+    points_facts(path, (scan.points.len() as u64, scan.bounds().diagonal()), units)
+}
+
+/// The facts of a scan as an input, from its number of points and its diagonal.
+pub fn points_facts(path: &Path, (points, diagonal): (u64, f64), units: planish::model::Units) -> Input {
     Input {
         path: crate::words::told(&path.display().to_string()),
         kind: "scan".into(),
-        counts: [("points".to_owned(), scan.points.len() as u64)].into(),
+        counts: [("points".to_owned(), points)].into(),
         units: units.symbol().into(),
-        diagonal: scan.bounds().diagonal(),
+        diagonal,
     }
 }
 

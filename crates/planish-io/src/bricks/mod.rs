@@ -1,8 +1,8 @@
 //! A scan on disk in bricks: what is too large for memory, and what the machines of a cluster share.
 //!
 //! A folder of plain files: `bricks` (which there are), `points-<k>` of each, and, once they are made, `facts-<k>`, `stands-<k>`
-//! and `cells-<k>` of its samples. Each file appears whole or not at all, and making it again gives the same bytes: a process that
-//! dies loses nothing but its own work.
+//! and `cells-<k>` of its samples. `bricks` is written when all points are there; from then on each file appears whole or not at all,
+//! and making it again gives the same bytes: a process that dies loses nothing but its own work.
 //!
 //! 1. points read piece by piece, parted at medians - `part`      2. the folder as a store - here
 
@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Parts of at most so many points are parted in memory: as much as two bricks at work take.
+/// Parts of at most so many points are parted in memory: records, places and order take some 300 MB, less than a brick at work.
 const AT_ONCE: u64 = 1 << 22;
 /// The file that tells which bricks there are.
 const MANIFEST: &str = "bricks";
@@ -36,7 +36,7 @@ pub struct BrickFolder {
     manifest: Manifest,
 }
 
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Manifest {
     bricks: Vec<Brick>,
     /// Added to every position to get those of the file.
@@ -74,9 +74,7 @@ impl BrickFolder {
     /// # Errors
     /// If it is none.
     pub fn open(folder: &Path) -> Result<BrickFolder, StoreError> {
-        let mut opened = BrickFolder { folder: folder.to_path_buf(), manifest: Manifest::default() };
-        opened.manifest = opened.read(MANIFEST)?;
-        Ok(opened)
+        Ok(BrickFolder { folder: folder.to_path_buf(), manifest: kept(folder, MANIFEST)? })
     }
 
     /// Added to every position to get those of the file.
@@ -113,29 +111,15 @@ impl BrickFolder {
     /// # Errors
     /// If it is not there, or damaged.
     pub fn read<T: DeserializeOwned>(&self, name: &str) -> Result<T, StoreError> {
-        let path = self.folder.join(name);
-        let told = |e: &dyn std::fmt::Display| StoreError(format!("{}: {e}", path.display()));
-        let bytes = std::fs::read(&path).map_err(|e| told(&e))?;
-        postcard::from_bytes(&bytes).map_err(|_| told(&"is damaged, or of another version of planish"))
-    }
-
-    /// True if something is kept by this name.
-    pub fn has(&self, name: &str) -> bool {
-        self.folder.join(name).is_file()
+        kept(&self.folder, name)
     }
 }
 
-impl Default for Manifest {
-    fn default() -> Manifest {
-        Manifest {
-            bricks: Vec::new(),
-            shift: DVec3::ZERO,
-            scanners: Vec::new(),
-            has_normals: false,
-            points: 0,
-            left_out: 0,
-        }
-    }
+fn kept<T: DeserializeOwned>(folder: &Path, name: &str) -> Result<T, StoreError> {
+    let path = folder.join(name);
+    let told = |e: &dyn std::fmt::Display| StoreError(format!("{}: {e}", path.display()));
+    let bytes = std::fs::read(&path).map_err(|e| told(&e))?;
+    postcard::from_bytes(&bytes).map_err(|_| told(&"is damaged, or of another version of planish"))
 }
 
 /// The file with the points of a brick.
@@ -156,12 +140,11 @@ impl BrickStore for BrickFolder {
     fn around(&self, brick: usize, halo: f64) -> Result<Cloud, StoreError> {
         let bricks = self.bricks();
         let reach = bricks[brick].reach(halo);
-        let inside = |p: DVec3| p.cmpge(reach.min).all() && p.cmplt(reach.max).all();
         let mut found: Vec<Record> = Vec::new();
-        for (k, _) in bricks.iter().enumerate().filter(|(k, b)| *k == brick || b.bounds.meets(&reach)) {
+        for k in (0..bricks.len()).filter(|&k| bricks[k].bounds.meets(&reach)) {
             let path = points_file(&self.folder, k);
             let taken = records(&path, &mut |r| {
-                if k == brick || inside(r.point) {
+                if bricks[brick].is_near(r.point, halo) {
                     found.push(r);
                 }
             });

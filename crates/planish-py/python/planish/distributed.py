@@ -99,8 +99,8 @@ def mesh(
     * scan: the file, or its pieces, as of `Bricks.create`
     * cluster, jobs: as of `run_many`
     * memory: GB that each worker of a cluster that is made here may take; a brick of the usual size takes about half of one
-    * folder: where the bricks lie meanwhile, empty or not there yet; all workers see it. None makes one for the time of the call
-      beside the others of this machine, which is for a cluster of this machine alone
+    * folder: where the bricks lie, empty or not there yet; all workers see it. None: a temporary one of this machine, for a
+      cluster of this machine alone
     * most, columns, classes, close and the keywords of `Cloud.mesh`: as of `Bricks.create`
     * progress: True writes the steps to stderr; a function is called with the name of the step and the share done
 
@@ -118,18 +118,26 @@ def mesh(
         place = str(pathlib.Path(folder if folder is not None else own).absolute())
         bricks = Bricks.create(scan, place, columns=columns, classes=classes, close=close, **parameters)
         count = len(bricks)
-        _all(client, "clean", place, range(count), progress)
-        _all(client, "settle", place, [-1], progress)
-        _all(client, "mesh", place, range(count), progress)
+        each: list[tuple[int, ...]] = [(k,) for k in range(count)]
+        for step, arguments in (("clean", each), ("settle", [()]), ("mesh", each)):
+            _all(client, step, (place, _stamp()), arguments, progress)
         return bricks.weld()
 
 
-def _all(client: Any, step: str, folder: str, bricks: Iterable[int], progress: bool | Callable[[str, float], object]) -> None:
+def _all(
+    client: Any,
+    step: str,
+    place: tuple[str, str],
+    arguments: list[tuple[int, ...]],
+    progress: bool | Callable[[str, float], object],
+) -> None:
     """One step of all bricks; the first that fails stops the others."""
     from distributed import as_completed
     from distributed.scheduler import KilledWorker
 
-    work = [client.submit(_brick, step, folder, k, key=f"planish-{step}-{k}-{_stamp()}", pure=False) for k in bricks]
+    work = [
+        client.submit(_brick, step, place, a, key=f"planish-{step}-{k}-{place[1]}", pure=False) for k, a in enumerate(arguments)
+    ]
     try:
         for done, future in enumerate(as_completed(list(work)), start=1):
             try:
@@ -146,21 +154,19 @@ def _all(client: Any, step: str, folder: str, bricks: Iterable[int], progress: b
         raise
 
 
-#: The bricks that this worker had last: what was settled for all is read once.
-_held: dict[str, Bricks] = {}
+#: The bricks of the step that this worker had last, by folder and stamp: what was settled for all is read once.
+_held: dict[tuple[str, str], Bricks] = {}
 
 
-def _brick(step: str, folder: str, brick: int) -> None:
-    """A step of one brick, on a worker."""
+def _brick(step: str, place: tuple[str, str], arguments: tuple[int, ...]) -> None:
+    """A step of one brick, on a worker, which has other threads only for other bricks."""
     set_threads(1)
-    if folder not in _held:
+    bricks = _held.get(place)
+    if bricks is None:
+        bricks = Bricks(place[0])
         _held.clear()
-        _held[folder] = Bricks(folder)
-    bricks = _held[folder]
-    if step == "settle":
-        bricks.settle()
-    else:
-        getattr(bricks, step)(brick)
+        _held[place] = bricks
+    getattr(bricks, step)(*arguments)
 
 
 def _gathered(work: dict[Any, int], paths: list[Path], folder: Path, progress: bool | Callable[[Row], None]) -> Batch:

@@ -288,13 +288,7 @@ fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Sourc
         std::fs::create_dir(&folder).map_err(|e| products::unwritable(&folder, &e))?;
         let (bricks, far_off) = files::scan_in_bricks(path, &args.scan, &folder)?;
         let units = session.units_of(path);
-        let input = Input {
-            path: crate::words::told(&path.display().to_string()),
-            kind: "scan".into(),
-            counts: [("points".to_owned(), bricks.points())].into(),
-            units: units.symbol().into(),
-            diagonal: bricks.bounds().diagonal(),
-        };
+        let input = super::clean::points_facts(path, (bricks.points(), bricks.bounds().diagonal()), units);
         return Ok((Source::Bricks { bricks, far_off, _room: room }, input, units));
     }
     if planish_io::is_scan(path) {

@@ -21,7 +21,13 @@ pub struct Brick {
 impl Brick {
     /// Is a point in the box?
     pub fn holds(&self, p: DVec3) -> bool {
-        p.cmpge(self.aabb.min).all() && p.cmplt(self.aabb.max).all()
+        self.is_near(p, 0.0)
+    }
+
+    /// Is a point in the box or within `halo` of it, along the axes?
+    pub fn is_near(&self, p: DVec3, halo: f64) -> bool {
+        let reach = self.reach(halo);
+        p.cmpge(reach.min).all() && p.cmplt(reach.max).all()
     }
 
     /// The box and what is within `halo` of it, along the axes.
@@ -56,14 +62,13 @@ impl Partition {
     /// The points in a brick or within `halo` of it, as ascending indices.
     pub fn around(&self, points: &[DVec3], brick: usize, halo: f64) -> Vec<u32> {
         let reach = self.bricks[brick].reach(halo);
-        let inside = |p: DVec3| p.cmpge(reach.min).all() && p.cmplt(reach.max).all();
         let mut found = Vec::new();
         for (k, other) in self.bricks.iter().enumerate() {
             let own = &self.order[other.range.clone()];
             if k == brick {
                 found.extend(own);
-            } else if other.bounds.max.cmpge(reach.min).all() && other.bounds.min.cmplt(reach.max).all() {
-                found.extend(own.iter().filter(|&&i| inside(points[i as usize])));
+            } else if other.bounds.meets(&reach) {
+                found.extend(own.iter().filter(|&&i| self.bricks[brick].is_near(points[i as usize], halo)));
             }
         }
         found.sort_unstable();
