@@ -284,6 +284,27 @@ fn regress_maps_in_object_space_do_not_pass_for_maps_in_the_frame_of_the_surface
 }
 
 #[test]
+fn images_of_another_frame_than_the_sidecar_tells_are_refused_in_every_kind_of_file() {
+    let pair = pair();
+    for file in [MapFile::Exr, MapFile::ExrHalf, MapFile::Png, MapFile::Tiff] {
+        let folder = folder();
+        for frame in [MapFrame::Surface, MapFrame::Object] {
+            let params = MapParams { frame, ..MapParams::default() };
+            let all = made(&pair, &params);
+            let sidecar = std::fs::read(folder.path().join("relief.json"));
+            write_maps(folder.path(), &all, &[], &packed(&all, &params), &pair.surfaces, &options(params, file))
+                .unwrap();
+            read_maps(folder.path()).unwrap();
+            if let Ok(before) = sidecar {
+                std::fs::write(folder.path().join("relief.json"), before).unwrap();
+            }
+        }
+        let told = read_maps(folder.path()).unwrap_err().to_string();
+        assert!(told.contains("it holds \"vector object tbn\", and relief.json tells of"), "{file:?}: {told}");
+    }
+}
+
+#[test]
 fn broken_maps_are_told_in_one_line_with_a_hint() {
     let pair = pair();
     let params = MapParams::default();

@@ -370,9 +370,9 @@ pub fn refit(
 /// Parts a model at a wavelength (units of the model): what is longer goes to new surfaces, what is shorter to the relief, so
 /// that a bump sits wholly in the map.
 ///
-/// A first surface is fitted with knot spans no shorter than the wavelength, which is too stiff to take part in shorter waves;
-/// what it misses is filtered over all patches, and the surfaces are fitted to the first with the long waves of the rest, with as
-/// many control points as these need. Edits of the relief stay as they are. On an error the model is what it was.
+/// The grids are freed of the shorter waves over all patches at once ([`relief::long_waves`]), and the surfaces are fitted to what is
+/// left, with as many control points as it needs and no fewer than before. Edits of the relief stay as they are. On an error
+/// the model is what it was.
 /// # Errors
 /// As [`fit`]; [`ReliefError::Edit`] for a wavelength that the grids cannot carry, with the shortest that they can.
 ///
@@ -396,22 +396,19 @@ pub fn part_at(
             format!("waves of {wavelength} are too short for the grids of the patches; the shortest is {shortest}");
         return Err(ReliefError::Edit { what }.into());
     }
-    let per_curve = |count: &dyn Fn(&Side) -> f64| {
-        let control = |side: &Side| count(side).max(1.0) as usize + surface::FEWEST_CONTROL - 1;
-        surface::Resolution::PerCurve(sides.iter().map(control).collect())
+    let control = |side: &Side| {
+        let needed = spans(side).ceil().clamp(1.0, carried(side)) as usize + surface::FEWEST_CONTROL - 1;
+        needed.max(side.control)
     };
-    let stiff = per_curve(&|side| (side.length / wavelength).floor());
-    let fine = per_curve(&|side| spans(side).ceil().min(carried(side)));
-    let stiff = FitParams { resolution: stiff, control_at: Vec::new(), ..params.fit.clone() };
+    let control: Vec<usize> = sides.iter().map(control).collect();
+    let counts = part_counts(&model.network, &sides, &control, wavelength);
+    let fine = surface::Resolution::PerCurve(control);
     let smoothing = params.fit.smoothing.min(PART_SMOOTHING);
     let fine = FitParams { resolution: fine, control_at: Vec::new(), smoothing, ..params.fit.clone() };
     let mut clock = Clock::new(observer, &WEIGHTS);
     let long = clock.stage(
         "waves",
-        |o| -> Result<_, PipelineError> {
-            let first = surface::fit_network(&model.network, &model.grids, &stiff, o)?;
-            Ok(relief::long_waves(&model.network, &model.grids, &first, wavelength, o)?)
-        },
+        |o| relief::long_waves(&model.network, &model.grids, &model.surfaces, (&counts, wavelength), o),
         |grids: &Vec<Grid>| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;
     let grids = std::mem::take(&mut model.grids);
@@ -427,23 +424,41 @@ const SPANS_PER_WAVE: f64 = 4.0;
 /// weight: so it loses a hundredth of its height by that, and one three times as long 1e-4.
 const PART_SMOOTHING: f64 = 1e-3;
 
+/// Nodes for each of the shortest waves that are looked for: frequencies are known to a hundredth then.
+const NODES_PER_WAVE: f64 = 16.0;
+
+/// Nodes along each curve that waves are parted on: as many as waves and control points need, and no more than the grids have.
+fn part_counts(network: &Network, sides: &[Side], control: &[usize], wavelength: f64) -> Vec<usize> {
+    let chords = network.chords();
+    let mut of_chord = vec![0; chords.len()];
+    for ((side, &control), &chord) in sides.iter().zip(control).zip(&chords) {
+        let waves = (NODES_PER_WAVE * side.length / wavelength).ceil() as usize + 1;
+        let needed = waves.max(2 * control).min(side.nodes);
+        of_chord[chord as usize] = needed.max(of_chord[chord as usize]);
+    }
+    chords.iter().map(|&chord| of_chord[chord as usize]).collect()
+}
+
 /// A curve as the grids have it.
 struct Side {
     /// World units.
     length: f64,
     /// Nodes along it.
     nodes: usize,
+    /// Control points of the surfaces along it.
+    control: usize,
 }
 
 /// The curves of a network as the grids beside them have them, in their order.
 fn sides(model: &Model) -> Vec<Side> {
     let mut sides: Vec<Side> =
-        model.network.curves.iter().map(|_| Side { length: 0.0, nodes: surface::FEWEST_CONTROL }).collect();
-    for (patch, grid) in model.network.patches.iter().zip(&model.grids) {
+        model.network.curves.iter().map(|_| Side { length: 0.0, nodes: surface::FEWEST_CONTROL, control: 0 }).collect();
+    for ((patch, grid), surface) in model.network.patches.iter().zip(&model.grids).zip(&model.surfaces) {
         for (k, side) in patch.sides.iter().enumerate() {
+            let control = if k % 2 == 0 { surface.cols } else { surface.rows };
             let nodes = if k % 2 == 0 { grid.cols } else { grid.rows };
             let points = (0..nodes).map(|i| grid.points[surface::node(grid.rows, grid.cols, k, i, 0)]);
-            sides[side.curve as usize] = Side { length: crate::geom::polyline::length(points), nodes };
+            sides[side.curve as usize] = Side { length: crate::geom::polyline::length(points), nodes, control };
         }
     }
     sides

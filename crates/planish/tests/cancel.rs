@@ -21,7 +21,7 @@ const PROMISED: f64 = 0.2;
 /// A machine that others load may take this many times as long.
 const LOADED: f64 = 2.0;
 /// Moments at which each stage is stopped, and tries of each.
-const MOMENTS: u64 = 6;
+const MOMENTS: u64 = 4;
 const TRIES: usize = 3;
 
 /// One stage at a time: all of them use all cores.

@@ -196,7 +196,7 @@ fn displaced_mesh_is_the_same_to_the_bit_on_1_and_4_threads() {
 }
 
 #[test]
-fn regress_parting_at_10_gives_99_percent_of_a_wave_of_30_to_the_surface_and_95_of_one_of_3_to_the_map() {
+fn regress_parting_at_10_gives_99_9_percent_of_a_wave_of_30_to_the_surface_and_of_one_of_3_to_the_map() {
     let (long, short) = (|y: f64| (TAU * y / 30.0).sin(), |x: f64| 0.1 * (TAU * x / 3.0).sin());
     // Two by two patches of 30 x 30, five nodes for each of the short waves.
     let shape = |u: f64, v: f64| DVec3::new(30.0 * u, 30.0 * v, long(30.0 * v) + short(30.0 * u));
@@ -205,14 +205,11 @@ fn regress_parting_at_10_gives_99_percent_of_a_wave_of_30_to_the_surface_and_95_
     let params = PipelineParams::default();
     pipeline::refit(&mut model, &params, &Silent).unwrap();
     pipeline::part_at(&mut model, 10.0, &params, &Silent).unwrap();
-    // The heights of the surfaces, as shares of both waves by least squares; waves are not parted well at an open border.
+    // The heights of the surfaces, as shares of both waves by least squares.
     let (mut sums, mut rest) = ([0.0; 5], 0.0);
     for surface in &model.surfaces {
         for k in 0..200 * 200 {
             let p = surface.point((k % 200) as f64 / 199.0, (k / 200) as f64 / 199.0);
-            if p.x.min(p.y) < 5.0 || p.x.max(p.y) > 55.0 {
-                continue;
-            }
             let (a, b) = (long(p.y), short(p.x));
             sums = [sums[0] + a * a, sums[1] + a * b, sums[2] + b * b, sums[3] + a * p.z, sums[4] + b * p.z];
             rest += (p.z - a).powi(2);
@@ -221,14 +218,64 @@ fn regress_parting_at_10_gives_99_percent_of_a_wave_of_30_to_the_surface_and_95_
     let [aa, ab, bb, az, bz] = sums;
     let whole = aa * bb - ab * ab;
     let (kept, taken) = ((az * bb - bz * ab) / whole, (bz * aa - az * ab) / whole);
-    assert!((kept - 1.0).abs() < 0.01, "{kept} of the long wave is in the surface");
-    assert!(taken.abs() < 0.05, "{taken} of the short wave is in the surface");
-    // What an open border does to the filter reaches a little further.
-    assert!((rest / aa).sqrt() < 0.02, "{}", (rest / aa).sqrt());
+    assert!((kept - 1.0).abs() < 0.001, "{kept} of the long wave is in the surface");
+    assert!(taken.abs() < 0.001, "{taken} of the short wave is in the surface");
+    assert!((rest / aa).sqrt() < 0.01, "{}", (rest / aa).sqrt());
     // What the grids cannot carry is told with the shortest that they can.
     for wavelength in [1e-9, 0.1, 2.0] {
         let told = pipeline::part_at(&mut model, wavelength, &params, &Silent).unwrap_err().to_string();
         let (_, shortest) = told.split_once("the shortest is ").expect(&told);
         pipeline::part_at(&mut model.clone(), shortest.parse().unwrap(), &params, &Silent).unwrap();
+    }
+}
+
+/// The surfaces of a patchwork that is parted at a wavelength, at 100 x 100 places of each.
+fn parted(work: Patchwork, wavelength: f64) -> Vec<Vec<DVec3>> {
+    let mut model = Model { network: work.network, grids: work.grids, ..Model::default() };
+    let params = PipelineParams::default();
+    pipeline::refit(&mut model, &params, &Silent).unwrap();
+    pipeline::part_at(&mut model, wavelength, &params, &Silent).unwrap();
+    let place = |s: &Surface, k: usize| s.point((k % 100) as f64 / 99.0, (k / 100) as f64 / 99.0);
+    model.surfaces.iter().map(|s| (0..10_000).map(|k| place(s, k)).collect()).collect()
+}
+
+/// Root mean square and largest of what `off` says of all places.
+fn spread(places: &[Vec<DVec3>], off: impl Fn(DVec3) -> f64) -> [f64; 2] {
+    let all: Vec<f64> = places.iter().flatten().map(|&p| off(p).abs()).collect();
+    let square: f64 = all.iter().map(|d| d * d).sum();
+    [(square / all.len() as f64).sqrt(), all.iter().copied().fold(0.0, f64::max)]
+}
+
+#[test]
+fn regress_a_ball_of_radius_10_in_six_patches_is_off_by_less_than_1e_2_parted_at_20() {
+    // Longer than the sides of the patches: with surfaces too stiff for shorter waves in place of an energy, .48 was missing.
+    for wavelength in [5.0, 10.0, 20.0] {
+        let ball = cube(33, CurveKind::Smooth, |p| p.normalize() * 10.0);
+        let [rms, most] = spread(&parted(ball, wavelength), |p| p.length() - 10.0);
+        assert!(rms < 0.01 && most < 0.04, "{wavelength}: {rms}, {most}");
+    }
+}
+
+#[test]
+fn parting_takes_waves_along_sharp_edges_and_leaves_the_edges() {
+    // A wave of 2 along each edge of a cube with sides of 20, none at its corners.
+    let wave = |p: DVec3| p * 10.0 + DVec3::splat(0.1 * (TAU * 5.0 * (p.x + p.y + p.z)).sin());
+    let [rms, most] = spread(&parted(cube(65, CurveKind::Feature, wave), 5.0), |p| p.abs().max_element() - 10.0);
+    assert!(rms < 5e-4 && most < 5e-3, "{rms}, {most}");
+}
+
+#[test]
+fn parting_leaves_a_bent_sheet_bent_up_to_its_border() {
+    // A quarter of a cylinder with a wave of 1 along it.
+    let sheet = || {
+        sheet(2, 2, [false, false], [65, 65], |x, y| {
+            let (angle, y) = (x * std::f64::consts::FRAC_PI_4, 8.0 * y);
+            let radius = 10.0 + 0.05 * (TAU * y).sin();
+            DVec3::new(radius * angle.cos(), y, radius * angle.sin())
+        })
+    };
+    for (wavelength, bound) in [(5.0, 3e-4), (10.0, 4e-3)] {
+        let [rms, _] = spread(&parted(sheet(), wavelength), |p| p.x.hypot(p.z) - 10.0);
+        assert!(rms < bound, "{wavelength}: {rms}");
     }
 }

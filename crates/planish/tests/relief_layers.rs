@@ -54,6 +54,10 @@ impl<'a> Edited<'a> {
         if name == "grey.png" {
             return Ok(Picture { width: 4, height: 4, pixels: vec![[0.5, 1.0]; 16] });
         }
+        if name == "stripes.png" {
+            let pixels = (0..256 * 256).map(|k| [(k % 2) as f32, 1.0]).collect();
+            return Ok(Picture { width: 256, height: 256, pixels });
+        }
         // The left half white, the right half transparent.
         let pixels = (0..8 * 4).map(|k| if k % 8 < 4 { [1.0, 1.0] } else { [1.0, 0.0] }).collect();
         Ok(Picture { width: 8, height: 4, pixels })
@@ -116,7 +120,7 @@ fn what_is_even_everywhere_is_no_short_wave_on_a_closed_surface() {
     let shapes: Vec<[usize; 2]> = work.grids.iter().map(|g| [g.rows, g.cols]).collect();
     let filter = layers::Filter::new(&work.network, &s, &shapes, &Silent).unwrap();
     let even: Vec<Vec<DVec3>> = work.grids.iter().map(|g| vec![DVec3::new(1.0, -2.0, 3.0); g.points.len()]).collect();
-    let values = filter.gather(&even);
+    let values = filter.base.gather(&even);
     for d in filter.low_pass(&values, 0.5, &Silent).unwrap() {
         assert!(d.distance(values[0]) < 1e-9, "{d}");
     }
@@ -133,7 +137,7 @@ fn a_blur_over_1e9_and_1e150_sizes_of_the_surface_leaves_the_mean_and_is_no_faul
     let half = |p: &DVec3| DVec3::new(0.0, 0.0, if p.x < 1.0 { 1.0 } else { 0.0 });
     let nodes: Vec<Vec<DVec3>> = work.grids.iter().map(|g| g.points.iter().map(half).collect()).collect();
     for radius in [1e9, 1e150] {
-        let soft = filter.blur(&filter.gather(&nodes), radius, &Silent).unwrap();
+        let soft = filter.blur(&filter.base.gather(&nodes), radius, &Silent).unwrap();
         let spread = soft.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], d| [a.min(d.z), b.max(d.z)]);
         assert!(spread[1] - spread[0] < 1e-6 && (0.45..0.55).contains(&spread[0]), "{radius}: {spread:?}");
     }
@@ -188,6 +192,20 @@ fn a_stamp_stands_upright_and_gives_way_where_it_is_transparent() {
     assert!((at(&sum, 1.0, 1.25) - 0.3).abs() < 1e-12, "what was there gives way");
     assert_eq!(at(&sum, 1.25, 0.6), 0.5);
     assert!(edited.crack() < 1e-14);
+}
+
+#[test]
+fn regress_stripes_of_a_pixel_finer_than_the_nodes_are_stamped_as_their_mean() {
+    let work = flat(2, 33);
+    let mut edited = Edited::new(&work, &heights(&work, |_| 0.0));
+    edited.make(r#"{"edit":"stamp","image":"stripes.png","at":[1,1,0],"up":[0,1,0],"width":1,"height":0.1}"#).unwrap();
+    for (grid, relief) in work.grids.iter().zip(&edited.sum()) {
+        for (p, d) in grid.points.iter().zip(&relief.vectors) {
+            if (*p - DVec3::new(1.0, 1.0, 0.0)).abs().max_element() < 0.45 {
+                assert!((d.z - 0.05).abs() < 1e-6, "{p}: {}", d.z);
+            }
+        }
+    }
 }
 
 #[test]

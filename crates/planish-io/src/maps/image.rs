@@ -94,11 +94,11 @@ pub(super) struct Raster {
     pub height: usize,
     pub channels: usize,
     pub values: Vec<f32>,
-    /// What the numbers are, as the head of an EXR tells; empty if nothing is told.
+    /// What the numbers are, as the file tells; empty if it does not.
     pub meaning: String,
 }
 
-/// Name of the entry for [`Raster::meaning`] in the head of an EXR.
+/// Name of the entry for [`Raster::meaning`] in files.
 const MEANING: &str = "planishRelief";
 
 /// Writes an image; `note` goes into its metadata.
@@ -184,6 +184,9 @@ fn write_png(out: &mut Cursor<Vec<u8>>, raster: &Raster, bits: u32, note: &str) 
     });
     encoder.set_depth(if bits == 8 { png::BitDepth::Eight } else { png::BitDepth::Sixteen });
     encoder.add_text_chunk("Comment".into(), note.into())?;
+    if !raster.meaning.is_empty() {
+        encoder.add_text_chunk(MEANING.into(), raster.meaning.clone())?;
+    }
     let bytes: Vec<u8> = match bits {
         8 => raster.values.iter().map(|&x| whole(x, bits) as u8).collect(),
         _ => raster.values.iter().flat_map(|&x| whole(x, bits).to_be_bytes()).collect(),
@@ -235,6 +238,11 @@ fn write_tiff(out: &mut Cursor<Vec<u8>>, raster: &Raster, note: &str) -> tiff::T
     use tiff::tags::Tag;
     let values: Vec<u16> = raster.values.iter().map(|&x| whole(x, 16)).collect();
     let (width, height) = (raster.width as u32, raster.height as u32);
+    let note = match raster.meaning.as_str() {
+        "" => note.into(),
+        meaning => format!("{note}\n{MEANING}: {meaning}"),
+    };
+    let note = note.as_str();
     let mut encoder = TiffEncoder::new(out)?.with_compression(tiff::encoder::Compression::Deflate(Default::default()));
     match raster.channels {
         1 => {
@@ -289,7 +297,7 @@ pub(super) fn read_with_alpha(path: &Path, name: &str) -> Result<Picture, ReadEr
     let bytes = crate::mesh_file::bytes_of(path)?;
     let place = Place::Item("image", 0);
     let damaged = |what: String| ReadError::Syntax { what: format!("{name}: {what}"), place: place.clone() };
-    let (width, height, found, numbers) = png_numbers(&bytes).map_err(damaged)?;
+    let Pixels { width, height, channels, numbers, .. } = png_pixels(&bytes).map_err(damaged)?;
     let pixel = |all: &[f32]| match *all {
         [grey] => [grey, 1.0],
         [grey, alpha] => [grey, alpha],
@@ -297,7 +305,7 @@ pub(super) fn read_with_alpha(path: &Path, name: &str) -> Result<Picture, ReadEr
         [r, g, b, alpha, ..] => [(r + g + b) / 3.0, alpha],
         [] => [0.0, 0.0],
     };
-    Ok(Picture { width, height, pixels: numbers.chunks_exact(found).map(pixel).collect() })
+    Ok(Picture { width, height, pixels: numbers.chunks_exact(channels).map(pixel).collect() })
 }
 
 /// Refuses sizes that the bytes cannot hold.
@@ -344,12 +352,21 @@ fn read_exr(bytes: &[u8]) -> Result<Raster, String> {
 }
 
 fn read_png(bytes: &[u8]) -> Result<Raster, String> {
-    let (width, height, found, numbers) = png_numbers(bytes)?;
-    Ok(without_alpha(width, height, found, numbers))
+    let Pixels { width, height, channels, numbers, meaning } = png_pixels(bytes)?;
+    Ok(Raster { meaning, ..without_alpha(width, height, channels, numbers) })
 }
 
-/// Width, height, channels and numbers of a PNG.
-fn png_numbers(bytes: &[u8]) -> Result<(usize, usize, usize, Vec<f32>), String> {
+/// What a PNG holds, its alpha channel among the rest.
+struct Pixels {
+    width: usize,
+    height: usize,
+    channels: usize,
+    numbers: Vec<f32>,
+    /// As [`Raster::meaning`].
+    meaning: String,
+}
+
+fn png_pixels(bytes: &[u8]) -> Result<Pixels, String> {
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(|e| e.to_string())?;
@@ -357,14 +374,15 @@ fn png_numbers(bytes: &[u8]) -> Result<(usize, usize, usize, Vec<f32>), String> 
     plausible(width, height, bytes)?;
     let mut data = vec![0; reader.output_buffer_size().ok_or("it is too large")?];
     let info = reader.next_frame(&mut data).map_err(|e| e.to_string())?;
-    let found = info.color_type.samples();
+    let words = &reader.info().uncompressed_latin1_text;
+    let meaning = words.iter().find(|t| t.keyword == MEANING).map(|t| t.text.clone()).unwrap_or_default();
     let numbers: Vec<f32> = match info.bit_depth {
         png::BitDepth::Sixteen => {
             data.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]]) as f32 / largest(16)).collect()
         }
         _ => data.iter().map(|&b| b as f32 / 255.0).collect(),
     };
-    Ok((width, height, found, numbers))
+    Ok(Pixels { width, height, channels: info.color_type.samples(), numbers, meaning })
 }
 
 fn read_tiff(bytes: &[u8]) -> Result<Raster, String> {
@@ -373,6 +391,9 @@ fn read_tiff(bytes: &[u8]) -> Result<Raster, String> {
     let (width, height) = decoder.dimensions().map_err(|e| e.to_string())?;
     let (width, height) = (width as usize, height as usize);
     plausible(width, height, bytes)?;
+    let note = decoder.get_tag_ascii_string(tiff::tags::Tag::ImageDescription).unwrap_or_default();
+    let told = note.lines().find_map(|line| line.strip_prefix(MEANING)?.strip_prefix(": "));
+    let meaning = told.unwrap_or_default().to_owned();
     let numbers: Vec<f32> = match decoder.read_image().map_err(|e| e.to_string())? {
         DecodingResult::U16(all) => all.iter().map(|&x| x as f32 / largest(16)).collect(),
         DecodingResult::U8(all) => all.iter().map(|&x| x as f32 / 255.0).collect(),
@@ -383,7 +404,7 @@ fn read_tiff(bytes: &[u8]) -> Result<Raster, String> {
     if pixels == 0 || !numbers.len().is_multiple_of(pixels) {
         return Err("its pixels do not all have the same channels".into());
     }
-    Ok(without_alpha(width, height, numbers.len() / pixels, numbers))
+    Ok(Raster { meaning, ..without_alpha(width, height, numbers.len() / pixels, numbers) })
 }
 
 /// One or three channels: an alpha channel says nothing of a displacement.

@@ -180,7 +180,7 @@ pub fn relief_sum(reliefs: &[Relief]) -> u32 {
     sum.finalize()
 }
 
-/// What the texels of maps are, as it stands in the head of an EXR: kind, and of vectors frame and order.
+/// What the texels of maps are, as images tell it themselves: kind, and of vectors frame and order.
 fn meaning(params: &MapParams) -> String {
     let word = |value: serde_json::Result<serde_json::Value>| value.ok().and_then(|v| v.as_str().map(str::to_owned));
     let of_vectors = || {
@@ -430,7 +430,7 @@ pub struct ReadMaps {
 /// Reads the maps in a folder.
 /// # Errors
 /// `ReadError` for a folder without sidecar, or an image that is missing, damaged, of another size or number of channels than
-/// the sidecar says, with numbers that are not finite, or an EXR whose head tells of another kind, frame or order.
+/// the sidecar says, with numbers that are not finite, or that tells of another kind, frame or order.
 pub fn read_maps(folder: impl AsRef<Path>) -> Result<ReadMaps, ReadError> {
     let folder = folder.as_ref();
     let sidecar = sidecar::read(folder)?;
@@ -447,10 +447,14 @@ pub fn read_maps(folder: impl AsRef<Path>) -> Result<ReadMaps, ReadError> {
         }
         let meaning = meaning(&sidecar.params);
         if !raster.meaning.is_empty() && raster.meaning != meaning {
-            return Err(wrong(format!(
-                "its texels are \"{}\", and the sidecar tells of \"{meaning}\"",
-                raster.meaning
-            )));
+            return Err(ReadError::Header {
+                what: format!(
+                    "{}: it holds \"{}\", and relief.json tells of \"{meaning}\"",
+                    entry.file, raster.meaning
+                ),
+                place: Place::Item("image", k),
+                hint: "import images with the sidecar that was written beside them",
+            });
         }
         if raster.channels < channels {
             return Err(wrong(format!("it has {} channel, not {channels}", raster.channels)));

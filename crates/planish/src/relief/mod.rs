@@ -12,6 +12,7 @@
 mod bake;
 mod closest;
 mod frame;
+mod laplacian;
 pub mod layers;
 pub mod maps;
 mod resample;

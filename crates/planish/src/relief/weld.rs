@@ -27,6 +27,27 @@ pub struct PatchedMesh {
     pub patches: Vec<PatchNodes>,
 }
 
+impl PatchedMesh {
+    /// Vectors of the nodes of all patches as vectors of the vertices; of several nodes at a vertex the first counts.
+    pub fn gather(&self, nodes: &[Vec<DVec3>]) -> Vec<DVec3> {
+        let mut values = vec![DVec3::NAN; self.mesh.points.len()];
+        for (patch, vectors) in self.patches.iter().zip(nodes) {
+            for (&v, &d) in patch.vertices.iter().zip(vectors) {
+                let value = &mut values[v as usize];
+                if value.is_nan() {
+                    *value = d;
+                }
+            }
+        }
+        values
+    }
+
+    /// Vectors of the vertices as vectors of the nodes of all patches.
+    pub fn scatter(&self, values: &[DVec3]) -> Vec<Vec<DVec3>> {
+        self.patches.iter().map(|p| p.vertices.iter().map(|&v| values[v as usize]).collect()).collect()
+    }
+}
+
 /// The nodes of one patch of a [`PatchedMesh`], row-major as [`Grid`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PatchNodes {

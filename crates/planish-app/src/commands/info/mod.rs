@@ -85,6 +85,7 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
     report.warnings = faults(&facts);
     figures(&facts, &mut report);
     let crossings = crossings(mesh, &mut report);
+    let of_mesh = report.warnings.len();
     if let Some(model) = model {
         report.quality.insert("patches.count".into(), Figure::Count(model.network.patches.len() as u64));
         let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
@@ -109,10 +110,11 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
                 table.row("folds", format!("{grids} cells of grids, {surfaces} places of surfaces"));
             }
         }
+        let step = if of_mesh > 0 { "; `planish run` repairs what it can of the mesh" } else { "" };
         let verdict = match report.warnings.len() {
             0 => "nothing".to_owned(),
-            1 => "one thing, told above; `planish run` repairs what it can of the mesh".to_owned(),
-            n => format!("{n} things, told above; `planish run` repairs what it can of the mesh"),
+            1 => format!("one thing, told above{step}"),
+            n => format!("{n} things, told above{step}"),
         };
         table.row("wrong", verdict);
         table.print();

@@ -1,16 +1,14 @@
 //! `planish relief part` and `planish relief level`: other surfaces under the same shape.
 
 use super::super::{Session, pipeline_failure};
-use super::{finish, open};
+use super::{finish, folds, open};
 use crate::args::AllStages;
 use crate::args::relief::{ReliefLevel, ReliefPart};
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::tolerance::Scale;
-use planish::geom::polyline;
 use planish::model::{HistoryEntry, Model};
-use planish::network::Curve;
-use planish::pipeline::{self, PipelineError, PipelineParams, Warning};
+use planish::pipeline::{self, PipelineError, PipelineParams};
 use planish::relief::ReliefError;
 use planish_io::report::{Report, number};
 use std::path::Path;
@@ -30,7 +28,6 @@ pub fn part(session: &Session, args: &ReliefPart) -> Result<Status, Failure> {
     let wavelength = args.wavelength.length(scale);
     let params = stored(&args.model, &model)?;
     let mut report = Report::new("relief part", files::model_facts(&args.model, &model, model.units));
-    report.warnings.extend(wide(&model, wavelength));
     let before = rms(&model);
     let stages = pipeline::part_at(&mut model, wavelength, &params, &session.bars).map_err(|e| match e {
         PipelineError::Relief(ReliefError::Edit { what }) => {
@@ -41,6 +38,7 @@ pub fn part(session: &Session, args: &ReliefPart) -> Result<Status, Failure> {
     let parameters = serde_json::json!({ "wavelength": wavelength }).to_string();
     model.history.push(HistoryEntry { command: "relief part".into(), parameters });
     report.stages = std::iter::once(read).chain(stages).collect();
+    folds(&model, &mut report, &args.model)?;
     let told = vec![
         ("wavelength".into(), format!("{} {}", number(wavelength), model.units)),
         ("RMS of the relief".into(), format!("{} {}, before {}", number(rms(&model)), model.units, number(before))),
@@ -62,27 +60,9 @@ pub fn level(session: &Session, args: &ReliefLevel) -> Result<Status, Failure> {
     let parameters = serde_json::json!({ "control_points": control }).to_string();
     model.history.push(HistoryEntry { command: "relief level".into(), parameters });
     report.stages = std::iter::once(read).chain(stages).collect();
+    folds(&model, &mut report, &args.model)?;
     let told = vec![("control points".into(), planish_io::report::count(control as u64))];
     finish(session, &args.output, &model, report, told)
-}
-
-/// Sides of patches are at least so many wavelengths long, or what a patch bends by counts as short. Measured on a ball in six
-/// patches: with sides of 3.1 wavelengths off by .0014 of the radius, of 1.6 by .017.
-const WAVES_PER_SIDE: f64 = 3.0;
-
-/// What to tell of a wavelength that patches are too small for.
-fn wide(model: &Model, wavelength: f64) -> Option<Warning> {
-    let along = |curve: &Curve| polyline::length(curve.points.iter().map(|p| p.position(&model.mesh)));
-    let mut sides: Vec<f64> = model.network.curves.iter().map(along).collect();
-    sides.sort_unstable_by(f64::total_cmp);
-    let middle = *sides.get(sides.len() / 2)?;
-    let text = format!(
-        "Sides of patches are {} {} long in the middle, less than three wavelengths: where patches bend, their form goes to the map, too.",
-        number(middle),
-        model.units
-    );
-    let step = format!("--wavelength {}{}", number(middle / WAVES_PER_SIDE), model.units);
-    (wavelength * WAVES_PER_SIDE > middle).then(|| Warning::new("wavelength_wide", text, step))
 }
 
 /// Root mean square of the displacements over all texels.

@@ -37,7 +37,7 @@ pub fn split(displaced: &Displaced, wavelengths: &[f64], observer: &dyn Observer
     let shapes: Vec<[usize; 2]> = reliefs.iter().map(|r| [r.rows, r.cols]).collect();
     let filter = Filter::new(network, surfaces, &shapes, observer)?;
     let world: Vec<Vec<DVec3>> = surfaces.par_iter().zip(reliefs).map(|(s, r)| world_vectors(s, r)).collect();
-    let whole = filter.gather(&world);
+    let whole = filter.base.gather(&world);
     let mut cuts = wavelengths.to_vec();
     cuts.sort_by(|a, b| b.total_cmp(a));
     cuts.dedup();
@@ -53,7 +53,7 @@ pub fn split(displaced: &Displaced, wavelengths: &[f64], observer: &dyn Observer
             at_nodes(s, rows, cols, &mut vectors, |d, _, frame| *d = frame.local_from_world(*d));
             rounded(&Relief { rows, cols, vectors }, step)
         };
-        let nodes = filter.scatter(&band);
+        let nodes = filter.base.scatter(&band);
         let maps: Vec<Relief> = surfaces.par_iter().zip(nodes.into_par_iter().zip(&shapes)).map(local).collect();
         for (rest, map) in rest.iter_mut().zip(&maps) {
             rest.vectors.iter_mut().zip(&map.vectors).for_each(|(a, b)| *a -= *b);

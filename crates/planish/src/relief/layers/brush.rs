@@ -1,7 +1,7 @@
 //! Strokes and stamps: heights along the normal, by distance in space, so that they go on over seams.
 
 use super::super::Relief;
-use super::ground::{Ground, Place};
+use super::ground::{Ground, Place, Texel};
 use super::projection::{Picture, Projection, Spot};
 use super::region::{Region, fade};
 use crate::relief::ReliefError;
@@ -135,11 +135,12 @@ impl Stamp {
         let image = Projection::new(ground, picture, &spot)?;
         let reach = image.reach();
         let near = |p: usize| comes_near(ground, p, &[image.middle], reach);
-        let height = |p: usize, k: usize| image.at(&ground.nodes[p][k]).into_iter().product::<f64>() * self.height;
+        let seen = |p: usize, node: &Texel| image.at(node, ground.spacings[p]);
+        let height = |p: usize, k: usize| seen(p, &ground.nodes[p][k]).into_iter().product::<f64>() * self.height;
         let mut maps = raised(ground, near, height);
         if self.replace {
             for (p, map) in maps.iter_mut().enumerate().filter(|(p, _)| near(*p)) {
-                let alphas: Vec<f64> = ground.nodes[p].iter().map(|node| image.at(node)[1]).collect();
+                let alphas: Vec<f64> = ground.nodes[p].iter().map(|node| seen(p, node)[1]).collect();
                 if alphas.iter().any(|&a| a > 0.0) && map.vectors.is_empty() {
                     map.vectors = vec![DVec3::ZERO; map.rows * map.cols];
                 }

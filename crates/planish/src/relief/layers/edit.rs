@@ -412,7 +412,7 @@ fn blurred(now: &Displaced, radius: f64, observer: &dyn Observer) -> Result<Vec<
     let shapes: Vec<[usize; 2]> = reliefs.iter().map(|r| [r.rows, r.cols]).collect();
     let filter = Filter::new(network, surfaces, &shapes, observer)?;
     let world: Vec<Vec<DVec3>> = surfaces.par_iter().zip(reliefs).map(|(s, r)| world_vectors(s, r)).collect();
-    let soft = filter.scatter(&filter.blur(&filter.gather(&world), radius, observer)?);
+    let soft = filter.base.scatter(&filter.blur(&filter.base.gather(&world), radius, observer)?);
     Ok(surfaces.par_iter().zip(shapes).zip(soft).map(|((s, shape), d)| from_world(s, shape, d)).collect())
 }
 

@@ -5,7 +5,8 @@
 //! `A = (M + t L)^-1 M`: its eigenvalues `s = 1 / (1 + t w^2)` lie in `(0, 1]` whatever the mesh, and at the cut-off
 //! `w = 2 pi / wavelength` is `s = 1/2` for `t = 1 / w^2`. A step at 1/2 as a sum of Chebyshev polynomials cuts there.
 
-use super::super::{PatchNodes, PatchedMesh, ReliefError, surface_patches};
+use super::super::laplacian::{at_least, elements};
+use super::super::{PatchedMesh, ReliefError, surface_patches};
 use crate::linalg::SparseCholesky;
 use crate::network::Network;
 use crate::observe::{Cancelled, Observer};
@@ -17,18 +18,14 @@ use std::f64::consts::{PI, TAU};
 const WIDTH: f64 = 0.03;
 /// Terms of the sum: beyond, a step of that width has nothing left above 1e-7.
 const TERMS: usize = 80;
-/// Least thickness of a triangle against its length, for its cotangents.
-const THINNEST: f64 = 1e-3;
 /// Longest standard deviation and cut-off in diagonals of the surface: the waves that fit on it are left to 1e-4 by one step of
 /// that smoother. Beyond, the masses would be lost in the rounding of the stiffnesses.
 const REACH: f64 = 30.0;
-/// Least mass of a vertex against the mean: vertices of collapsed cells have none of their own.
-const LEAST_MASS: f64 = 1e-9;
 
 /// The mesh of all patches with its masses and stiffnesses.
 pub struct Filter {
     /// The patches as one mesh.
-    pub(super) base: PatchedMesh,
+    pub base: PatchedMesh,
     mass: Vec<f64>,
     /// Lower triangle of the cotangent matrix.
     stiff: Vec<(usize, usize, f64)>,
@@ -47,43 +44,15 @@ impl Filter {
         let base = surface_patches(network, surfaces, shapes, observer)?;
         let mut mass = vec![0.0; base.mesh.points.len()];
         let mut stiff = Vec::new();
-        for patch in &base.patches {
-            let cols = patch.cols;
-            for cell in (0..patch.rows - 1).flat_map(|j| (0..cols - 1).map(move |i| j * cols + i)) {
-                let [a, b, c, d] = [cell, cell + 1, cell + cols + 1, cell + cols].map(|n| patch.vertices[n]);
-                // Both diagonals by halves: with one of them masses would depend on which.
-                for triangle in [[a, b, c], [a, c, d], [a, b, d], [b, c, d]] {
-                    add_half(&base.mesh.points, triangle, &mut mass, &mut stiff);
-                }
+        for element in elements(&base) {
+            element.vertices.iter().for_each(|&v| mass[v as usize] += element.mass);
+            for (i, j, w) in element.bonds() {
+                let (i, j) = (i as usize, j as usize);
+                stiff.extend([(i, i, w), (j, j, w), (i.max(j), i.min(j), -w)]);
             }
         }
-        let mean = mass.iter().sum::<f64>() / mass.len().max(1) as f64;
-        mass.iter_mut().for_each(|m| *m = m.max(LEAST_MASS * mean));
+        at_least(&mut mass);
         Ok(Filter { base, mass, stiff })
-    }
-
-    /// For each patch and node its number among `values` of [`Filter::gather`].
-    fn patches(&self) -> &[PatchNodes] {
-        &self.base.patches
-    }
-
-    /// Vectors of the nodes of all patches as vectors of the places; of several nodes at a place the first counts.
-    pub fn gather(&self, nodes: &[Vec<DVec3>]) -> Vec<DVec3> {
-        let mut values = vec![DVec3::NAN; self.mass.len()];
-        for (patch, vectors) in self.patches().iter().zip(nodes) {
-            for (&v, &d) in patch.vertices.iter().zip(vectors) {
-                let value = &mut values[v as usize];
-                if value.is_nan() {
-                    *value = d;
-                }
-            }
-        }
-        values
-    }
-
-    /// Vectors of the places as vectors of the nodes of all patches.
-    pub fn scatter(&self, values: &[DVec3]) -> Vec<Vec<DVec3>> {
-        self.patches().iter().map(|p| p.vertices.iter().map(|&v| values[v as usize]).collect()).collect()
     }
 
     /// Root mean square over the surface.
@@ -150,26 +119,6 @@ impl Filter {
     fn smooth(&self, smoother: &SparseCholesky, columns: &mut [f64]) {
         columns.iter_mut().zip(self.mass.iter().cycle()).for_each(|(y, m)| *y *= m);
         smoother.solve(columns);
-    }
-}
-
-/// Adds half a triangle to masses and cotangent matrix.
-fn add_half(points: &[DVec3], triangle: [u32; 3], mass: &mut [f64], stiff: &mut Vec<(usize, usize, f64)>) {
-    let [a, b, c] = triangle.map(|v| points[v as usize]);
-    let double = (b - a).cross(c - a).length();
-    triangle.iter().for_each(|&v| mass[v as usize] += double / 12.0);
-    // Slivers would have cotangents without end: here they are at least a thousandth as thick as they are long.
-    let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
-    let area = double.max(THINNEST * longest);
-    if area == 0.0 {
-        return;
-    }
-    for (k, (p, q, r)) in [(a, b, c), (b, c, a), (c, a, b)].into_iter().enumerate() {
-        let weight = (q - p).dot(r - p) / area / 4.0;
-        let (i, j) = (triangle[(k + 1) % 3] as usize, triangle[(k + 2) % 3] as usize);
-        if i != j {
-            stiff.extend([(i, i, weight), (j, j, weight), (i.max(j), i.min(j), -weight)]);
-        }
     }
 }
 

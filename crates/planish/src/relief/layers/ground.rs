@@ -42,6 +42,8 @@ pub struct Ground<'a> {
     /// For each patch and node its place on the surface and its frame.
     pub(super) nodes: Vec<Vec<Texel>>,
     pub(super) boxes: Vec<Aabb>,
+    /// Mean distance of neighbouring nodes of each patch, units of the model.
+    pub(super) spacings: Vec<f64>,
     seams: Vec<Vec<Member>>,
 }
 
@@ -72,7 +74,8 @@ impl<'a> Ground<'a> {
         };
         let nodes: Vec<Vec<(DVec3, Frame)>> = surfaces.par_iter().zip(&shapes).map(one).collect();
         let boxes = nodes.iter().map(|n| Aabb::of(n.iter().map(|(p, _)| p))).collect();
-        Ok(Ground { network, surfaces, shapes, nodes, boxes, seams })
+        let spacings = nodes.iter().zip(&shapes).map(|(nodes, &[rows, cols])| spacing(nodes, rows, cols)).collect();
+        Ok(Ground { network, surfaces, shapes, nodes, boxes, spacings, seams })
     }
 
     /// Point and normal of a place: of one in space, those of the nearest node.
@@ -174,4 +177,11 @@ impl<'a> Ground<'a> {
     pub(super) fn nothing(&self) -> Vec<Relief> {
         self.shapes.iter().map(|&[rows, cols]| Relief { rows, cols, vectors: Vec::new() }).collect()
     }
+}
+
+/// Mean distance of neighbouring nodes.
+fn spacing(nodes: &[Texel], rows: usize, cols: usize) -> f64 {
+    let along = nodes.chunks_exact(cols).flat_map(|row| row.windows(2).map(|w| w[0].0.distance(w[1].0)));
+    let across = nodes.iter().zip(nodes.iter().skip(cols)).map(|(a, b)| a.0.distance(b.0));
+    along.chain(across).sum::<f64>() / (rows * (cols - 1) + cols * (rows - 1)).max(1) as f64
 }

@@ -80,8 +80,8 @@ impl Region {
             let named = self.patches.is_empty() || self.patches.contains(&(p as u32));
             let inside = |node: &Texel| {
                 let near = ball.map_or(1.0, |middle| fade(self.radius - node.0.distance(middle), self.feather));
-                let shown =
-                    mask.as_ref().map_or(1.0, |mask| mask.at(node).into_iter().product::<f64>().clamp(0.0, 1.0));
+                let share = |mask: &Projection| mask.at(node, ground.spacings[p]).into_iter().product::<f64>();
+                let shown = mask.as_ref().map_or(1.0, |mask| share(mask).clamp(0.0, 1.0));
                 let within = if named { near * shown } else { 0.0 };
                 if self.outside { 1.0 - within } else { within }
             };
