@@ -74,7 +74,7 @@ fn counts_for_each_curve_are_held_against_the_network_before_the_fit() {
 fn a_missed_tolerance_and_a_missed_number_of_patches_name_the_limit_and_the_option_that_moves_it() {
     let folder = tempfile::tempdir().unwrap();
     // A wave that few control points cannot follow.
-    let (n, mut text) = (30, String::new());
+    let (n, mut text) = (12, String::new());
     let wave = |i: usize| (i as f64 * 1.9).sin() * 0.05;
     for j in 0..=n {
         for i in 0..=n {
