@@ -371,10 +371,11 @@ pub fn refit(
 /// that a bump sits wholly in the map.
 ///
 /// The grids are freed of the shorter waves over all patches at once ([`relief::long_waves`]), and the surfaces are fitted to what is
-/// left, with as many control points as it needs and no fewer than before. Edits of the relief stay as they are. On an error
-/// the model is what it was.
+/// left, with four to eight knot spans for each wave, by how many they had before. Edits of the relief stay as they are. On an
+/// error the model is what it was.
 /// # Errors
-/// As [`fit`]; [`ReliefError::Edit`] for a wavelength that the grids cannot carry, with the shortest that they can.
+/// As [`fit`]; [`ReliefError::Edit`] for a wavelength that the grids cannot carry, with the shortest that they can, and for one that
+/// is longer than the model.
 ///
 /// Source: [K98] §7.5 and fig. 7.2: a least-squares surface takes part of what seems detail.
 pub fn part_at(
@@ -396,9 +397,14 @@ pub fn part_at(
             format!("waves of {wavelength} are too short for the grids of the patches; the shortest is {shortest}");
         return Err(ReliefError::Edit { what }.into());
     }
+    let size = relief::diagonal(&model.surfaces);
+    if wavelength > size {
+        let what = format!("waves of {wavelength} are longer than the model ({size:.3})");
+        return Err(ReliefError::Edit { what }.into());
+    }
     let control = |side: &Side| {
-        let needed = spans(side).ceil().clamp(1.0, carried(side)) as usize + surface::FEWEST_CONTROL - 1;
-        needed.max(side.control)
+        let for_spans = |spans: f64| spans.ceil().clamp(1.0, carried(side)) as usize + surface::FEWEST_CONTROL - 1;
+        side.control.clamp(for_spans(spans(side)), for_spans(2.0 * spans(side)))
     };
     let control: Vec<usize> = sides.iter().map(control).collect();
     let counts = part_counts(&model.network, &sides, &control, wavelength);
@@ -433,7 +439,7 @@ fn part_counts(network: &Network, sides: &[Side], control: &[usize], wavelength:
     let mut of_chord = vec![0; chords.len()];
     for ((side, &control), &chord) in sides.iter().zip(control).zip(&chords) {
         let waves = (NODES_PER_WAVE * side.length / wavelength).ceil() as usize + 1;
-        let needed = waves.max(2 * control).min(side.nodes);
+        let needed = waves.max(control + 1).min(side.nodes);
         of_chord[chord as usize] = needed.max(of_chord[chord as usize]);
     }
     chords.iter().map(|&chord| of_chord[chord as usize]).collect()

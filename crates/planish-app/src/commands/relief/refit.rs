@@ -30,9 +30,8 @@ pub fn part(session: &Session, args: &ReliefPart) -> Result<Status, Failure> {
     let mut report = Report::new("relief part", files::model_facts(&args.model, &model, model.units));
     let before = rms(&model);
     let stages = pipeline::part_at(&mut model, wavelength, &params, &session.bars).map_err(|e| match e {
-        PipelineError::Relief(ReliefError::Edit { what }) => {
-            Failure::usage("--wavelength", what).hint("ask for longer ones")
-        }
+        PipelineError::Relief(ReliefError::Edit { what }) => Failure::usage("--wavelength", what)
+            .hint("give a length between what the grids carry and the size of the model"),
         e => pipeline_failure(&args.model, None, e),
     })?;
     let parameters = serde_json::json!({ "wavelength": wavelength }).to_string();
