@@ -56,7 +56,7 @@ pub fn elements(base: &PatchedMesh) -> impl Iterator<Item = Element> {
 }
 
 /// Gives masses that are none the least that counts as one.
-pub fn at_least(mass: &mut [f64]) {
+pub fn give_least_mass(mass: &mut [f64]) {
     let mean = mass.iter().sum::<f64>() / mass.len().max(1) as f64;
     mass.iter_mut().for_each(|m| *m = m.max(LEAST_MASS * mean));
 }

@@ -35,7 +35,7 @@ pub use quality::{
 };
 pub use retouch::retouch;
 pub use seam::{EDGE_ANGLE_DEG, EdgeInSeam, StitchParams, edges_in_seams, stitch, stitch_near};
-pub(crate) use sides::{check, node};
+pub(crate) use sides::{check, check_grids, node};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

@@ -5,7 +5,7 @@
 //! `A = (M + t L)^-1 M`: its eigenvalues `s = 1 / (1 + t w^2)` lie in `(0, 1]` whatever the mesh, and at the cut-off
 //! `w = 2 pi / wavelength` is `s = 1/2` for `t = 1 / w^2`. A step at 1/2 as a sum of Chebyshev polynomials cuts there.
 
-use super::super::laplacian::{at_least, elements};
+use super::super::laplacian::{elements, give_least_mass};
 use super::super::{PatchedMesh, ReliefError, surface_patches};
 use crate::linalg::SparseCholesky;
 use crate::network::Network;
@@ -51,7 +51,7 @@ impl Filter {
                 stiff.extend([(i, i, w), (j, j, w), (i.max(j), i.min(j), -w)]);
             }
         }
-        at_least(&mut mass);
+        give_least_mass(&mut mass);
         Ok(Filter { base, mass, stiff })
     }
 

@@ -18,7 +18,7 @@ const PASSES: usize = 3;
 /// Largest stiffness of a place against its mass: three of them follow each other in the energy and leave 4 of the 16 digits of a
 /// number. A place among 16 for each wave has 100; those that stand much closer, or in slivers, get more mass.
 const STIFFEST: f64 = 1e4;
-/// Residual against the right-hand side at which the solver stops.
+/// Residual against the right-hand side at which the solver stops: a millionth of the detail.
 const CONVERGED: f64 = 1e-6;
 /// Most steps of the solver. Its preconditioner is within a factor of 4 of the energy but along lines, so that 10 to 40 do.
 const MAX_STEPS: usize = 100;

@@ -3,13 +3,13 @@
 mod energy;
 
 use self::energy::{Energy, Pieces};
-use super::laplacian::{at_least, elements};
+use super::laplacian::{elements, give_least_mass};
 use super::{PatchedMesh, ReliefError, surface_patches};
 use crate::grid::Grid;
 use crate::network::{Network, Patch};
 use crate::observe::Observer;
 use crate::surface::basis::uniform_parameters;
-use crate::surface::{FEWEST_CONTROL, FitParams, KnotSpacing, Resolution, Surface, fit_network, node};
+use crate::surface::{FEWEST_CONTROL, FitParams, KnotSpacing, Resolution, Surface, check_grids, fit_network, node};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_4;
@@ -58,14 +58,8 @@ fn thinned(
     if grids.iter().zip(&shapes).all(|(g, s)| [g.rows, g.cols] == *s) {
         return Ok(grids.to_vec());
     }
-    let nodes = |curve: usize| {
-        let found = network.patches.iter().zip(grids).find_map(|(patch, g)| {
-            let k = patch.sides.iter().position(|side| side.curve as usize == curve)?;
-            Some(if k % 2 == 0 { g.cols } else { g.rows })
-        });
-        found.unwrap_or(FEWEST_CONTROL)
-    };
-    let control = |(curve, &count): (usize, &usize)| (count + FEWEST_CONTROL - 2).min(nodes(curve)).max(FEWEST_CONTROL);
+    let nodes = check_grids(network, grids)?;
+    let control = |(curve, &count): (usize, &usize)| (count + FEWEST_CONTROL - 2).min(nodes[curve]).max(FEWEST_CONTROL);
     let resolution = Resolution::PerCurve(counts.iter().enumerate().map(control).collect());
     let params = FitParams { resolution, smoothing: 0.0, knots: KnotSpacing::Even, ..FitParams::default() };
     let splines = fit_network(network, grids, &params, observer)?;
@@ -87,7 +81,7 @@ fn pieces(base: &PatchedMesh, lines: &[u32]) -> Pieces {
             pieces.inner.extend(element.bonds());
         }
     }
-    at_least(&mut pieces.mass);
+    give_least_mass(&mut pieces.mass);
     pieces
 }
 
@@ -140,7 +134,7 @@ impl Lines {
                 }
             }
         }
-        at_least(&mut pieces.mass);
+        give_least_mass(&mut pieces.mass);
         Lines { vertices, pieces }
     }
 }
