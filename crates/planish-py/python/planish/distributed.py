@@ -119,7 +119,8 @@ def mesh(
         bricks = Bricks.create(scan, place, columns=columns, classes=classes, close=close, **parameters)
         count = len(bricks)
         each: list[tuple[int, ...]] = [(k,) for k in range(count)]
-        for step, arguments in (("clean", each), ("settle", [()]), ("mesh", each)):
+        at_once: list[tuple[int, ...]] = [()]
+        for step, arguments in (("clean", each), ("settle", at_once), ("mesh", each)):
             _all(client, step, (place, _stamp()), arguments, progress)
         return bricks.weld()
 
@@ -128,7 +129,7 @@ def _all(
     client: Any,
     step: str,
     place: tuple[str, str],
-    arguments: list[tuple[int, ...]],
+    arguments: Sequence[tuple[int, ...]],
     progress: bool | Callable[[str, float], object],
 ) -> None:
     """One step of all bricks; the first that fails stops the others."""
