@@ -371,8 +371,8 @@ pub fn refit(
 /// that a bump sits wholly in the map.
 ///
 /// The grids are freed of the shorter waves over all patches at once ([`relief::long_waves`]), and the surfaces are fitted to what is
-/// left, with as many control points as it needs and no fewer than before. Edits of the relief stay as they are. On an error
-/// the model is what it was.
+/// left, with four to eight knot spans for each wave, by how many they had before. Edits of the relief stay as they are. On an
+/// error the model is what it was.
 /// # Errors
 /// As [`fit`]; [`ReliefError::Edit`] for a wavelength that the grids cannot carry, with the shortest that they can, and for one that
 /// is longer than the model.
@@ -403,8 +403,8 @@ pub fn part_at(
         return Err(ReliefError::Edit { what }.into());
     }
     let control = |side: &Side| {
-        let needed = spans(side).ceil().clamp(1.0, carried(side)) as usize + surface::FEWEST_CONTROL - 1;
-        needed.max(side.control)
+        let for_spans = |spans: f64| spans.ceil().clamp(1.0, carried(side)) as usize + surface::FEWEST_CONTROL - 1;
+        side.control.clamp(for_spans(spans(side)), for_spans(2.0 * spans(side)))
     };
     let control: Vec<usize> = sides.iter().map(control).collect();
     let counts = part_counts(&model.network, &sides, &control, wavelength);
@@ -433,14 +433,13 @@ const PART_SMOOTHING: f64 = 1e-3;
 /// Nodes for each of the shortest waves that are looked for: frequencies are known to a hundredth then.
 const NODES_PER_WAVE: f64 = 16.0;
 
-/// Nodes along each curve that waves are parted on: as many as waves need, two for each control point, and no more than the grids
-/// have.
+/// Nodes along each curve that waves are parted on: as many as waves and control points need, and no more than the grids have.
 fn part_counts(network: &Network, sides: &[Side], control: &[usize], wavelength: f64) -> Vec<usize> {
     let chords = network.chords();
     let mut of_chord = vec![0; chords.len()];
     for ((side, &control), &chord) in sides.iter().zip(control).zip(&chords) {
         let waves = (NODES_PER_WAVE * side.length / wavelength).ceil() as usize + 1;
-        let needed = waves.max(2 * control).min(side.nodes);
+        let needed = waves.max(control + 1).min(side.nodes);
         of_chord[chord as usize] = needed.max(of_chord[chord as usize]);
     }
     chords.iter().map(|&chord| of_chord[chord as usize]).collect()

@@ -3,12 +3,17 @@
 //! Pinkall and Polthier 1993, *Computing Discrete Minimal Surfaces and Their Conjugates*, for the weights.
 
 use super::PatchedMesh;
+use crate::linalg::SparseCholesky;
+use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 
 /// Least thickness of a triangle against its length, for its cotangents.
 const THINNEST: f64 = 1e-3;
 /// Least mass of a vertex against the mean: vertices of collapsed cells have none of their own.
 const LEAST_MASS: f64 = 1e-9;
+
+/// `(i, j, w)`: the energy `w (x_i - x_j)^2` between two vertices.
+pub type Bond = (u32, u32, f64);
 
 /// Half a triangle of a cell: each cell is parted along both diagonals, and both parts count by halves; with one of them
 /// masses would depend on which.
@@ -36,8 +41,8 @@ impl Element {
         }
     }
 
-    /// `(i, j, w)` for each edge: its energy is `w (x_i - x_j)^2`.
-    pub fn bonds(&self) -> impl Iterator<Item = (u32, u32, f64)> {
+    /// Of its edges.
+    pub fn bonds(&self) -> impl Iterator<Item = Bond> {
         let edges = (0..3).map(|k| (self.vertices[(k + 1) % 3], self.vertices[(k + 2) % 3], self.stiffness[k]));
         edges.filter(|&(i, j, w)| i != j && w != 0.0)
     }
@@ -59,4 +64,32 @@ pub fn elements(base: &PatchedMesh) -> impl Iterator<Item = Element> {
 pub fn give_least_mass(mass: &mut [f64]) {
     let mean = mass.iter().sum::<f64>() / mass.len().max(1) as f64;
     mass.iter_mut().for_each(|m| *m = m.max(LEAST_MASS * mean));
+}
+
+/// `M + t L` with masses and bonds, `t` in squares of length, factored.
+///
+/// * `rows` - of each vertex; `u32::MAX` for those whose values are given
+/// # Errors
+/// [`Cancelled`].
+pub fn smoother(
+    mass: &[f64],
+    bonds: &[Bond],
+    rows: &[u32],
+    time: f64,
+    observer: &dyn Observer,
+) -> Result<SparseCholesky, Cancelled> {
+    let row = |v: usize| (rows[v] != u32::MAX).then_some(rows[v] as usize);
+    let masses = mass.iter().enumerate().filter_map(|(v, &m)| row(v).map(|k| (k, k, m)));
+    let mut lower: Vec<(usize, usize, f64)> = masses.collect();
+    let size = lower.len();
+    for &(i, j, w) in bonds {
+        let [i, j] = [i, j].map(|v| row(v as usize));
+        lower.extend([i, j].into_iter().flatten().map(|k| (k, k, w * time)));
+        if let (Some(i), Some(j)) = (i, j) {
+            lower.push((i.max(j), i.min(j), -w * time));
+        }
+    }
+    let factored = SparseCholesky::factor_watched(size, lower, &|| observer.cancelled()).ok_or(Cancelled)?;
+    // Masses above 0 and a matrix that is never negative: it is positive.
+    Ok(factored.expect("a mass matrix with a Laplacian is positive definite"))
 }

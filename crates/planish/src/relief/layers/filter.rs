@@ -5,7 +5,7 @@
 //! `A = (M + t L)^-1 M`: its eigenvalues `s = 1 / (1 + t w^2)` lie in `(0, 1]` whatever the mesh, and at the cut-off
 //! `w = 2 pi / wavelength` is `s = 1/2` for `t = 1 / w^2`. A step at 1/2 as a sum of Chebyshev polynomials cuts there.
 
-use super::super::laplacian::{elements, give_least_mass};
+use super::super::laplacian::{Bond, elements, give_least_mass, smoother};
 use super::super::{PatchedMesh, ReliefError, surface_patches};
 use crate::linalg::SparseCholesky;
 use crate::network::Network;
@@ -27,8 +27,7 @@ pub struct Filter {
     /// The patches as one mesh.
     pub base: PatchedMesh,
     mass: Vec<f64>,
-    /// Lower triangle of the cotangent matrix.
-    stiff: Vec<(usize, usize, f64)>,
+    bonds: Vec<Bond>,
 }
 
 impl Filter {
@@ -43,16 +42,13 @@ impl Filter {
     ) -> Result<Filter, ReliefError> {
         let base = surface_patches(network, surfaces, shapes, observer)?;
         let mut mass = vec![0.0; base.mesh.points.len()];
-        let mut stiff = Vec::new();
+        let mut bonds = Vec::new();
         for element in elements(&base) {
             element.vertices.iter().for_each(|&v| mass[v as usize] += element.mass);
-            for (i, j, w) in element.bonds() {
-                let (i, j) = (i as usize, j as usize);
-                stiff.extend([(i, i, w), (j, j, w), (i.max(j), i.min(j), -w)]);
-            }
+            bonds.extend(element.bonds());
         }
         give_least_mass(&mut mass);
-        Ok(Filter { base, mass, stiff })
+        Ok(Filter { base, mass, bonds })
     }
 
     /// Root mean square over the surface.
@@ -108,12 +104,8 @@ impl Filter {
 
     fn smoother(&self, time: f64, observer: &dyn Observer) -> Result<SparseCholesky, Cancelled> {
         let time = time.min((REACH * self.base.mesh.bounds().diagonal()).powi(2));
-        let masses = self.mass.iter().enumerate().map(|(i, &m)| (i, i, m));
-        let lower = masses.chain(self.stiff.iter().map(|&(i, j, w)| (i, j, w * time))).collect();
-        let cancelled = || observer.cancelled();
-        let factor = SparseCholesky::factor_watched(self.mass.len(), lower, &cancelled).ok_or(Cancelled)?;
-        // Masses above 0 and a matrix that is never negative: it is positive.
-        Ok(factor.expect("a mass matrix with a Laplacian is positive definite"))
+        let rows: Vec<u32> = (0..self.mass.len() as u32).collect();
+        smoother(&self.mass, &self.bonds, &rows, time, observer)
     }
 
     fn smooth(&self, smoother: &SparseCholesky, columns: &mut [f64]) {
