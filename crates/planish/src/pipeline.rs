@@ -531,6 +531,10 @@ fn repair(input: &TriMesh, clock: &mut Clock) -> Result<(TriMesh, Repairs), Pipe
     Ok(clock.stage("repair", |o| mend::repair(input, o), |(mesh, _)| [("triangles", mesh.triangles.len())])?)
 }
 
+/// Patches that a layout is asked for at most; where more are wanted, each of fewer is divided. Layouts are made on a mesh of some
+/// thousand triangles, and its vertices are their corners: ten triangles are left for each patch then.
+const MOST_LAID: usize = 600;
+
 fn draw(
     input: &TriMesh,
     tags: Option<&FeatureTags>,
@@ -539,12 +543,26 @@ fn draw(
     clock: &mut Clock,
 ) -> Result<Layout, PipelineError> {
     let tagged = tags.map(|tags| tags.half_edges(input, mesh)).unwrap_or_default();
-    let counts = |laid: &Layout| [("patches", laid.network.patches.len())];
-    Ok(clock.stage(
-        "layout",
-        |o| layout::layout(mesh, Known { sharp: &tagged, ..Known::default() }, params, o),
-        counts,
-    )?)
+    let lay = |params: &LayoutParams, o: &dyn Observer| {
+        layout::layout(mesh, Known { sharp: &tagged, ..Known::default() }, params, o)
+    };
+    let laid = |o: &dyn Observer| -> Result<Layout, PipelineError> {
+        let by = (params.patches as f64 / MOST_LAID as f64).sqrt().ceil() as usize;
+        if by > 1 && !params.coarsest {
+            let fewer = LayoutParams { patches: params.patches / (by * by), ..params.clone() };
+            let Layout { network, method } = lay(&fewer, &Part::new(o, 0.0, 0.6))?;
+            match grid::divide(mesh, &network, by, &GridParams::default(), &Part::new(o, 0.6, 0.4)) {
+                Ok(network) if layout::count_is_near(network.patches.len(), params.patches) => {
+                    return Ok(Layout { network, method });
+                }
+                Err(e) if Cancelled::is_cause_of(&e) => return Err(Cancelled.into()),
+                // Where a grid is folded its curves cross.
+                _ => {}
+            }
+        }
+        Ok(lay(params, o)?)
+    };
+    clock.stage("layout", laid, |laid| [("patches", laid.network.patches.len())])
 }
 
 /// The stages from the grids to the reliefs.

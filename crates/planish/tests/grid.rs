@@ -7,9 +7,12 @@ mod patches;
 
 use glam::{DQuat, DVec3};
 use patches::{Sheet, cut, ears, sheet, sheets, snouts, two_triangles};
-use planish::grid::{Grid, GridError, GridParams, choose_sizes, measure, relax};
+use planish::grid::{Grid, GridError, GridParams, choose_sizes, divide, measure, relax};
+use planish::layout::{Known, LayoutParams, count_is_near, layout};
 use planish::mesh::{FacePoint, TriMesh};
-use planish::network::{Corner, Curve, CurveKind, Network, Patch, Side};
+use planish::network::{Corner, Curve, CurveKind, Network, Patch, Side, imprint};
+use planish::pipeline;
+use planish::synthetic::shapes;
 use planish::{Observer, Silent};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -316,4 +319,47 @@ fn disks_cut_from_scans_give_grids_on_the_mesh() {
         println!("{file}: {} disks, {folds} folds", disks.len());
         assert_eq!(folds, 0, "{file}");
     }
+}
+
+#[test]
+fn a_box_divided_by_3_has_54_patches_with_corners_at_thirds_of_its_sides_within_1e_4() {
+    let size = DVec3::new(3.0, 6.0, 9.0);
+    let mesh = shapes::cuboid(size, 10);
+    let network = layout(&mesh, Known::default(), &LayoutParams::default(), &Silent).unwrap().network;
+    assert_eq!(network.patches.len(), 6);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| divide(&mesh, &network, 3, &GridParams::default(), &Silent).unwrap())
+    };
+    let divided = run(1);
+    assert_eq!(divided, run(4));
+    assert_eq!([divided.corners.len(), divided.curves.len(), divided.patches.len()], [56, 108, 54]);
+    assert_eq!(divided.curves.iter().filter(|c| c.kind == CurveKind::Feature).count(), 36);
+    let low = mesh.bounds().min;
+    for corner in &divided.corners {
+        let thirds = (corner.place.position(&mesh) - low) / size * 3.0;
+        assert!(thirds.distance(thirds.round()) < 1e-4, "{thirds}");
+    }
+    for patch in imprint(&mesh, &divided, &Silent).unwrap() {
+        let sides = patch.mesh.bounds().max - patch.mesh.bounds().min;
+        let area: f64 = (0..patch.mesh.triangles.len()).map(|f| patch.mesh.area(f)).sum();
+        let flat = [sides.x * sides.y, sides.y * sides.z, sides.z * sides.x].iter().sum::<f64>();
+        assert!((area / flat - 1.0).abs() < 1e-3, "{area} of {flat}");
+    }
+    assert_eq!(divide(&mesh, &network, 1, &GridParams::default(), &Silent).unwrap(), network);
+}
+
+#[test]
+fn regress_2000_patches_on_a_ball_follow_its_form_and_their_number_is_kept() {
+    // They are more than the working mesh of a layout has room for: it took minutes, and they were even cells with any angles.
+    let mesh = shapes::sphere(1.0, 6);
+    let params = LayoutParams { patches: 2000, ..LayoutParams::default() };
+    let drafted = pipeline::layout(&mesh, None, &params, &Silent).unwrap();
+    let found = drafted.network.patches.len();
+    assert!(count_is_near(found, 2000), "{found}");
+    assert_eq!(drafted.warnings.len(), 0, "{:?}", drafted.warnings);
+    let mut ends = vec![0; drafted.network.corners.len()];
+    drafted.network.curves.iter().flat_map(|c| c.corners).for_each(|c| ends[c as usize] += 1);
+    assert_eq!(ends.iter().filter(|n| **n != 4).count(), 8, "a ball has eight corners with three patches");
+    imprint(&drafted.mesh, &drafted.network, &Silent).unwrap();
 }

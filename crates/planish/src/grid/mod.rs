@@ -15,6 +15,7 @@
 //! replaced, and aspect ratios are those of chords: `docs/methods/grids.md`.
 
 mod chart;
+mod divide;
 mod feature;
 mod follow;
 mod net;
@@ -23,6 +24,7 @@ mod resample;
 mod side;
 mod sizes;
 
+pub use divide::{DivideError, divide};
 pub use feature::curve::{FeatureGrid, Sections, relax_with_features};
 pub use feature::network::{Drawn, check_features, family_of, relax_network};
 pub use feature::{Family, FeatureCurve, FeatureError};

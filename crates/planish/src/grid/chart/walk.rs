@@ -20,6 +20,30 @@ impl Chart {
     /// Visits the surface along the straight segment from `p` (in triangle `start`) to `q` in the square: calls
     /// `visit` with the fraction of the segment and the position wherever it crosses an edge, ends excluded.
     pub fn trace(&self, p: DVec2, start: u32, q: DVec2, visit: &mut dyn FnMut(f64, DVec3)) {
+        self.cross(p, start, q, &mut |fraction, h, w| {
+            let [a, b] = [h, next(h)].map(|h| self.points[self.tail(h) as usize]);
+            visit(fraction, a.lerp(b, w));
+        });
+    }
+
+    /// The spots where the straight segment from `p` (in triangle `start`) to `q` in the square crosses edges, in their order.
+    pub fn crossings(&self, p: DVec2, start: u32, q: DVec2) -> Vec<Spot> {
+        let mut spots = Vec::new();
+        self.cross(p, start, q, &mut |_, h, w| {
+            let mut bary = [0.0; 3];
+            bary[h as usize % 3] = 1.0 - w;
+            bary[next(h) as usize % 3] = w;
+            spots.push(Spot { triangle: h / 3, bary });
+        });
+        spots
+    }
+
+    fn tail(&self, h: u32) -> u32 {
+        self.triangles[h as usize / 3][h as usize % 3]
+    }
+
+    /// Calls `visit` with the fraction of the segment, the half-edge that it crosses, and the share of that.
+    fn cross(&self, p: DVec2, start: u32, q: DVec2, visit: &mut dyn FnMut(f64, u32, f64)) {
         let line = q - p;
         let square = line.length_squared();
         if square == 0.0 {
@@ -31,7 +55,7 @@ impl Chart {
             let (a, b) = (t[h as usize % 3], t[next(h) as usize % 3]);
             orientation(self.uv[a as usize], self.uv[b as usize], q) < 0.0
         };
-        let tail = |h: u32| self.triangles[h as usize / 3][h as usize % 3];
+        let tail = |h: u32| self.tail(h);
         let mut out = NONE;
         for h in 3 * start..3 * start + 3 {
             if beyond(h) && side(tail(h)) <= 0.0 && side(tail(next(h))) >= 0.0 {
@@ -47,7 +71,7 @@ impl Chart {
             let w = if above > below { (-below / (above - below)).clamp(0.0, 1.0) } else { 0.5 };
             let at = self.uv[a as usize].lerp(self.uv[b as usize], w);
             let fraction = (at - p).dot(line) / square;
-            visit(fraction.clamp(0.0, 1.0), self.points[a as usize].lerp(self.points[b as usize], w));
+            visit(fraction.clamp(0.0, 1.0), out, w);
             let entered = self.opposite[out as usize];
             if entered == NONE {
                 return;
