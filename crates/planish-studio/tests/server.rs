@@ -118,7 +118,7 @@ fn two_pages_have_one_history_and_a_restart_has_it_again() {
         }
     });
     server.end();
-    assert!(!folder.path().join("sphere.planish-journal").exists());
+    assert!(!folder.path().join("sphere.planish-edits").exists());
     let again = Server::start(folder.path(), Some(file));
     run(async {
         let mut page = again.connect().await;

@@ -207,7 +207,7 @@ describe.skipIf(!chromiumPath)('the studio', () => {
   it('ends by Ctrl-C with its work in the file and nothing beside it', async () => {
     expect(await program.end()).toBe(0);
     expect(existsSync(join(program.folder, 'ball.planish'))).toBe(true);
-    expect(existsSync(join(program.folder, 'ball.planish-journal'))).toBe(false);
+    expect(existsSync(join(program.folder, 'ball.planish-edits'))).toBe(false);
     await program.start('ball.planish');
   });
 });

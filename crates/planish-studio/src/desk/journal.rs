@@ -23,9 +23,10 @@ pub struct Journal {
     path: PathBuf,
 }
 
-/// The journal beside a project file.
+/// The journal beside a project file. Names that SQLite gives to files of its own would not do: it takes `x.planish-journal` for the
+/// rest of an unfinished transaction of `x.planish`, and refuses to read that or removes it.
 pub fn path_of(file: &Path) -> PathBuf {
-    file.with_extension("planish-journal")
+    file.with_extension("planish-edits")
 }
 
 impl Journal {
@@ -115,6 +116,7 @@ impl Fnv {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use planish::Model;
 
     #[test]
     fn edits_after_the_state_of_the_file_come_back_and_a_line_cut_off_does_not() {
@@ -129,5 +131,19 @@ mod tests {
         let text = std::fs::read_to_string(path_of(&folder.path().join("a.planish"))).unwrap();
         std::fs::write(path_of(&folder.path().join("a.planish")), &text[..text.len() - 9]).unwrap();
         assert_eq!(journal.lost(1), [edit(1), edit(2)]);
+    }
+
+    #[test]
+    fn regress_the_journal_outlives_the_writing_and_reading_of_its_project_file() {
+        // It was named as SQLite names a journal of its own: each save removed it, and a file beside it could not be read.
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a.planish");
+        let model = Model { mesh: planish::synthetic::shapes::sphere(1.0, 2), ..Model::default() };
+        planish_io::write_model(&file, &model).unwrap();
+        let (journal, edit) = (Journal::new(&file), serde_json::from_str(r#"{"edit":"undo"}"#).unwrap());
+        journal.add(&edit, 1, 2);
+        assert_eq!(planish_io::read_model(&file).unwrap().mesh, model.mesh);
+        planish_io::write_model(&file, &model).unwrap();
+        assert_eq!(journal.lost(1), [edit]);
     }
 }
