@@ -8,7 +8,7 @@ use planish::contour::{ContourError, MeshingError};
 use planish::curve::CurveError;
 use planish::edit::ApplyError;
 use planish::field::{FieldError, FormulaError, LatticeError};
-use planish::grid::{FeatureError, GridError};
+use planish::grid::{DivideError, FeatureError, GridError};
 use planish::layout::LayoutError;
 use planish::mesh::{CompareError, DecimateError, MeshError, SmoothError};
 use planish::network::ImprintError;
@@ -87,6 +87,16 @@ impl Told for MeshingError {
             MeshingError::Field(e) => e.exception(message),
             MeshingError::Contour(e) => e.exception(message),
             MeshingError::Level { .. } => class::ContourError::new_err(message),
+        }
+    }
+}
+
+impl Told for DivideError {
+    fn exception(&self, message: String) -> PyErr {
+        match self {
+            DivideError::Imprint(e) => e.exception(message),
+            DivideError::Grid(e) => e.exception(message),
+            DivideError::Cancelled(_) => class::Error::new_err(message),
         }
     }
 }

@@ -6,15 +6,20 @@ use crate::params::{Given, pipeline_params};
 use crate::surface::PyGrid;
 use crate::{array, json, watch};
 use numpy::{PyArray1, PyArray2};
+use planish::DVec3;
 use planish::curve::SurfaceCurve;
+use planish::grid::{self, GridParams};
 use planish::network::{CurveKind, Network, diagnose, imprint};
 use planish::pipeline::{self, PipelineError, PipelineParams};
-use planish::{DVec3, grid};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
+
+/// A patch is divided into this many along a side at most: grids have no more cells.
+const MOST_DIVISIONS: usize = 128;
 
 /// What is left to do until a network is finished, as a dict: `finished`, and `faults` as texts.
 pub fn told_faults<'py>(py: Python<'py>, body: &Body, network: &Network) -> PyResult<Bound<'py, PyAny>> {
@@ -139,6 +144,20 @@ impl PyNetwork {
             Ok(grid::resample(mesh, network, &patches, (&[], &[]), &params, o.one())?)
         })?;
         Ok(grids.into_iter().map(PyGrid::new).collect())
+    }
+
+    /// The network with `by` times `by` patches in the place of each, which meet along the rows and columns of its grid. What curves
+    /// follow stays. Raises ValueError, NetworkError, GridError.
+    ///
+    /// Source: docs/methods/layout.md, "Many patches".
+    #[pyo3(signature = (by=2, *, progress=None))]
+    fn divided(&self, py: Python, by: usize, progress: Option<&Bound<PyAny>>) -> PyResult<PyNetwork> {
+        if !(1..=MOST_DIVISIONS).contains(&by) {
+            return Err(PyValueError::new_err(format!("by={by}: 1 to {MOST_DIVISIONS} are possible")));
+        }
+        let (mesh, params) = (&self.body.mesh, GridParams::default());
+        let divide = |o: &dyn watch::Both| grid::divide(mesh, &self.network, by, &params, o.one());
+        Ok(PyNetwork::new(self.body.clone(), watch::run(py, "divide", progress, divide)?, json!({})))
     }
 
     /// Grids, surfaces, seams and reliefs on this network: a model. Raises the error of the first stage that fails.

@@ -169,6 +169,16 @@ def test_fits_on_grids_made_one_by_one_are_those_of_the_network(box: planish.Mes
     assert network.fit(control=[6, 5]).quality["surface.max_rel"] < 1e-9
 
 
+def test_a_box_is_divided_into_four_patches_a_side_and_fits_as_before(box: planish.Mesh) -> None:
+    network = box.layout(patches=6)
+    finer = network.divided()
+    assert len(finer.patches) == 24 and finer.diagnose()["finished"] and finer.curve_kinds.count("feature") == 24
+    assert np.allclose(network.divided(1).corners, network.corners)
+    assert finer.fit(control=[4, 4]).quality["surface.max_rel"] < 1e-9
+    with pytest.raises(ValueError, match="by=0: 1 to 128 are possible"):
+        network.divided(0)
+
+
 def test_a_project_keeps_figures_and_history_and_edits_can_be_taken_back(box: planish.Mesh, tmp_path: Path) -> None:
     drawn = box.model(units="cm")
     assert not drawn.diagnose()["finished"]

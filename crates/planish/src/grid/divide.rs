@@ -32,9 +32,10 @@ pub enum DivideError {
     Cancelled(#[from] Cancelled),
 }
 
-/// A network with `by` times `by` patches in the place of each.
+/// A network with `by` times `by` patches in the place of each, in their order.
 ///
 /// Curves keep what they follow; the new ones between are smooth.
+/// * `params` - how square and how straight cells are; their number is given
 /// # Errors
 /// See [`DivideError`].
 pub fn divide(
@@ -50,7 +51,7 @@ pub fn divide(
     let adjacency = Adjacency::new(mesh);
     let patches = imprint(mesh, network, &Part::new(observer, 0.0, 0.1))?;
     let mut divided = Network { corners: network.corners.clone(), ..Network::default() };
-    let halves: Vec<Pieces> =
+    let sides: Vec<Pieces> =
         network.curves.iter().map(|curve| pieces(mesh, &adjacency, curve, by, &mut divided)).collect();
     let part = Part::new(observer, 0.1, 0.7);
     let done = AtomicUsize::new(0);
@@ -62,7 +63,7 @@ pub fn divide(
     };
     let lattices: Vec<Result<Lattice, GridError>> = patches.par_iter().with_max_len(1).enumerate().map(drawn).collect();
     for (patch, lattice) in network.patches.iter().zip(lattices) {
-        lattice?.put(mesh, patch, &halves, &mut divided);
+        lattice?.put(mesh, patch, &sides, &mut divided);
     }
     imprint(mesh, &divided, &Part::new(observer, 0.8, 0.2))?;
     Ok(divided)
