@@ -18,7 +18,7 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A patch is divided into this many along a side at most: grids have no more cells.
+/// A patch is divided into this many along a side at most: with eight cells each, its grid has the longest sides there are.
 const MOST_DIVISIONS: usize = 128;
 
 /// What is left to do until a network is finished, as a dict: `finished`, and `faults` as texts.

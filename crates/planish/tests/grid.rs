@@ -351,7 +351,7 @@ fn a_box_divided_by_3_has_54_patches_with_corners_at_thirds_of_its_sides_within_
 
 #[test]
 fn regress_2000_patches_on_a_ball_follow_its_form_and_their_number_is_kept() {
-    // They are more than the working mesh of a layout has room for: it took minutes, and they were even cells with any angles.
+    // They are more than the working mesh of a layout has room for.
     let mesh = shapes::sphere(1.0, 6);
     let params = LayoutParams { patches: 2000, ..LayoutParams::default() };
     let drafted = pipeline::layout(&mesh, None, &params, &Silent).unwrap();

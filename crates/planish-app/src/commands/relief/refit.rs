@@ -31,7 +31,7 @@ pub fn part(session: &Session, args: &ReliefPart) -> Result<Status, Failure> {
     let before = rms(&model);
     let stages = pipeline::part_at(&mut model, wavelength, &params, &session.bars).map_err(|e| match e {
         PipelineError::Relief(ReliefError::Edit { what }) => Failure::usage("--wavelength", what)
-            .hint("give a length between what the grids carry and the size of the model"),
+            .hint("give a length between what the grids carry and the size of the model; mend folded patches first"),
         e => pipeline_failure(&args.model, None, e),
     })?;
     let parameters = serde_json::json!({ "wavelength": wavelength }).to_string();
