@@ -1,6 +1,6 @@
 //! NumPy arrays in and out.
 //!
-//! In: C-contiguous `float64` (or `uint32` for triangles) is read where it lies; other layouts and dtypes of numbers are
+//! In: C-contiguous, aligned `float64` (or `uint32` for triangles) is read where it lies; other layouts and dtypes of numbers are
 //! converted once; what is no array of numbers, or has another shape, is refused with its name, shape and dtype.
 //! Out: results are moved to NumPy; arrays that an object keeps are shown as read-only views (`view`).
 
@@ -22,7 +22,7 @@ pub struct Read<'py, T: Element> {
 impl<T: Element> Read<'_, T> {
     /// The numbers.
     pub fn flat(&self) -> &[T] {
-        // Contiguous by `read`.
+        // Contiguous and aligned by `read`.
         self.array.as_slice().unwrap_or_default()
     }
 
@@ -62,7 +62,7 @@ fn read<'py, T: Element>(
         found.len() == shape.len() && found.iter().zip(shape).all(|(&n, &wanted)| wanted == 0 || n == wanted)
     };
     let array = match any.cast::<PyArrayDyn<T>>() {
-        Ok(array) if array.is_c_contiguous() => array.clone(),
+        Ok(array) if array.is_c_contiguous() && aligned(array)? => array.clone(),
         _ => {
             let raw = numpy()?
                 .call_method1("asarray", (any,))
@@ -79,15 +79,18 @@ fn read<'py, T: Element>(
             if !fits(&found) {
                 return Err(wrong_shape(name, &found, shape));
             }
-            let options = PyDict::new(py);
-            options.set_item("dtype", dtype)?;
-            numpy()?.call_method("ascontiguousarray", (raw,), Some(&options))?.cast_into::<PyArrayDyn<T>>()?
+            numpy()?.call_method1("require", (raw, dtype, ["C", "A"]))?.cast_into::<PyArrayDyn<T>>()?
         }
     };
     if !fits(array.shape()) {
         return Err(wrong_shape(name, array.shape(), shape));
     }
     Ok(Read { array: array.try_readonly()? })
+}
+
+/// Whether each number lies where the processor wants it: a view of bytes, or an array sent by another process, may lie between.
+fn aligned<T: Element>(array: &Bound<'_, PyArrayDyn<T>>) -> PyResult<bool> {
+    array.getattr("flags")?.getattr("aligned")?.extract()
 }
 
 fn wrong_shape(name: &str, found: &[usize], wanted: &[usize]) -> PyErr {

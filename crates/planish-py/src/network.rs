@@ -6,17 +6,22 @@ use crate::params::{Given, pipeline_params};
 use crate::surface::PyGrid;
 use crate::{array, json, watch};
 use numpy::{PyArray1, PyArray2};
-use planish::DVec3;
 use planish::curve::SurfaceCurve;
-use planish::grid::{self, GridParams};
+use planish::grid::{self, FeatureError, Grid, GridParams, Relaxer};
 use planish::network::{CurveKind, Network, diagnose, imprint};
 use planish::pipeline::{self, PipelineError, PipelineParams};
+use planish::{DVec3, Observer};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyCFunction, PyDict};
 use serde_json::json;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// Time between two looks whether the result is still wanted.
+const LOOK: Duration = Duration::from_millis(20);
 
 /// A patch is divided into this many along a side at most: with eight cells each, its grid has the longest sides there are.
 const MOST_DIVISIONS: usize = 128;
@@ -160,22 +165,78 @@ impl PyNetwork {
         Ok(PyNetwork::new(self.body.clone(), watch::run(py, "divide", progress, divide)?, json!({})))
     }
 
-    /// Grids, surfaces, seams and reliefs on this network: a model. Raises the error of the first stage that fails.
+    /// Grids of some patches, of given sizes: what `fit` asks `relax` for. Raises ValueError, NetworkError, GridError.
+    ///
+    /// * patches: (n,), rising
+    /// * sizes: (n, 2), points of each along u and v
+    #[pyo3(signature = (patches, sizes, *, progress=None, **parameters))]
+    fn relax(
+        &self,
+        py: Python,
+        patches: &Bound<PyAny>,
+        sizes: &Bound<PyAny>,
+        progress: Option<&Bound<PyAny>>,
+        parameters: Option<&Bound<PyDict>>,
+    ) -> PyResult<Vec<PyGrid>> {
+        let mut given = Given::new("Network.relax", parameters)?;
+        let params: GridParams = given.take()?;
+        given.done()?;
+        let count = self.network.patches.len();
+        let column = py.import("numpy")?.call_method1("reshape", (patches, (-1, 1)))?;
+        let which: Vec<usize> =
+            array::indices::<1>(&column, "patches", count)?.into_iter().map(|[p]| p as usize).collect();
+        let given = array::indices::<2>(sizes, "sizes", params.max_side + 1)?;
+        if given.len() != which.len() || !which.is_sorted_by(|a, b| a < b) {
+            return Err(PyValueError::new_err("patches, sizes: patches rise, and each has one size"));
+        }
+        let mut sizes = vec![(2, 2); count];
+        which.iter().zip(given).for_each(|(&p, [cols, rows])| sizes[p] = (cols as usize, rows as usize));
+        let (input, network) = (&self.body.mesh, &self.network);
+        let grids = watch::run(py, "grids", progress, |o| -> Result<_, PipelineError> {
+            let patches = match self.patches.get() {
+                Some(patches) => patches,
+                None => {
+                    let made = imprint(input, network, o.one())?;
+                    self.patches.get_or_init(|| made)
+                }
+            };
+            let here = grid::Here { input, network, patches, drawn: (&[], &[]), params: &params };
+            Ok(here.relax(&which, &sizes, o.one())?)
+        })?;
+        Ok(grids.into_iter().map(PyGrid::new).collect())
+    }
+
+    /// Grids, surfaces, seams and reliefs on this network: a model. Raises the error of the first stage that fails, and what `relax`
+    /// raises.
     ///
     /// * tolerance, control, per_curve: how fine the surfaces are; one of them
-    #[pyo3(signature = (*, units="mm", progress=None, **parameters))]
+    /// * relax: called for grids of some patches in the place of `Network.relax`, as `relax(patches, sizes, stopped)`, and returns
+    ///   them; other processes may make them. `stopped()` is True once the result is no longer wanted
+    #[pyo3(signature = (*, units="mm", relax=None, progress=None, **parameters))]
     fn fit(
         &self,
         py: Python,
         units: &str,
+        relax: Option<Bound<PyAny>>,
         progress: Option<&Bound<PyAny>>,
         parameters: Option<&Bound<PyDict>>,
     ) -> PyResult<PyModel> {
         let params = pipeline_params("Network.fit", PipelineParams::default(), parameters)?;
         let units = crate::words::units(units)?;
-        let network = self.network.clone();
-        let fit = |o: &dyn watch::Both| pipeline::fit(&self.body.mesh, None, Some(network), &params, o.run());
-        PyModel::fitted(watch::run(py, "fit", progress, fit)?, &params, units)
+        let (mesh, network) = (&self.body.mesh, self.network.clone());
+        let fitted = match relax {
+            None => watch::run(py, "fit", progress, |o| pipeline::fit(mesh, None, Some(network), &params, o.run()))?,
+            Some(relax) => {
+                let others = Others { relax: relax.unbind(), raised: Mutex::new(None) };
+                let fit = |o: &dyn watch::Both| pipeline::fit_by(&others, mesh, network, &params, o.run());
+                watch::run(py, "fit", progress, fit).map_err(|e| others.raised().unwrap_or(e))?
+            }
+        };
+        PyModel::fitted(fitted, &params, units)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        crate::neighbour::of(slf.as_any(), "planish._pickle", "network")
     }
 
     fn __repr__(&self) -> String {
@@ -200,6 +261,62 @@ impl PyNetwork {
         let view = crate::picture::View::of(eye, up)?;
         let lines = crate::picture::lines(&self.body.mesh, &self.network);
         crate::picture::draw(py, &self.body.mesh, lines, &view, [width, height])
+    }
+}
+
+/// A function written in Python that relaxes patches. What it raises is kept.
+struct Others {
+    relax: Py<PyAny>,
+    raised: Mutex<Option<PyErr>>,
+}
+
+impl Others {
+    fn raised(&self) -> Option<PyErr> {
+        self.raised.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}
+
+impl Relaxer for Others {
+    fn relax(
+        &self,
+        which: &[usize],
+        sizes: &[(usize, usize)],
+        observer: &dyn Observer,
+    ) -> Result<Vec<Grid>, FeatureError> {
+        let stopped = Arc::new(AtomicBool::new(false));
+        let ask = |py: Python| -> PyResult<Vec<Grid>> {
+            let patches = PyArray1::from_iter(py, which.iter().map(|&p| p as u32));
+            let sizes = which.iter().map(|&p| [sizes[p].0 as u32, sizes[p].1 as u32]).collect();
+            let flag = stopped.clone();
+            let stopped = PyCFunction::new_closure(py, None, None, move |_, _| flag.load(Ordering::Relaxed))?;
+            let made = self.relax.bind(py).call1((patches, array::rows(py, sizes)?, stopped))?;
+            made.try_iter()?.map(|grid| Ok(grid?.cast::<PyGrid>()?.get().grid.clone())).collect()
+        };
+        let done = AtomicBool::new(false);
+        let answer = std::thread::scope(|scope| {
+            // Python asks the flag, and the flag asks the observer.
+            scope.spawn(|| {
+                while !done.load(Ordering::Relaxed) {
+                    stopped.store(observer.cancelled(), Ordering::Relaxed);
+                    std::thread::sleep(LOOK);
+                }
+            });
+            let answer = Python::attach(ask);
+            done.store(true, Ordering::Relaxed);
+            answer
+        });
+        observer.check().map_err(grid::GridError::from)?;
+        let wrong = |what: String| FeatureError::Elsewhere { what };
+        let grids = answer.map_err(|error| {
+            let told = wrong(error.to_string());
+            *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+            told
+        })?;
+        let fits = |(&p, g): (&usize, &Grid)| (g.cols, g.rows) == sizes[p];
+        if grids.len() != which.len() || !which.iter().zip(&grids).all(fits) {
+            return Err(wrong(format!("relax returned no grids of the sizes of the {} patches", which.len())));
+        }
+        Ok(grids)
     }
 }
 

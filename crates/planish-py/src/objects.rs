@@ -8,7 +8,7 @@ use planish::curve::SurfaceCurve;
 use planish::geom::{Bvh, FacePoint};
 use planish::mesh::{Adjacency, FeatureTags, TriMesh};
 use planish::model::{HistoryEntry, Model};
-use planish::network::Network;
+use planish::network::{Network, PatchMesh};
 use planish::pipeline::{Assessed, Fitted, PipelineParams};
 use pyo3::prelude::*;
 use serde_json::{Value, json};
@@ -126,12 +126,14 @@ pub struct PyNetwork {
     pub network: Network,
     /// What the stage that made it tells.
     pub facts: Value,
+    /// Its patches, once some of them were relaxed.
+    pub patches: OnceLock<Vec<PatchMesh>>,
 }
 
 impl PyNetwork {
     /// A network on a mesh.
     pub fn new(body: Arc<Body>, network: Network, facts: Value) -> PyNetwork {
-        PyNetwork { body, network, facts }
+        PyNetwork { body, network, facts, patches: OnceLock::new() }
     }
 }
 

@@ -5,6 +5,7 @@ use crate::objects::PyMesh;
 use crate::{array, json, neighbour, view, watch};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use planish::DVec3;
+use planish::geom::FacePoint;
 use planish::grid::Grid;
 use planish::relief::{self, Relief};
 use planish::surface::basis::uniform_knots;
@@ -17,10 +18,16 @@ use serde_json::json;
 
 /// A patch resampled to a regular grid of points on the mesh.
 ///
-/// Made by `Network.grids` and `Model.grids`. `points[j, i]` has `i` along u and `j` along v.
+/// Grid(points, *, face, bary)
+///
+/// * points: (rows, cols, 3); `points[j, i]` has `i` along u and `j` along v
+/// * face, bary: the same points as places on the mesh, row by row, (rows * cols,) uint32 and (rows * cols, 3); see `places`
+///
+/// Made by `Network.grids` and `Model.grids`, too.
 #[pyclass(frozen, module = "planish", name = "Grid")]
 pub struct PyGrid {
-    grid: Grid,
+    /// The grid.
+    pub grid: Grid,
 }
 
 impl PyGrid {
@@ -32,6 +39,30 @@ impl PyGrid {
 
 #[pymethods]
 impl PyGrid {
+    #[new]
+    #[pyo3(signature = (points, *, face, bary))]
+    fn py_new(points: &Bound<PyAny>, face: &Bound<PyAny>, bary: &Bound<PyAny>) -> PyResult<PyGrid> {
+        let read = array::reals(points, "points", &[0, 0, 3])?;
+        array::finite(read.flat(), "points", 3)?;
+        let (rows, cols) = (read.shape()[0], read.shape()[1]);
+        if rows < 2 || cols < 2 {
+            return Err(PyValueError::new_err(format!("points: {rows} x {cols} are no grid; give at least 2 x 2")));
+        }
+        let face = face.call_method1("reshape", ((-1, 1),))?;
+        let face = array::indices::<1>(&face, "face", u32::MAX as usize)?;
+        let bary = array::reals(bary, "bary", &[rows * cols, 3])?;
+        if face.len() != rows * cols {
+            return Err(PyValueError::new_err(format!("face: {} are needed, not {}", rows * cols, face.len())));
+        }
+        let place = |([face], &bary): (&[u32; 1], &[f64; 3])| FacePoint { face: *face, bary };
+        let places = face.iter().zip(bary.rows::<3>()).map(place).collect();
+        Ok(PyGrid::new(Grid { rows, cols, points: read.vectors(), places }))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        neighbour::of(slf.as_any(), "planish._pickle", "grid")
+    }
+
     /// Positions, (rows, cols, 3), world units; a read-only view of the grid's own memory.
     #[getter]
     fn points<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray3<f64>>> {

@@ -61,8 +61,9 @@ def test_an_object_does_not_change_with_the_array_that_it_was_made_from() -> Non
         np.asfortranarray(POINTS),
         np.repeat(POINTS, 2, axis=0)[::2],
         POINTS.astype(">f8"),
+        np.frombuffer(b"?" + POINTS.tobytes(), offset=1).reshape(POINTS.shape),
     ],
-    ids=["list", "float32", "int16", "fortran", "strided", "big endian"],
+    ids=["list", "float32", "int16", "fortran", "strided", "big endian", "between the places of numbers"],
 )
 @pytest.mark.parametrize("dtype", [np.uint32, np.int64, np.int32, np.uint8, np.uint64])
 def test_other_layouts_and_dtypes_of_numbers_give_the_same_mesh(points: object, dtype: type) -> None:

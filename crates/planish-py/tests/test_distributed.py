@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import threading
 import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import planish
@@ -125,6 +127,57 @@ def test_bricks_on_a_cluster_with_a_killed_worker_are_the_mesh_of_one_process(sc
         killer.join()
     assert len(killed) == 1 and same(here, there)
     assert [step for step, share in told if share == 1.0] == ["clean", "settle", "mesh"]
+
+
+def test_a_model_fitted_on_a_cluster_with_a_killed_worker_has_the_bytes_of_one_process() -> None:
+    network = planish.demo_part(triangles=8_000).layout(patches=40)
+    killed: list[int] = []
+
+    def kill(cluster: Any) -> None:
+        ends = time.monotonic() + 60.0
+        while not killed and time.monotonic() < ends:
+            busy = [
+                task.processing_on.name
+                for task in list(cluster.scheduler.tasks.values())
+                if task.processing_on and str(task.key).startswith("planish-relax")
+            ]
+            if busy:
+                killed.append(cluster.workers[busy[0]].process.process.pid)
+                os.kill(killed[0], signal.SIGKILL)
+            time.sleep(0.01)
+
+    with distributed_library.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        killer = threading.Thread(target=kill, args=(cluster,))
+        killer.start()
+        there = distributed.fit(network, cluster=cluster.scheduler_address, tolerance=2e-4, density=3.0)
+        killer.join()
+        with pytest.raises(planish.GridError, match="with four sides|flattened|sides of at least"):
+            distributed.fit(network, cluster=cluster, min_side=30, max_side=20)
+    here = network.fit(tolerance=2e-4, density=3.0)
+    assert len(killed) == 1 and there.quality == here.quality
+    for a, b in zip(here.grids, there.grids, strict=True):
+        assert np.array_equal(a.points, b.points) and np.array_equal(a.places["bary"], b.places["bary"])
+    for a, b in zip(here.surfaces, there.surfaces, strict=True):
+        assert np.array_equal(a.control, b.control)
+
+
+def test_grids_of_some_patches_are_those_of_all_and_what_relax_raises_comes_up() -> None:
+    network = planish.cuboid(cells=6).layout(patches=6)
+    grids = network.grids()
+    sizes = [grid.shape[::-1] for grid in grids]
+    some = network.relax([1, 4], [sizes[1], sizes[4]])
+    again = pickle.loads(pickle.dumps(some[1]))
+    for grid in (some[1], again):
+        assert np.array_equal(grid.points, grids[4].points) and np.array_equal(grid.places["face"], grids[4].places["face"])
+    assert np.array_equal(pickle.loads(pickle.dumps(network)).relax([1], [sizes[1]])[0].points, grids[1].points)
+    with pytest.raises(ValueError, match="patches rise"):
+        network.relax([4, 1], [sizes[4], sizes[1]])
+    with pytest.raises(ValueError, match="names none of the 6"):
+        network.relax([6], [(5, 5)])
+    with pytest.raises(RuntimeError, match="not today"):
+        network.fit(relax=lambda patches, sizes, stopped: (_ for _ in ()).throw(RuntimeError("not today")))
+    with pytest.raises(planish.GridError, match="no grids of the sizes"):
+        network.fit(relax=lambda patches, sizes, stopped: [])
 
 
 def test_bricks_tell_what_is_wrong_with_folders_and_files(scan: Path, tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ pub use scan::{
 pub use truth::{EdgesFound, Zone, edge_reach, edges_found, truth_figures, zone};
 
 use crate::cloud::{self, Cleaned, Cloud, CloudError};
-use crate::grid::{self, FeatureError, Grid, GridError, GridParams};
+use crate::grid::{self, FeatureError, Grid, GridError, GridParams, Relaxer};
 use crate::layout::{self, Known, Layout, LayoutError, LayoutParams};
 use crate::mend::{self, Repairs};
 use crate::mesh::{CompareError, FeatureTags, MeshError, TriMesh};
@@ -148,7 +148,7 @@ pub fn run(input: Input, params: &RunParams, observer: &dyn PipelineObserver) ->
     )?;
     let (mesh, tags) = (&meshed.meshed.extracted.mesh, &meshed.meshed.extracted.tags);
     let params = (params.stages)(params_for(&meshed), mesh.bounds().diagonal());
-    let mut fitted = fit_with(mesh, Some(tags), None, &params, &mut clock)?;
+    let mut fitted = fit_with(mesh, Some(tags), None, None, &params, &mut clock)?;
     // Outliers are no part of the shape: its size is that of the mesh.
     run_figures(&meshed, &points, mesh.bounds().diagonal(), &mut fitted);
     Ok(Run { fitted, params, scan: Some(Scanned { meshed, points }) })
@@ -237,7 +237,20 @@ pub fn fit(
     params: &PipelineParams,
     observer: &dyn PipelineObserver,
 ) -> Result<Fitted, PipelineError> {
-    fit_with(input, tags, network, params, &mut Clock::new(observer, &WEIGHTS))
+    fit_with(input, tags, network, None, params, &mut Clock::new(observer, &WEIGHTS))
+}
+
+/// As [`fit`] on a network, with its patches relaxed by `relaxer`: grids are most of the work that can be shared out.
+/// # Errors
+/// As [`fit`], and those of `relaxer`.
+pub fn fit_by(
+    relaxer: &dyn Relaxer,
+    input: &TriMesh,
+    network: Network,
+    params: &PipelineParams,
+    observer: &dyn PipelineObserver,
+) -> Result<Fitted, PipelineError> {
+    fit_with(input, None, Some(network), Some(relaxer), params, &mut Clock::new(observer, &WEIGHTS))
 }
 
 /// As [`fit`], with the clock of a longer run.
@@ -245,6 +258,7 @@ fn fit_with(
     input: &TriMesh,
     tags: Option<&FeatureTags>,
     network: Option<Network>,
+    relaxer: Option<&dyn Relaxer>,
     params: &PipelineParams,
     clock: &mut Clock,
 ) -> Result<Fitted, PipelineError> {
@@ -259,7 +273,7 @@ fn fit_with(
     let patches = clock.stage("imprint", |o| network::imprint(&mesh, &network, o), |p| [("patches", p.len())])?;
     let grids = clock.stage(
         "grids",
-        |o| resampled(&mesh, &network, &patches, (&[], &[]), params, o),
+        |o| resampled(relaxer, (&mesh, &network, &patches), (&[], &[]), params, o),
         |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;
     let mut model = Model { mesh, network, grids, ..Model::default() };
@@ -284,15 +298,16 @@ const DENSER_HELPS: f64 = 0.7;
 
 /// Grids as they are by themselves, and finer ones along the chords where they carry too few control points for the tolerance.
 fn resampled(
-    mesh: &TriMesh,
-    network: &Network,
-    patches: &[network::PatchMesh],
+    relaxer: Option<&dyn Relaxer>,
+    (mesh, network, patches): (&TriMesh, &Network, &[network::PatchMesh]),
     drawn: grid::Drawn,
     params: &PipelineParams,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, PipelineError> {
+    let here = grid::Here { input: mesh, network, patches, drawn, params: &params.grid };
+    let relaxer = relaxer.unwrap_or(&here);
     let first = Part::new(observer, 0.0, 0.7);
-    let mut grids = grid::resample(mesh, network, patches, drawn, &params.grid, &first)?;
+    let mut grids = grid::resample_by(relaxer, (mesh, network, patches), drawn, &params.grid, &first)?;
     let start = grids.iter().map(|g| g.points.len()).sum();
     let mut before: Vec<f64> = Vec::new();
     for round in 0..params.grid.denser_rounds {
@@ -305,7 +320,7 @@ fn resampled(
             }
         }
         let drawn_grids = (&mut grids[..], start);
-        if !grid::densify(mesh, network, patches, drawn, drawn_grids, &need, &params.grid, &part)? {
+        if !grid::densify(relaxer, network, drawn, drawn_grids, &need, &params.grid, &part)? {
             break;
         }
         before = need;

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from ._planish import Cloud, Mesh, Surface
+from ._planish import Cloud, Grid, Mesh, Network, Surface
 
 
 def mesh(mesh: Mesh) -> tuple[Any, ...]:
@@ -28,3 +28,16 @@ def surface(surface: Surface) -> tuple[Any, ...]:
 
 def _surface(control: Any, knots_u: Any, knots_v: Any) -> Surface:
     return Surface(control, knots_u=knots_u, knots_v=knots_v)
+
+
+def grid(grid: Grid) -> tuple[Any, ...]:
+    places = grid.places
+    return _grid, (grid.points, places["face"], places["bary"])
+
+
+def _grid(points: Any, face: Any, bary: Any) -> Grid:
+    return Grid(points, face=face, bary=bary)
+
+
+def network(network: Network) -> tuple[Any, ...]:
+    return Network.from_json, (network.to_json(), network.mesh)

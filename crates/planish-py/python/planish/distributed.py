@@ -5,10 +5,12 @@
     distributed.run_many(["a.ply", "b.e57"], "out", patches=60)                            # a cluster of this machine's own
     distributed.run_many(["a.ply", "b.e57"], "out", cluster="tcp://10.0.0.1:8786")         # any Dask cluster, by its address
     mesh = distributed.mesh("huge.e57", cluster="tcp://10.0.0.1:8786", folder="/shared/huge")
+    model = distributed.fit(mesh.layout(patches=5000), cluster="tcp://10.0.0.1:8786")
 
 `run_many`: each input is one task, and each task is `planish run` in a process of its own on its worker: the products are the same
 bytes, in the same folders, as those of `planish.run_many`, whatever the number of workers. `mesh`: each brick of a scan is a task,
-first for its samples and then for its mesh (`planish.Bricks`); the mesh is the same bytes as on one machine. Workers read and
+first for its samples and then for its mesh (`planish.Bricks`); the mesh is the same bytes as on one machine. `fit`: patches of a
+network are relaxed by shares, each share a task, and the model is the same bytes; what workers need is sent to them. Others read and
 write files by these paths, so on several machines they lie on a file system that all of them have. A task whose worker dies is
 started again on another one; files appear whole or not at all, and what is finished is not lost.
 
@@ -24,12 +26,12 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ._batch import Batch, Option, Row, _batch, _flags, _tell
-from ._planish import Bricks, Cloud, Mesh, RunError, folder_names, set_threads
+from ._planish import Bricks, Cloud, Grid, Mesh, Model, Network, RunError, folder_names, keywords, set_threads
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-__all__ = ["mesh", "run_many"]
+__all__ = ["fit", "mesh", "run_many"]
 
 #: Workers that may die under one task before it counts as failed.
 _DEATHS = 3
@@ -123,6 +125,84 @@ def mesh(
         for step, arguments in (("clean", each), ("settle", at_once), ("mesh", each)):
             _all(client, step, (place, _stamp()), arguments, progress)
         return bricks.weld()
+
+
+def fit(
+    network: Network,
+    *,
+    cluster: Any = None,
+    jobs: int | None = None,
+    progress: Any = None,
+    **parameters: Any,
+) -> Model:
+    """A model of a network, as `Network.fit` makes it, with the patches relaxed by the workers of a cluster.
+
+    * cluster, jobs: as of `run_many`
+    * progress and the other keywords: as of `Network.fit`
+
+    Grids are the part of the work that falls apart into patches; surfaces, seams and reliefs follow in this process. Returns the
+    model: the same bytes as without a cluster. Raises what `Network.fit` raises; RunError if workers died three times under one share of
+    the patches; ImportError without `dask.distributed`.
+    """
+    if jobs is not None and jobs < 1:
+        raise ValueError(f"jobs={jobs}: at least 1 is needed")
+    of_grids = {name: value for name, value in parameters.items() if name in keywords()["grid"]}
+    with _client(cluster, jobs) as client:
+        held = client.scatter(network, broadcast=True, hash=False)
+        workers = max(1, len(client.scheduler_info()["workers"]))
+
+        def relax(patches: Any, sizes: Any, stopped: Callable[[], bool]) -> list[Grid]:
+            # Neighbours are alike, so every share has some of all parts of the model.
+            count = min(len(patches), _SHARES * workers)
+            shares = [slice(k, None, count) for k in range(count)]
+            stamp = _stamp()
+            work = [
+                client.submit(
+                    _relaxed, held, patches[share], sizes[share], of_grids, key=f"planish-relax-{k}-{stamp}", pure=False
+                )
+                for k, share in enumerate(shares)
+            ]
+            return _in_order(work, shares, len(patches), stopped)
+
+        return network.fit(relax=relax, progress=progress, **parameters)
+
+
+#: Shares of the patches for each worker: the last one to end keeps the others waiting by a part of that.
+_SHARES = 8
+#: Seconds between two looks whether the result is still wanted.
+_LOOK = 0.05
+
+
+def _relaxed(network: Network, patches: Any, sizes: Any, parameters: dict[str, Any]) -> list[Grid]:
+    """A share of the patches, on a worker, which has other threads only for other shares."""
+    set_threads(1)
+    return network.relax(patches, sizes, **parameters)
+
+
+def _in_order(work: list[Any], shares: list[slice], count: int, stopped: Callable[[], bool]) -> list[Grid]:
+    """The grids of all shares, in the order of their patches; the first share that fails stops the others."""
+    import distributed
+    from distributed.scheduler import KilledWorker
+
+    found: list[Any] = [None] * count
+    try:
+        for future, share in zip(work, shares, strict=True):
+            while not future.done():
+                if stopped():
+                    raise KeyboardInterrupt
+                try:
+                    distributed.wait(future, timeout=_LOOK)
+                except TimeoutError:
+                    continue
+            try:
+                found[share] = future.result()
+            except KilledWorker as error:
+                raise RunError(f"relax: {_DEATHS} workers died under one share of the patches ({error})") from error
+    except BaseException:
+        for future in work:
+            future.cancel()
+        raise
+    return found
 
 
 def _all(

@@ -30,7 +30,7 @@ pub use feature::network::{Drawn, check_features, family_of, relax_network};
 pub use feature::{Family, FeatureCurve, FeatureError};
 pub use follow::follow;
 pub use quality::{GridQuality, measure};
-pub use resample::{densify, resample};
+pub use resample::{Here, Relaxer, densify, resample, resample_by};
 pub use sizes::choose_sizes;
 
 use crate::grid::chart::locate::Spot;

@@ -57,28 +57,53 @@ pub fn resample(
     params: &GridParams,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, FeatureError> {
-    let make = |which: &[usize], sizes: &[Size], observer: &dyn Observer| {
-        made(input, network, patches, sizes, drawn, which, params, observer)
-    };
-    refined(input, network, patches, params, &|sizes| give_sums(network, drawn, sizes), &make, observer)
+    resample_by(&Here { input, network, patches, drawn, params }, (input, network, patches), drawn, params, observer)
 }
 
-/// Grids of some of the patches, rising, by the sizes of all.
-fn made(
-    input: &TriMesh,
-    network: &Network,
-    patches: &[PatchMesh],
-    sizes: &[Size],
+/// As [`resample`], with the patches relaxed by `relaxer`.
+/// # Errors
+/// As [`resample`], and those of `relaxer`.
+pub fn resample_by(
+    relaxer: &dyn Relaxer,
+    (input, network, patches): (&TriMesh, &Network, &[PatchMesh]),
     drawn: Drawn,
-    which: &[usize],
     params: &GridParams,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, FeatureError> {
-    if drawn.0.is_empty() && drawn.1.is_empty() {
-        let jobs: Vec<Job> = which.iter().map(|&p| (p, &patches[p], sizes[p])).collect();
-        return Ok(relax_jobs(input, &jobs, &[], params, observer)?);
+    refined(input, network, patches, params, &|sizes| give_sums(network, drawn, sizes), relaxer, observer)
+}
+
+/// Who relaxes patches: [`Here`], or other processes in its place.
+pub trait Relaxer: Sync {
+    /// Grids of some of the patches of a network, rising, by the sizes of all: what [`Here`] makes of them, to the bit.
+    /// # Errors
+    /// As [`relax_network`](super::relax_network); [`FeatureError::Elsewhere`].
+    fn relax(&self, which: &[usize], sizes: &[Size], observer: &dyn Observer) -> Result<Vec<Grid>, FeatureError>;
+}
+
+/// Relaxes patches in this process.
+pub struct Here<'a> {
+    /// The mesh that places refer to.
+    pub input: &'a TriMesh,
+    /// Its network.
+    pub network: &'a Network,
+    /// The patches of the network.
+    pub patches: &'a [PatchMesh],
+    /// Feature curves and sections; mostly empty.
+    pub drawn: Drawn<'a>,
+    /// How grids are made.
+    pub params: &'a GridParams,
+}
+
+impl Relaxer for Here<'_> {
+    fn relax(&self, which: &[usize], sizes: &[Size], observer: &dyn Observer) -> Result<Vec<Grid>, FeatureError> {
+        let Here { input, network, patches, drawn, params } = *self;
+        if drawn.0.is_empty() && drawn.1.is_empty() {
+            let jobs: Vec<Job> = which.iter().map(|&p| (p, &patches[p], sizes[p])).collect();
+            return Ok(relax_jobs(input, &jobs, &[], params, observer)?);
+        }
+        relax_some(input, network, patches, sizes, drawn, which, params, observer)
     }
-    relax_some(input, network, patches, sizes, drawn, which, params, observer)
 }
 
 /// Gives twice the cells to the chords of some curves, the neediest first where not all have room: up to [`MOST_GROWTH`] times
@@ -88,9 +113,8 @@ fn made(
 /// # Errors
 /// As [`relax_network`](super::relax_network).
 pub fn densify(
-    input: &TriMesh,
+    relaxer: &dyn Relaxer,
     network: &Network,
-    patches: &[PatchMesh],
     drawn: Drawn,
     (grids, start): (&mut [Grid], usize),
     need: &[f64],
@@ -132,34 +156,32 @@ pub fn densify(
         }
     }
     let which: Vec<usize> = (0..grids.len()).filter(|&p| sizes[p] != before[p]).collect();
-    for (&p, grid) in which.iter().zip(made(input, network, patches, &sizes, drawn, &which, params, observer)?) {
+    for (&p, grid) in which.iter().zip(relaxer.relax(&which, &sizes, observer)?) {
         grids[p] = grid;
     }
     Ok(!which.is_empty())
 }
 
 /// Points along u and v.
-type Size = (usize, usize);
+pub type Size = (usize, usize);
 type Give<'a> = dyn Fn(&mut [Size]) -> Result<(), FeatureError> + 'a;
-type Make<'a> = dyn Fn(&[usize], &[Size], &dyn Observer) -> Result<Vec<Grid>, FeatureError> + 'a;
 
 /// Relaxes all patches, and those that need it again with more points.
 /// * `give` - puts sizes that are given in the place of those chosen
-/// * `make` - grids of some patches, rising, by the sizes of all
 fn refined(
     input: &TriMesh,
     network: &Network,
     patches: &[PatchMesh],
     params: &GridParams,
     give: &Give,
-    make: &Make,
+    relaxer: &dyn Relaxer,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, FeatureError> {
     params.validate()?;
     let mut sizes = choose_sizes(network, patches, params);
     give(&mut sizes)?;
     let all: Vec<usize> = (0..patches.len()).collect();
-    let mut grids = make(&all, &sizes, &Part::new(observer, 0.0, FIRST_SHARE))?;
+    let mut grids = relaxer.relax(&all, &sizes, &Part::new(observer, 0.0, FIRST_SHARE))?;
     let allowed = params.miss * input.bounds().diagonal();
     let chords = network.chords();
     let [_, most] = bounds(params);
@@ -205,7 +227,7 @@ fn refined(
         let added = total(&wanted).saturating_sub(total(&sizes));
         let trial: usize = tried.iter().map(|&p| wanted[p].0 * wanted[p].1).sum();
         if trial as f64 <= TRIAL_SHARE * added as f64 {
-            for (&k, grid) in needy.iter().zip(make(&tried, &wanted, &Part::new(observer, start, 0.0))?) {
+            for (&k, grid) in needy.iter().zip(relaxer.relax(&tried, &wanted, &Part::new(observer, start, 0.0))?) {
                 past_help[suspects[k]] = !fault(suspects[k], &grid).helped(faults[k]);
             }
             wanted = wish(&wants(&past_help))?;
@@ -214,7 +236,7 @@ fn refined(
         if suspects.is_empty() {
             break;
         }
-        for (&p, grid) in suspects.iter().zip(make(&suspects, &wanted, &Part::new(observer, start, share))?) {
+        for (&p, grid) in suspects.iter().zip(relaxer.relax(&suspects, &wanted, &Part::new(observer, start, share))?) {
             grids[p] = grid;
         }
         sizes = wanted;

@@ -154,7 +154,7 @@ fn remade(
                     return Ok(grids);
                 }
             }
-            super::resampled(mesh, network, &patches, drawn, params, o)
+            super::resampled(None, (mesh, network, &patches), drawn, params, o)
         },
         |grids| [("points", grids.iter().map(|g| g.points.len()).sum())],
     )?;

@@ -136,4 +136,10 @@ pub enum FeatureError {
     /// The curves cannot be imprinted.
     #[error(transparent)]
     Imprint(#[from] ImprintError),
+    /// Who relaxes patches in the place of this process has failed.
+    #[error("the patches were not relaxed: {what}")]
+    Elsewhere {
+        /// Why.
+        what: String,
+    },
 }
