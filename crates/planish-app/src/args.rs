@@ -318,9 +318,13 @@ pub struct Mesh {
     /// solids or a milling job (.toml); a volume (.nrrd, .npy); or with --formula a formula. `-` is standard input
     pub input: PathBuf,
     /// The mesh: .ply (with feature tags), .obj, .stl or .glb; or the field itself as a volume, .nrrd or .npy: distances below
-    /// zero inside. `-` is standard output
+    /// zero inside. `-` is standard output. With --tiles a folder
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// Write the mesh in tiles: a PLY for each cube of this side, a length (5, 5m) or a share of the diagonal (10%), into the
+    /// folder -o, with a list, tiles.json
+    #[arg(long, value_name = "LENGTH|%", conflicts_with = "to")]
+    pub tiles: Option<Tolerance>,
     /// The input is a formula of x, y and z, negative inside, such as 'x^2 + y^2 - 1'
     #[arg(long, requires = "bounds")]
     pub formula: bool,

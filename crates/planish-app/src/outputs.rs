@@ -36,6 +36,9 @@ pub fn check(command: &Command) -> Result<(), Failure> {
     allow(&inputs, &outputs, common.policy())?;
     match command {
         Command::Export(a) if is_folder_of_maps(&a.output) => allow_maps(&a.output, common.policy()),
+        Command::Mesh(a) if a.tiles.is_some() => {
+            allow_named(&a.output, planish_io::tile_names(&a.output), planish_io::is_tile_name, common.policy())
+        }
         Command::Relief(a) => match &a.command {
             ReliefCommand::Export(a) => allow_maps(&a.output, common.policy()),
             _ => Ok(()),
@@ -60,6 +63,7 @@ fn files(command: &Command) -> (Vec<PathBuf>, Vec<PathBuf>) {
         Command::Clean(a) => {
             (vec![a.scan.clone()], [Some(a.output.clone()), a.lines.clone()].into_iter().flatten().collect())
         }
+        Command::Mesh(a) if a.tiles.is_some() => (vec![a.input.clone()], Vec::new()),
         Command::Mesh(a) => (vec![a.input.clone()], vec![a.output.clone()]),
         Command::Smooth(a) => (vec![a.mesh.clone()], vec![a.output.clone()]),
         Command::Decimate(a) => (vec![a.mesh.clone()], vec![a.output.clone()]),
@@ -164,12 +168,17 @@ fn is_own_relief(folder: &Path) -> bool {
     is_empty || !planish_io::relief_names(folder).is_empty()
 }
 
-/// Checks a folder that maps go to: what bears the name of a map there must be named by the sidecar beside it.
+/// Checks a folder that maps go to.
 fn allow_maps(folder: &Path, policy: Policy) -> Result<(), Failure> {
-    let own = planish_io::relief_names(folder);
+    allow_named(folder, planish_io::relief_names(folder), planish_io::is_relief_name, policy)
+}
+
+/// Checks a folder that files of some names go to: what bears such a name there must be one that the list of this program's, which
+/// lies beside, names.
+fn allow_named(folder: &Path, own: Vec<String>, is_name: fn(&str) -> bool, policy: Policy) -> Result<(), Failure> {
     let names =
         fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.file_name().to_string_lossy().into_owned());
-    let mut found: Vec<String> = names.filter(|name| planish_io::is_relief_name(name)).collect();
+    let mut found: Vec<String> = names.filter(|name| is_name(name)).collect();
     found.sort();
     for name in found {
         let path = folder.join(&name);

@@ -149,7 +149,10 @@ impl Staged {
         let mut entries: Vec<_> = fs::read_dir(self.staging())?.collect::<Result<_, _>>()?;
         entries.sort_by_key(|e| e.file_name());
         if entries.iter().any(|e| e.file_name() == planish_io::RELIEF_SIDECAR) {
-            remove_old_maps(folder)?;
+            remove_old(folder, planish_io::relief_names(folder))?;
+        }
+        if entries.iter().any(|e| e.file_name() == planish_io::TILE_LIST) {
+            remove_old(folder, planish_io::tile_names(folder))?;
         }
         for entry in entries.into_iter().filter(|e| e.file_name() != LOCK) {
             let place = folder.join(entry.file_name());
@@ -163,9 +166,9 @@ impl Staged {
     }
 }
 
-/// Removes the maps that the sidecar in a folder names, and nothing else.
-fn remove_old_maps(folder: &Path) -> io::Result<()> {
-    for name in planish_io::relief_names(folder) {
+/// Removes the files that a list of this program's names in a folder, and nothing else.
+fn remove_old(folder: &Path, names: Vec<String>) -> io::Result<()> {
+    for name in names {
         match fs::remove_file(folder.join(name)) {
             Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
             _ => {}
@@ -177,7 +180,7 @@ fn remove_old_maps(folder: &Path) -> io::Result<()> {
 /// Puts a folder of maps in its place. Of what is there only the maps that an older sidecar names go.
 fn replace_maps(from: &Path, to: &Path) -> io::Result<()> {
     fs::create_dir_all(to)?;
-    remove_old_maps(to)?;
+    remove_old(to, planish_io::relief_names(to))?;
     for entry in fs::read_dir(from)? {
         let entry = entry?;
         fs::rename(entry.path(), to.join(entry.file_name()))?;

@@ -161,6 +161,44 @@ fn sigterm_and_sighup_end_like_ctrl_c_with_nothing_left_and_a_line() {
 }
 
 #[test]
+fn tiles_hold_the_mesh_and_replace_those_of_an_older_list_and_no_file_of_somebody_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    write_box(&at("box.ply"), 4);
+    let mesh = |more: &[&str]| planish(&[&["mesh", "box.ply", "-q", "--resolution=33"], more].concat(), folder.path());
+    let tiles = |more: &[&str]| mesh(&[&["-o", "tiles", "--report", "r.json"], more].concat());
+    assert_eq!(status(&mesh(&["-o", "whole.ply"])), 0);
+    assert_eq!(status(&tiles(&["--tiles=10%"])), 0);
+    let many = names(&at("tiles")).len();
+    fs::write(at("tiles/notes.txt"), "mine").unwrap();
+    let output = tiles(&["--tiles", "40%"]);
+    assert_eq!(status(&output), 0, "{}", stderr(&output));
+    let found: Vec<String> = names(&at("tiles")).into_iter().filter(|n| planish_io::is_tile_name(n)).collect();
+    assert!(2 < found.len() && found.len() < many && at("tiles/notes.txt").exists(), "{found:?} of {many}");
+    let whole = planish_io::read_mesh(at("whole.ply")).unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&fs::read(at("r.json")).unwrap()).unwrap();
+    assert_eq!(report["quality"]["mesh.tiles"], found.len() - 1);
+    let place = |p: &planish::DVec3| p.to_array().map(f64::to_bits);
+    let mut places = std::collections::BTreeSet::new();
+    let mut triangles = 0;
+    for name in found.iter().filter(|n| n.ends_with(".ply")) {
+        let tile = planish_io::read_mesh(at("tiles").join(name)).unwrap();
+        triangles += tile.triangles.len();
+        places.extend(tile.points.iter().map(place));
+    }
+    assert_eq!(triangles, whole.triangles.len());
+    assert!(places.into_iter().eq(whole.points.iter().map(place).collect::<std::collections::BTreeSet<_>>()));
+    fs::write(at("tiles/tile_7_7_7.ply"), "mine").unwrap();
+    let output = tiles(&["--tiles", "40%"]);
+    assert_eq!(status(&output), 2);
+    assert!(error_line(&output).contains("tile_7_7_7.ply: is there already"), "{}", stderr(&output));
+    assert_eq!(fs::read(at("tiles/tile_7_7_7.ply")).unwrap(), b"mine");
+    let output = mesh(&["-o", "none", "--tiles", "1e-300"]);
+    assert_eq!(status(&output), 2);
+    assert!(error_line(&output).contains("more than 100000") && !at("none").exists(), "{}", stderr(&output));
+}
+
+#[test]
 fn export_of_maps_removes_those_of_an_older_export_and_no_map_of_somebody_else() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

@@ -31,6 +31,7 @@ pub mod script;
 mod step;
 mod stl;
 mod text;
+mod tile_files;
 mod topology;
 mod usd;
 mod usd_material;
@@ -60,5 +61,6 @@ pub use scan::{
     write_scan, write_scan_in,
 };
 pub use step::{StepInput, StepSummary, read_step_surfaces, write_step};
+pub use tile_files::{TILE_LIST, TilesError, is_tile_name, tile_names, write_tiles};
 pub use usd::{UsdInput, write_usd};
 pub use usd_material::{UsdMaterial, UsdTexture};

@@ -17,7 +17,7 @@ use planish::pipeline::{self, PipelineError, PipelineParams};
 use planish::register::{self, AlignParams, Shape};
 use planish::{mend, mesh};
 use planish_io::WriteOptions;
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
@@ -129,6 +129,22 @@ impl PyMesh {
             FeatureTags::from_edges(mesh.points.len(), edges)
         });
         Ok(PyMesh::new(mesh, tags, json!(repairs)))
+    }
+
+    /// The mesh in tiles: cubes of side `size`, by their place: tile (i, j, k) is the cube from `size * (i, j, k)` on. Each triangle is in
+    /// the tile of its middle; vertices on the border of two tiles are the same numbers in both. Raises ValueError.
+    fn tiles<'py>(&self, py: Python<'py>, size: f64) -> PyResult<Bound<'py, PyDict>> {
+        let Body { mesh, tags, .. } = &*self.body;
+        let none = FeatureTags::default();
+        let mut parts = mesh::MeshParts::new(mesh, tags.as_ref().unwrap_or(&none));
+        let made = PyDict::new(py);
+        let cut = mesh::tiles(mesh, size, DVec3::ZERO).map_err(|e| PyValueError::new_err(e.to_string()))?;
+        for ([i, j, k], faces) in cut {
+            let part = parts.part(&faces);
+            let tags = tags.is_some().then_some(part.tags);
+            made.set_item((i, j, k), PyMesh::new(part.mesh, tags, json!({})))?;
+        }
+        Ok(made)
     }
 
     /// The mesh without its noise; sharp edges stay. Raises MeshError.

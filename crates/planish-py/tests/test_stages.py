@@ -54,6 +54,17 @@ def test_a_field_of_samples_is_negative_inside(samples: planish.Samples) -> None
     assert np.mean(field.values(inward) < 0.0) > 0.97 and np.mean(field.values(outward) > 0.0) > 0.97
 
 
+def test_tiles_are_the_mesh_with_its_edges_and_sides_that_are_none_are_refused(box: planish.Mesh) -> None:
+    size = float(np.ptp(box.points, axis=0).max()) / 2.0
+    tiles = box.tiles(size)
+    assert sum(len(tile.triangles) for tile in tiles.values()) == len(box.triangles) and len(tiles) > 4
+    for place, tile in tiles.items():
+        middles = tile.points[tile.triangles].mean(axis=1)
+        assert np.array_equal(np.floor(middles / size).astype(int), np.tile(place, (len(middles), 1)))
+    with pytest.raises(ValueError, match="side 0: a length above 0"):
+        box.tiles(0.0)
+
+
 def test_smoothing_takes_noise_off_a_ball(ball: planish.Mesh) -> None:
     rough = ball.points + 0.02 * np.random.default_rng(2).normal(size=ball.points.shape)
     smooth = planish.Mesh(rough, ball.triangles).smooth()

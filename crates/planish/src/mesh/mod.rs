@@ -13,6 +13,7 @@ pub(crate) mod sets;
 pub mod smooth;
 pub(crate) mod soup;
 mod tags;
+mod tiles;
 mod walk;
 
 pub use adjacency::{Adjacency, Fan, NONE, next, previous};
@@ -24,6 +25,7 @@ pub use intersect::{folded_back, self_intersections};
 pub use smooth::{SmoothError, SmoothParams, Smoothed, smooth};
 pub use soup::check;
 pub use tags::{FEATURE, FeatureKind, FeatureTags};
+pub use tiles::{MOST_TILES, MeshPart, MeshParts, TileError, tiles};
 pub use walk::{CurvePlace, move_point_on_curve, move_point_on_surface};
 
 pub use crate::geom::FacePoint;

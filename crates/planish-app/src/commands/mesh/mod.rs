@@ -14,6 +14,7 @@ use crate::placed::{self, Placed};
 use crate::products::{self, Staged};
 use crate::progress;
 use crate::summary::Summary;
+use crate::tolerance::Scale;
 use planish::DVec3;
 use planish::cloud::bricks::StoreError;
 use planish::cloud::{self, CloudError};
@@ -25,7 +26,7 @@ use planish::model::Units;
 use planish::pipeline::{self, Figure, ScanError, ScanMeshed, ScanParams, StageRecord, Warning};
 use planish_io::report::{Input, Report, count, number};
 use planish_io::script::Script;
-use planish_io::{BrickFolder, MeshFormat, WriteOptions};
+use planish_io::{BrickFolder, MeshFormat, TilesError, WriteOptions};
 use std::path::Path;
 
 /// Cells along the longest side unless the user says.
@@ -58,8 +59,12 @@ impl Source {
 }
 
 pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
-    files::check_extension(&args.output, &["ply", "obj", "stl", "glb", "nrrd", "npy"])?;
-    let staged = Staged::file(&args.output)?;
+    let staged = if args.tiles.is_some() {
+        Staged::folder(&args.output)?
+    } else {
+        files::check_extension(&args.output, &["ply", "obj", "stl", "glb", "nrrd", "npy"])?;
+        Staged::file(&args.output)?
+    };
     let own_report = session.stage_report()?;
     let params = args.meshing.params()?;
     let grid_params = args.volume.params(None)?;
@@ -73,7 +78,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
             args.meshing.refuse_cleaning("leave it out: the result is closed anyway")?
         }
     }
-    if planish_io::is_grid(&args.output) {
+    if args.tiles.is_none() && planish_io::is_grid(&args.output) {
         let from = Sampled { staged, own_report, source, input, read };
         return volume(session, args, from, &params);
     }
@@ -105,9 +110,19 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let (mesh, tags) = (&made.extracted.mesh, &made.extracted.tags);
     let shift = source.shift();
     let options = WriteOptions { units, ..WriteOptions::default() };
-    let (moved, write) = session.step("write", || {
-        placed::write(&staged.file_path(), mesh, tags, shift, &options)
-            .map_err(|e| write_failure(&args.input, &args.output, e))
+    let mut tiles = None;
+    let (moved, write) = session.step("write", || match args.tiles {
+        None => placed::write(&staged.file_path(), mesh, tags, shift, &options)
+            .map_err(|e| write_failure(&args.input, &args.output, e)),
+        Some(side) => {
+            let size = side.length(Scale { diagonal: mesh.bounds().diagonal(), units });
+            let written = planish_io::write_tiles(&staged.path(""), mesh, tags, (size, shift), &options);
+            tiles = Some(written.map_err(|e| match e {
+                TilesError::Tile(e) => Failure::usage("--tiles", e.to_string()),
+                TilesError::Write(e) => write_failure(&args.input, &args.output, e),
+            })?);
+            Ok(None)
+        }
     })?;
     let mut report = Report::new("mesh", input);
     if let Source::Mesh(_) | Source::Scan(..) | Source::Bricks { .. } = &source {
@@ -123,6 +138,9 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     report.warnings.extend(moved);
     report.stages = vec![read, record, write];
     figures(made, &mut report);
+    if let Some(count) = tiles {
+        report.quality.insert("mesh.tiles".into(), Figure::Count(count as u64));
+    }
     if let Source::Mesh(input) = &source {
         thin_walls(made, &input.mesh, &mut report);
     }
@@ -282,8 +300,8 @@ fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Sourc
         return Ok((Source::Grid(Box::new(grid)), input, units));
     }
     let large = planish_io::points_told(path).is_some_and(|n| n > pipeline::BRICK_POINTS as u64);
-    if planish_io::is_scan(path) && large && !planish_io::is_grid(&args.output) {
-        let room = Staged::file(&args.output)?;
+    if planish_io::is_scan(path) && large && (args.tiles.is_some() || !planish_io::is_grid(&args.output)) {
+        let room = if args.tiles.is_some() { Staged::folder(&args.output)? } else { Staged::file(&args.output)? };
         let folder = room.path("bricks");
         std::fs::create_dir(&folder).map_err(|e| products::unwritable(&folder, &e))?;
         let (bricks, far_off) = files::scan_in_bricks(path, &args.scan, &folder)?;
@@ -436,6 +454,9 @@ fn table(args: &Mesh, made: &Meshed, report: &Report) -> Summary {
         ),
     );
     table.row("fallback cells", count(made.extracted.counts.fallbacks as u64));
+    if let Some(tiles) = report.figure("mesh.tiles") {
+        table.row("tiles", count(tiles as u64));
+    }
     table.row("mesh", args.output.display().to_string());
     table
 }

@@ -5,7 +5,7 @@
 //! are taken out and the hole is closed as one of the mesh.
 
 use crate::mend::{close_around, part_fans};
-use crate::mesh::{Adjacency, FeatureKind, FeatureTags, NONE, TriMesh, boundary_loops, next};
+use crate::mesh::{Adjacency, FeatureKind, FeatureTags, MeshParts, NONE, TriMesh, boundary_loops, next};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, HashSet};
@@ -32,39 +32,21 @@ impl Piece {
     /// The triangles that are kept.
     pub(super) fn cut(mesh: TriMesh, tags: FeatureTags, kept: &[bool], reached: &[(f64, u32)]) -> Piece {
         let cut = cut_edges(&mesh, kept);
-        let mut face = vec![u32::MAX; kept.len()];
-        let mut name = vec![u32::MAX; mesh.points.len()];
-        let (mut points, mut kinds, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
-        for (t, corners) in mesh.triangles.iter().enumerate().filter(|(t, _)| kept[*t]) {
-            face[t] = triangles.len() as u32;
-            triangles.push(corners.map(|v| {
-                let own = &mut name[v as usize];
-                if *own == u32::MAX {
-                    *own = points.len() as u32;
-                    points.push(mesh.points[v as usize]);
-                    kinds.push(tags.vertices.get(v as usize).copied().unwrap_or_default());
-                }
-                *own
-            }));
-        }
-        let named = |e: &[u32; 2]| e.map(|v| name[v as usize]);
-        let sides: HashSet<[u32; 2]> =
-            tags.edges.iter().map(named).filter(|e| e.iter().all(|&v| v != u32::MAX)).collect();
-        // An edge between two kept vertices may be of triangles that are not.
-        let mut edges: Vec<[u32; 2]> = triangles
-            .iter()
-            .flat_map(|&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]])
-            .filter(|&[a, b]| sides.contains(&[a, b]) || sides.contains(&[b, a]))
-            .map(|[a, b]| [a.min(b), a.max(b)])
-            .collect();
-        edges.sort_unstable();
-        edges.dedup();
-        let reached = reached.iter().filter(|r| face[r.1 as usize] != u32::MAX).map(|r| (r.0, face[r.1 as usize]));
+        let faces: Vec<u32> = (0..kept.len() as u32).filter(|&t| kept[t as usize]).collect();
+        let part = MeshParts::new(&mesh, &tags).part(&faces);
+        let named = |whole: usize, names: &mut dyn Iterator<Item = usize>| {
+            let mut own = vec![u32::MAX; whole];
+            names.enumerate().for_each(|(new, old)| own[old] = new as u32);
+            own
+        };
+        let face = named(kept.len(), &mut faces.iter().map(|&t| t as usize));
+        let vertex = named(mesh.points.len(), &mut part.vertices.iter().map(|&v| v as usize));
+        let reached = reached.iter().filter(|r| kept[r.1 as usize]).map(|r| (r.0, face[r.1 as usize]));
         Piece {
             reached: reached.collect(),
-            cut: cut.iter().map(named).collect(),
-            mesh: TriMesh::new(points, triangles),
-            tags: FeatureTags { vertices: kinds, edges },
+            cut: cut.iter().map(|e| e.map(|v| vertex[v as usize])).collect(),
+            mesh: part.mesh,
+            tags: part.tags,
         }
     }
 }
