@@ -21,6 +21,8 @@ use crate::network::Network;
 use crate::network::field::{self, FieldParams};
 use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
+use std::collections::VecDeque;
+use std::rc::Rc;
 
 /// Triangles of the proxy: the seamless maps of the measured meshes were made on 5 000 to 6 000 (two fifths of a second).
 const PROXY_TRIANGLES: usize = 6_000;
@@ -61,26 +63,32 @@ const ATTEMPTS: [Attempt; 3] = [
 
 /// A mesh with its seamless map.
 struct Aligned {
-    proxy: Proxy,
+    proxy: Rc<Proxy>,
     charts: Charts,
     mapped: map::Mapped,
 }
 
 impl Aligned {
     /// The map of a mesh on a proxy with edges as `sizing` asks for.
+    /// * `even` - the proxy with edges as long everywhere, once it is made
     ///
     /// A triangle whose corners are all bound, by lines or as cones, may get no area on whole numbers. Where cones are that
     /// near to lines and to each other the proxy is made finer, until none is.
     fn on(
         (mesh, sharp): (&TriMesh, &[bool]),
         attempt: &Attempt,
-        sizing: &mut Sizing,
+        (sizing, even): (&mut Sizing, &mut Option<Rc<Proxy>>),
         effort: &Effort,
         observer: &dyn Observer,
     ) -> Result<Option<Aligned>, AlignError> {
         let mut rounds = REFINEMENTS;
         let (proxy, charts) = loop {
-            let Some(proxy) = proxy::proxy(mesh, sharp, &[], sizing, observer) else { return Ok(None) };
+            let made = || proxy::proxy(mesh, sharp, &[], sizing, observer).map(Rc::new);
+            let proxy = if sizing.is_even() { even.take().or_else(made) } else { made() };
+            let Some(proxy) = proxy else { return Ok(None) };
+            if sizing.is_even() {
+                *even = Some(proxy.clone());
+            }
             let most = MOST_TO_WANTED * sizing.triangles(mesh);
             if proxy.mesh.triangles.len() > most {
                 return Err(AlignError::Dense { found: proxy.mesh.triangles.len(), most });
@@ -200,6 +208,15 @@ pub(super) struct Laid {
     pub deviation_deg: f64,
     /// What it is worth.
     pub worth: Worth,
+    /// True if the form gives it more bad cells than any number of cells in question would outweigh.
+    is_far: bool,
+}
+
+impl Laid {
+    /// True if there is no need to look for another: it is good, or the form leaves no hope of a good one.
+    pub fn is_final(&self) -> bool {
+        self.worth.is_kept() && (self.worth.is_enough() || self.is_far)
+    }
 }
 
 /// What a network is worth: the number that was asked for first, then how well grids cover it.
@@ -258,6 +275,7 @@ pub(super) fn lay(
     let mut why = AlignError::Unmapped;
     let mut best: Option<Laid> = None;
     let mut has_tight = false;
+    let mut even = None;
     let effort = Effort::default();
     for attempt in &ATTEMPTS {
         // Where no cone is to be moved it would be the same again.
@@ -266,7 +284,7 @@ pub(super) fn lay(
         }
         let mut sizing = Sizing::even(mesh, PROXY_TRIANGLES);
         for _ in 0..=FINER_ROUNDS {
-            let aligned = match Aligned::on((mesh, sharp), attempt, &mut sizing, &effort, observer) {
+            let aligned = match Aligned::on((mesh, sharp), attempt, (&mut sizing, &mut even), &effort, observer) {
                 Ok(Some(aligned)) => aligned,
                 Ok(None) => {
                     observer.check()?;
@@ -283,7 +301,7 @@ pub(super) fn lay(
             {
                 best = Some(laid);
             }
-            if best.as_ref().is_some_and(|best| params.coarsest || best.worth.is_enough()) {
+            if best.as_ref().is_some_and(|best| params.coarsest || best.is_final()) {
                 return best.ok_or(why);
             }
             let Some(trouble) = trouble else { break };
@@ -308,11 +326,16 @@ pub(super) fn lay(
 struct Draft<'a> {
     bench: Bench<'a>,
     worth: Worth,
+    /// As of [`fitness::cells_needed`].
+    needed: f64,
     deviation_deg: f64,
 }
 
 impl Aligned {
     /// The first good network, of the numbers of patches in question, else the best; and what was in the way of others.
+    ///
+    /// If the first network has so many bad cells that no number in question would outweigh them, as on shapes of limbs and folds, the
+    /// largest number that has room is taken, or that which is asked for.
     fn choose(
         &self,
         params: &LayoutParams,
@@ -340,20 +363,30 @@ impl Aligned {
             let most = if params.coarsest { least } else { MOST_UNASKED };
             GROWTH.map(|growth| growth * least).into_iter().filter(|n| *n <= most).map(|n| n as usize).collect()
         };
-        for (i, &squares) in tried.iter().enumerate() {
-            observer.progress(0.3 + 0.6 * i as f64 / tried.len() as f64);
-            let whole = match &coarsest {
-                Some(coarsest) if i == 0 => Ok(coarsest.clone()),
-                _ => self.quantized(Scale::Squares(squares), observer).map_err(AlignError::from),
+        let count = tried.len();
+        let most = tried.iter().map(|&n| n as f64).fold(MOST_UNASKED, f64::max);
+        let mut tried = VecDeque::from(tried);
+        let mut is_far = false;
+        while let Some(squares) = tried.pop_front() {
+            let is_first = tried.len() + 1 == count;
+            observer.progress(0.9 - 0.6 * (tried.len() + 1) as f64 / count as f64);
+            let whole = match coarsest.take() {
+                Some(coarsest) => Ok(coarsest),
+                None => self.quantized(Scale::Squares(squares), observer).map_err(AlignError::from),
             };
             let draft = whole.and_then(|whole| self.draft(&whole, params, observer));
             match draft {
                 Ok(draft) => {
-                    let is_enough = draft.worth.is_enough();
+                    let mut is_last = draft.worth.is_enough() || is_far;
+                    if best.is_none() && draft.needed > most {
+                        is_far = true;
+                        is_last |= asked(params).is_some() && draft.worth.is_kept();
+                        tried.make_contiguous().sort_by(|a, b| b.cmp(a));
+                    }
                     if best.as_ref().is_none_or(|best| draft.worth.exceeds(best.worth)) {
                         best = Some(draft);
                     }
-                    if is_enough {
+                    if is_last {
                         break;
                     }
                 }
@@ -364,11 +397,11 @@ impl Aligned {
                 break;
             }
             // What has no room for two numbers of squares has none for more.
-            if i > 0 && best.is_none() && trouble.as_ref().is_some_and(|e| !e.places().is_empty()) {
+            if !is_first && best.is_none() && trouble.as_ref().is_some_and(|e| !e.places().is_empty()) {
                 break;
             }
         }
-        let laid = match best.map(|draft| self.laid(draft, observer)) {
+        let laid = match best.map(|draft| self.laid(draft, is_far, observer)) {
             Some(Err(AlignError::Cancelled(cancelled))) => return Err(cancelled),
             Some(Err(e)) => {
                 trouble = Some(e);
@@ -381,7 +414,7 @@ impl Aligned {
 
     /// Whole numbers for the cones and lines.
     fn quantized(&self, scale: Scale, observer: &dyn Observer) -> Result<IntegerMap, QuantizeError> {
-        let Proxy { mesh, adjacency, lines, .. } = &self.proxy;
+        let Proxy { mesh, adjacency, lines, .. } = &*self.proxy;
         integers::quantize(mesh, adjacency, &self.mapped.map, lines, scale, observer)
     }
 
@@ -392,7 +425,7 @@ impl Aligned {
         params: &LayoutParams,
         observer: &dyn Observer,
     ) -> Result<Draft<'_>, AlignError> {
-        let Proxy { mesh, adjacency, lines, .. } = &self.proxy;
+        let Proxy { mesh, adjacency, lines, .. } = &*self.proxy;
         let cramped = |faces: Vec<u32>| AlignError::Cramped { places: self.middles(&faces) };
         let from = &self.mapped.map.uv;
         let mapped = map::smooth_integers(mesh, adjacency, lines, &self.charts, (from, &whole.uv), observer)?;
@@ -414,7 +447,8 @@ impl Aligned {
             improve::settle(&mut bench, patches, rounds, observer).map_err(|_| Cancelled)?;
         }
         let worth = Worth::new(bench.complex.live_cells().count(), asked(params), good_part);
-        Ok(Draft { bench, worth, deviation_deg: mapped.deviation_deg })
+        let needed = fitness::cells_needed(good_part, squares);
+        Ok(Draft { bench, worth, needed, deviation_deg: mapped.deviation_deg })
     }
 
     /// # Errors
@@ -432,7 +466,7 @@ impl Aligned {
     }
 
     /// A layout brought to the mesh.
-    fn laid(&self, draft: Draft, observer: &dyn Observer) -> Result<Laid, AlignError> {
+    fn laid(&self, draft: Draft, is_far: bool, observer: &dyn Observer) -> Result<Laid, AlignError> {
         let complex = self.proxy.back(&draft.bench.complex).ok_or(AlignError::Misplaced)?;
         let (fine, fine_adjacency) = self.proxy.fine();
         let mut bench = Bench::new(fine, fine_adjacency, complex).ok_or(AlignError::Misplaced)?;
@@ -440,7 +474,7 @@ impl Aligned {
         fair::fair(&mut bench);
         let cones = self.charts.index.iter().filter(|i| **i != 0).count();
         let Draft { worth, deviation_deg, .. } = draft;
-        Ok(Laid { network: self.proxy.network(&bench.complex), cones, deviation_deg, worth })
+        Ok(Laid { network: self.proxy.network(&bench.complex), cones, deviation_deg, worth, is_far })
     }
 }
 

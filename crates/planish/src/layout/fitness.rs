@@ -126,6 +126,11 @@ pub(super) fn good_part(bench: &Bench) -> f64 {
     covers.iter().filter(|c| c.is_good()).count() as f64 / covers.len().max(1) as f64
 }
 
+/// Cells of which enough are good if the bad ones stay as many: bad corners that the form gives are not cured by more cells.
+pub(super) fn cells_needed(good_part: f64, cells: usize) -> f64 {
+    (1.0 - good_part) * cells as f64 / (1.0 - KEPT)
+}
+
 /// True if so large a part of the patches is good that more of them are not needed.
 pub(super) fn is_good(good_part: f64) -> bool {
     good_part >= KEPT

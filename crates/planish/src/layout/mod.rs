@@ -183,7 +183,7 @@ pub fn layout(
     sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
     let along = aligned::lay(mesh, &sharp, corners, params, observer);
     let (along, why) = match along {
-        Ok(laid) if params.coarsest || laid.worth.is_enough() => return Ok(laid.into()),
+        Ok(laid) if params.coarsest || laid.is_final() => return Ok(laid.into()),
         Ok(laid) if laid.worth.is_kept() => {
             (Some(laid), "patches along its form would be covered less well by grids".to_owned())
         }

@@ -75,6 +75,11 @@ impl Sizing {
         Sizing { edge: (area / (EQUILATERAL * triangles.max(1) as f64)).sqrt(), spots: Vec::new() }
     }
 
+    /// True if edges are as long everywhere.
+    pub fn is_even(&self) -> bool {
+        self.spots.is_empty()
+    }
+
     /// Asks for shorter edges at a place, and for longer ones again at a distance.
     pub fn shorten(&mut self, place: DVec3, edge: f64) {
         self.spots.push((place, edge));
