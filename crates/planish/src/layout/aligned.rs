@@ -488,6 +488,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_network_of_the_number_asked_for_is_final_if_it_is_good_or_if_no_number_outweighs_its_bad_cells() {
+        let is_final = |patches, good_part, is_far| {
+            let worth = Worth::new(patches, Some(60), good_part);
+            Laid { network: Network::default(), cones: 0, deviation_deg: 0.0, worth, is_far }.is_final()
+        };
+        assert!(is_final(60, 0.95, false) && is_final(60, 0.4, true));
+        assert!(!is_final(60, 0.85, false) && !is_final(110, 0.4, true));
+        // 24 bad cells of 60 are one in ten of 240.
+        assert!((fitness::cells_needed(0.6, 60) - 240.0).abs() < 1e-9);
+    }
+
+    #[test]
     fn a_network_nearer_to_the_number_asked_for_is_worth_more_and_among_those_that_have_it_the_better_one() {
         let worth = |patches, good_part| Worth::new(patches, Some(60), good_part);
         assert!(worth(110, 0.5).exceeds(worth(317, 1.0)) && worth(40, 0.5).exceeds(worth(110, 1.0)));
