@@ -10,7 +10,7 @@
 
 use super::embed::{self, EmbedError};
 use super::fair;
-use super::fitness;
+use super::fitness::{self, Cover};
 use super::integers::{self, IntegerMap, QuantizeError, Scale};
 use super::map::{self, Charts, Effort};
 use super::proxy::{self, Proxy, Sizing};
@@ -208,7 +208,7 @@ pub(super) struct Laid {
     pub deviation_deg: f64,
     /// What it is worth.
     pub worth: Worth,
-    /// True if the form gives it more bad cells than any number of cells in question would outweigh.
+    /// True if its form gives it more bad cells than any number of cells in question would outweigh.
     is_far: bool,
 }
 
@@ -326,16 +326,15 @@ pub(super) fn lay(
 struct Draft<'a> {
     bench: Bench<'a>,
     worth: Worth,
-    /// As of [`fitness::cells_needed`].
-    needed: f64,
+    covers: Vec<Cover>,
     deviation_deg: f64,
 }
 
 impl Aligned {
     /// The first good network, of the numbers of patches in question, else the best; and what was in the way of others.
     ///
-    /// If the first network has so many bad cells that no number in question would outweigh them, as on shapes of limbs and folds, the
-    /// largest number that has room is taken, or that which is asked for.
+    /// If no number in question would outweigh the bad cells of the first network ([`fitness::is_beyond`]), as on shapes of limbs and
+    /// folds, the largest number that has room is taken, or that which is asked for.
     fn choose(
         &self,
         params: &LayoutParams,
@@ -378,7 +377,7 @@ impl Aligned {
             match draft {
                 Ok(draft) => {
                     let mut is_last = draft.worth.is_enough() || is_far;
-                    if best.is_none() && draft.needed > most {
+                    if best.is_none() && fitness::is_beyond(&draft.covers, most) {
                         is_far = true;
                         is_last |= asked(params).is_some() && draft.worth.is_kept();
                         tried.make_contiguous().sort_by(|a, b| b.cmp(a));
@@ -439,7 +438,8 @@ impl Aligned {
         let rounds = SETTLING_PER_SMOOTHING * params.smoothing;
         let squares = bench.complex.live_cells().count();
         improve::settle(&mut bench, squares, rounds, observer).map_err(|_| Cancelled)?;
-        let good_part = fitness::good_part(&bench);
+        let covers = fitness::covers(&bench);
+        let good_part = fitness::good_part(&covers);
         let joined = fitness::joined(&bench, params.patches);
         let patches = joined.live_cells().count();
         if patches < squares && !params.coarsest {
@@ -447,8 +447,7 @@ impl Aligned {
             improve::settle(&mut bench, patches, rounds, observer).map_err(|_| Cancelled)?;
         }
         let worth = Worth::new(bench.complex.live_cells().count(), asked(params), good_part);
-        let needed = fitness::cells_needed(good_part, squares);
-        Ok(Draft { bench, worth, needed, deviation_deg: mapped.deviation_deg })
+        Ok(Draft { bench, worth, covers, deviation_deg: mapped.deviation_deg })
     }
 
     /// # Errors
@@ -495,8 +494,6 @@ mod tests {
         };
         assert!(is_final(60, 0.95, false) && is_final(60, 0.4, true));
         assert!(!is_final(60, 0.85, false) && !is_final(110, 0.4, true));
-        // 24 bad cells of 60 are one in ten of 240.
-        assert!((fitness::cells_needed(0.6, 60) - 240.0).abs() < 1e-9);
     }
 
     #[test]

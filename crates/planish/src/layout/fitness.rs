@@ -9,6 +9,7 @@ use crate::mesh::TriMesh;
 use crate::network::CurveKind;
 use glam::DVec3;
 use rayon::prelude::*;
+use std::collections::HashSet;
 use std::f64::consts::FRAC_2_PI;
 
 /// Part of the patches that has to be covered well: more squares are tried until it is.
@@ -25,6 +26,8 @@ pub(super) struct Cover {
     /// Length of the sum of all normals, by area, as a part of the area: 1 for a plane, 2/pi for half a cylinder, 1/2 for
     /// half a ball.
     pub flatness: f64,
+    /// True if none of its corners lies on a line or a boundary.
+    pub is_open: bool,
 }
 
 impl Cover {
@@ -39,13 +42,19 @@ pub(super) fn covers(bench: &Bench) -> Vec<Cover> {
     let shapes = bench.shapes();
     let cells: Vec<u32> = bench.complex.live_cells().collect();
     let is_sharp = |half: u32| bench.complex.arc(half).kind == CurveKind::Feature;
+    let on_line: HashSet<u32> = (cells.iter().flat_map(|&c| bench.complex.loop_of(c)))
+        .filter(|&&half| bench.complex.arc(half).kind != CurveKind::Smooth)
+        .flat_map(|&half| [bench.complex.from(half), bench.complex.from(half ^ 1)])
+        .collect();
     let cover = |&c: &u32| {
         let shape = shapes[c as usize].as_ref()?;
         let sides = bench.complex.loop_of(c);
         let is_given = |k: usize| is_sharp(sides[k]) && is_sharp(sides[(k + 3) % 4]);
         let off = shape.angles().into_iter().enumerate().filter(|(k, _)| !is_given(*k));
         let corner_deg = off.map(|(_, angle)| (angle.to_degrees() - 90.0).abs()).fold(0.0, f64::max);
-        Some(Cover { corner_deg, flatness: flatness(&bench.embedding.cut.mesh, &bench.embedding.members[c as usize]) })
+        let flatness = flatness(&bench.embedding.cut.mesh, &bench.embedding.members[c as usize]);
+        let is_open = !sides.iter().any(|&half| on_line.contains(&bench.complex.from(half)));
+        Some(Cover { corner_deg, flatness, is_open })
     };
     cells.par_iter().filter_map(cover).collect()
 }
@@ -121,14 +130,16 @@ fn joined_sides(mesh: &TriMesh, complex: &Complex, a: u32, b: u32) -> Option<[Si
 }
 
 /// Part of the patches that a grid covers well.
-pub(super) fn good_part(bench: &Bench) -> f64 {
-    let covers = covers(bench);
+pub(super) fn good_part(covers: &[Cover]) -> f64 {
     covers.iter().filter(|c| c.is_good()).count() as f64 / covers.len().max(1) as f64
 }
 
-/// Cells of which enough are good if the bad ones stay as many: bad corners that the form gives are not cured by more cells.
-pub(super) fn cells_needed(good_part: f64, cells: usize) -> f64 {
-    (1.0 - good_part) * cells as f64 / (1.0 - KEPT)
+/// True if most cells lie on open surface and so many of these are bad that, if they stay as many, no number of cells up to `most` is
+/// enough: what shears a map between its cones is not cured by more cells. Along lines another map may help.
+pub(super) fn is_beyond(covers: &[Cover], most: f64) -> bool {
+    let open: Vec<&Cover> = covers.iter().filter(|c| c.is_open).collect();
+    let bad = open.iter().filter(|c| !c.is_good()).count();
+    2 * open.len() > covers.len() && bad as f64 > (1.0 - KEPT) * most
 }
 
 /// True if so large a part of the patches is good that more of them are not needed.
@@ -140,6 +151,16 @@ pub(super) fn is_good(good_part: f64) -> bool {
 mod tests {
     use super::*;
     use crate::synthetic::shapes;
+
+    #[test]
+    fn thirty_one_bad_cells_on_open_surface_are_beyond_300_and_those_along_lines_or_among_many_lines_are_not() {
+        let cells =
+            |count: usize, corner_deg: f64, is_open: bool| vec![Cover { corner_deg, flatness: 1.0, is_open }; count];
+        let far = |parts: &[Vec<Cover>]| is_beyond(&parts.concat(), 300.0);
+        assert!(far(&[cells(31, 50.0, true), cells(30, 10.0, true), cells(20, 10.0, false)]));
+        assert!(!far(&[cells(29, 50.0, true), cells(30, 10.0, true), cells(20, 50.0, false)]));
+        assert!(!far(&[cells(31, 50.0, true), cells(30, 10.0, true), cells(70, 10.0, false)]));
+    }
 
     #[test]
     fn half_a_ball_has_a_flatness_of_a_half_and_half_a_cylinder_2_by_pi_within_1_percent() {

@@ -264,7 +264,10 @@ fn partitioned(
                 }
                 fair::fair(&mut bench);
                 observer.progress(1.0);
-                return Ok((network(&work, &work_adjacency, &bench.complex), fitness::good_part(&bench)));
+                return Ok((
+                    network(&work, &work_adjacency, &bench.complex),
+                    fitness::good_part(&fitness::covers(&bench)),
+                ));
             }
         }
         edge /= 2.0;
