@@ -8,6 +8,7 @@ use std::path::Path;
 
 /// The list of the tiles.
 pub const TILE_LIST: &str = "tiles.json";
+/// Of the list.
 const VERSION: u32 = 1;
 
 #[derive(Serialize, Deserialize)]
@@ -43,7 +44,7 @@ pub enum TilesError {
     Write(#[from] WriteError),
 }
 
-/// Writes the tiles of a mesh into a folder. Vertices on the border of two tiles have the same bits in both.
+/// Writes the tiles of a mesh into a folder and returns how many there are. Vertices on the border of two tiles have the same bits in both.
 /// * `size` - side of a tile, units of the mesh
 /// * `shift` - brings the mesh back to its place; tiles are those of the place
 /// # Errors

@@ -10,9 +10,9 @@
 `run_many`: each input is one task, and each task is `planish run` in a process of its own on its worker: the products are the same
 bytes, in the same folders, as those of `planish.run_many`, whatever the number of workers. `mesh`: each brick of a scan is a task,
 first for its samples and then for its mesh (`planish.Bricks`); the mesh is the same bytes as on one machine. `fit`: patches of a
-network are relaxed by shares, each share a task, and the model is the same bytes; what workers need is sent to them. Others read and
-write files by these paths, so on several machines they lie on a file system that all of them have. A task whose worker dies is
-started again on another one; files appear whole or not at all, and what is finished is not lost.
+network are relaxed by shares, each share a task, and the model is the same bytes; what workers need is sent to them. For
+the other two they read and write files by these paths, so on several machines these lie on a file system that all of them have. A
+task whose worker dies is started again on another one; files appear whole or not at all, and what is finished is not lost.
 
 A script that starts a cluster of its own needs `if __name__ == "__main__":` around the call, as everything does that starts
 processes. It needs `dask.distributed`, imported when it is asked for.

@@ -59,12 +59,10 @@ impl Source {
 }
 
 pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
-    let staged = if args.tiles.is_some() {
-        Staged::folder(&args.output)?
-    } else {
+    if args.tiles.is_none() {
         files::check_extension(&args.output, &["ply", "obj", "stl", "glb", "nrrd", "npy"])?;
-        Staged::file(&args.output)?
-    };
+    }
+    let staged = staged(args)?;
     let own_report = session.stage_report()?;
     let params = args.meshing.params()?;
     let grid_params = args.volume.params(None)?;
@@ -78,7 +76,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
             args.meshing.refuse_cleaning("leave it out: the result is closed anyway")?
         }
     }
-    if args.tiles.is_none() && planish_io::is_grid(&args.output) {
+    if is_volume(args) {
         let from = Sampled { staged, own_report, source, input, read };
         return volume(session, args, from, &params);
     }
@@ -154,6 +152,16 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
         table(args, made, &report).print();
     }
     Ok(Status::Done)
+}
+
+/// Room for the output: a folder of tiles, or a file.
+fn staged(args: &Mesh) -> Result<Staged, Failure> {
+    if args.tiles.is_some() { Staged::folder(&args.output) } else { Staged::file(&args.output) }
+}
+
+/// True if the field itself is written, and no mesh.
+fn is_volume(args: &Mesh) -> bool {
+    args.tiles.is_none() && planish_io::is_grid(&args.output)
 }
 
 /// A source that is to become a volume.
@@ -300,8 +308,8 @@ fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Sourc
         return Ok((Source::Grid(Box::new(grid)), input, units));
     }
     let large = planish_io::points_told(path).is_some_and(|n| n > pipeline::BRICK_POINTS as u64);
-    if planish_io::is_scan(path) && large && (args.tiles.is_some() || !planish_io::is_grid(&args.output)) {
-        let room = if args.tiles.is_some() { Staged::folder(&args.output)? } else { Staged::file(&args.output)? };
+    if planish_io::is_scan(path) && large && !is_volume(args) {
+        let room = staged(args)?;
         let folder = room.path("bricks");
         std::fs::create_dir(&folder).map_err(|e| products::unwritable(&folder, &e))?;
         let (bricks, far_off) = files::scan_in_bricks(path, &args.scan, &folder)?;
