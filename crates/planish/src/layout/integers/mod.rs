@@ -1,14 +1,15 @@
 //! From a seamless map to an integer-grid map: cones and corners of lines come to lie on whole numbers.
 //!
 //! 1. the mesh is thinned out in the map until only cones and corners of lines are left ([`thin`], on [`flat`]);
-//! 2. the edges of the triangles that are left get whole vectors, at a scale at which all triangles are upright, and then
-//!    as near to those wished as walks over the triangles bring them ([`walks`]);
+//! 2. the edges of the triangles that are left get whole vectors, at a scale at which all triangles are upright; walks over
+//!    the triangles then make them as short as can be ([`walks`]), or of the size asked for with isolines turned least ([`form`]);
 //! 3. every corner of the mesh goes where the stretched triangle takes it ([`charts`]).
 //!
 //! Coudert-Osmont, Desobry, Heistermann, Bommes, Ray, Sokolov 2024, *Quad Mesh Quantization Without a T-Mesh*.
 
 mod charts;
 mod flat;
+mod form;
 #[cfg(test)]
 mod tests;
 mod thin;
@@ -69,9 +70,12 @@ pub(super) enum QuantizeError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Rounds of steering the scale towards the number of squares asked for, and how near is near enough.
-const ROUNDS: usize = 8;
+/// Rounds of steering the price of a square towards the number of squares asked for, and how near is near enough.
+const ROUNDS: usize = 10;
 const NEAR: f64 = 0.04;
+
+/// The first price of all squares asked for, against an energy of 1 of the whole map.
+const FIRST_PRICE: f64 = 0.1;
 
 /// Turns of flips and walks.
 const FLIP_ROUNDS: usize = 6;
@@ -119,39 +123,53 @@ fn integers(flat: Flat, area: f64, scale: Scale, observer: &dyn Observer) -> Res
         Scale::Coarsest => flat.len() as f64 / 2.0,
         Scale::Squares(count) => count as f64,
     };
-    let mut steer = (asked / area).sqrt();
-    let Some(mut whole) = Whole::start(flat, steer, observer)? else { return Ok(None) };
+    let ratio = (asked / area).sqrt();
+    let Some(mut whole) = Whole::start(flat, ratio, observer)? else { return Ok(None) };
     if scale == Scale::Coarsest {
-        settle(&mut whole, 0.0, observer)?;
+        shrink(&mut whole, observer)?;
         return Ok(Some(whole));
     }
     let off = |w: &Whole| (w.squares() as f64 / asked).ln();
     let mut best: Option<Whole> = None;
-    // Scales that gave too few and too many.
-    let (mut low, mut high) = (None, None);
+    // What a square costs; what gave too few and too many of them; and by how much it changes until both are known.
+    let (mut price, mut high, mut low) = (0.0, None, None);
+    let mut change = FIRST_PRICE / asked;
     for _ in 0..ROUNDS {
-        settle(&mut whole, steer, observer)?;
+        settle(&mut whole, ratio, price, observer)?;
         if best.as_ref().is_none_or(|b| off(&whole).abs() < off(b).abs()) {
             best = Some(whole.clone());
         }
         if off(&whole).abs() <= NEAR {
             break;
         }
-        *(if off(&whole) < 0.0 { &mut low } else { &mut high }) = Some(steer);
-        steer = match (low, high) {
-            (Some(low), Some(high)) => f64::sqrt(low * high),
-            _ => steer * (-0.5 * off(&whole)).exp(),
+        let are_few = off(&whole) < 0.0;
+        *(if are_few { &mut high } else { &mut low }) = Some(price);
+        price = match (low, high) {
+            (Some(low), Some(high)) => (low + high) / 2.0,
+            _ => price + if are_few { -change } else { change },
         };
+        change *= 2.0;
     }
     Ok(best)
 }
 
-/// Brings the vectors near to the map at a scale: walks and flips in turn.
-fn settle(whole: &mut Whole, scale: f64, observer: &dyn Observer) -> Result<(), Cancelled> {
-    whole.wish_scale(scale);
+/// Brings the vectors near to the map at a scale, where each square has a price: walks and flips in turn.
+fn settle(whole: &mut Whole, scale: f64, price: f64, observer: &dyn Observer) -> Result<(), Cancelled> {
+    for _ in 0..FLIP_ROUNDS {
+        form::descend(whole, scale, price, observer)?;
+        if !whole.flip_edges() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Makes the vectors as short as walks and flips can.
+fn shrink(whole: &mut Whole, observer: &dyn Observer) -> Result<(), Cancelled> {
+    whole.wish_least();
     for _ in 0..FLIP_ROUNDS {
         whole.descend(observer)?;
-        if !whole.flip_edges(scale) {
+        if !whole.flip_edges() {
             break;
         }
     }

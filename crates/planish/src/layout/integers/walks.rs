@@ -37,7 +37,7 @@ const GAIN: f64 = 1e-9;
 const SEED: u64 = 26;
 
 /// The unit vector of a direction, 0 to 3 counter-clockwise from x.
-fn unit(direction: u32) -> I64Vec2 {
+pub(super) fn unit(direction: u32) -> I64Vec2 {
     [I64Vec2::X, I64Vec2::Y, I64Vec2::NEG_X, I64Vec2::NEG_Y][direction as usize % 4]
 }
 
@@ -55,7 +55,7 @@ fn turned(v: I64Vec2, turns: u8) -> I64Vec2 {
 const UPRIGHT: f64 = 1e-4;
 
 /// A change that arrived: half-edge and direction as `4 h + direction`.
-type State = u32;
+pub(super) type State = u32;
 
 /// Whole edge vectors of a flat surface.
 #[derive(Clone)]
@@ -121,15 +121,14 @@ impl Whole {
         (0..self.flat.len()).map(|t| self.twice_area(t)).sum::<i64>() / 2
     }
 
-    /// Wishes for the map at this scale; 0 for as little as can be.
-    pub fn wish_scale(&mut self, scale: f64) {
-        self.wish = self.flat.edge.iter().map(|&e| e * scale).collect();
+    /// Wishes for edges as short as can be.
+    pub fn wish_least(&mut self) {
+        self.wish.fill(DVec2::ZERO);
     }
 
     /// Flips edges that are not Delaunay in the stretched surface, where the triangles stay upright in the map as well: what
     /// keeps triangles upright then hinders walks less. True if any was.
-    /// * `scale` - of the wishes
-    pub fn flip_edges(&mut self, scale: f64) -> bool {
+    pub fn flip_edges(&mut self) -> bool {
         let mut flipped = false;
         for h in 0..self.q.len() as u32 {
             let o = self.flat.opposite[h as usize];
@@ -161,7 +160,7 @@ impl Whole {
                 for k in 0..3 {
                     let g = 3 * *t as usize + k;
                     self.q[g] = places[corners[(k + 1) % 3]] - places[corners[k]];
-                    self.wish[g] = self.flat.edge[g] * scale;
+                    self.wish[g] = DVec2::ZERO;
                     self.weight[g] = weight(self.flat.edge[g], self.mean);
                 }
             }
@@ -184,13 +183,13 @@ impl Whole {
     }
 
     /// Whether a half-edge may change in a direction: on lines along them only.
-    fn free(&self, h: u32, direction: u32) -> bool {
+    pub fn is_free(&self, h: u32, direction: u32) -> bool {
         let along_x = self.flat.edge[h as usize].x.abs() > self.flat.edge[h as usize].y.abs();
         !self.flat.line[h as usize] || along_x == direction.is_multiple_of(2)
     }
 
     /// Changes a half-edge, and the other half of its edge.
-    fn change(&mut self, h: u32, by: I64Vec2) {
+    pub fn change(&mut self, h: u32, by: I64Vec2) {
         self.q[h as usize] += by;
         let o = self.flat.opposite[h as usize];
         if o != NONE {
@@ -202,7 +201,7 @@ impl Whole {
     fn round(&mut self) {
         let near = |h: u32| {
             let wish = self.wish[h as usize].round();
-            let part = |direction: u32, x: f64| if self.free(h, direction) { x as i64 } else { 0 };
+            let part = |direction: u32, x: f64| if self.is_free(h, direction) { x as i64 } else { 0 };
             I64Vec2::new(part(0, wish.x), part(1, wish.y))
         };
         let mut rounded: Vec<I64Vec2> = (0..self.wish.len() as u32).map(near).collect();
@@ -293,7 +292,7 @@ impl Whole {
     /// Cost of undoing, on half-edge `h`, a change that half-edge `came` of the same triangle has had; `None` where a
     /// line forbids it.
     fn step_cost(&self, came: u32, direction: u32, h: u32, size: i64) -> Option<f64> {
-        if !self.free(h, direction) {
+        if !self.is_free(h, direction) {
             return None;
         }
         let change = unit(direction) * size;
@@ -362,7 +361,7 @@ impl Whole {
         let change = unit(direction) * size;
         let now = self.q[h as usize];
         let gain = self.cost(h, now) - self.cost(h, now + change);
-        if !self.free(h, direction) || !(gain > 0.0) {
+        if !self.is_free(h, direction) || !(gain > 0.0) {
             return false;
         }
         let limit = far.0 * gain + far.1;

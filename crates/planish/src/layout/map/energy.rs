@@ -20,6 +20,9 @@ const AREA_WEIGHT: f64 = 0.3;
 /// Weight of the field's directions in [`Maps::barrier`]: enough to keep isolines along it where nothing is folded.
 const HOLD: f64 = 0.5;
 
+/// Faces that a map stretches by more than this, or by less than its inverse, are not to stay so. Chosen.
+const MOST_STRETCHED: f64 = 3.0;
+
 /// A variable that has to stay positive, as barriers see it.
 struct Guarded {
     /// Nearly the variable where it is positive, finite and positive where it is not; comes nearer with less softness.
@@ -69,6 +72,24 @@ impl<'a> Maps<'a> {
         let gradient = (0..faces).map(gradient).collect();
         let share = area.iter().map(|a| a.max(least) / whole).collect();
         Maps { seams, gradient, share, within_quarter, effort: charts.effort.clone() }
+    }
+
+    /// The same with faces that are to be stretched so along and across their field.
+    pub fn stretched(mut self, stretch: &[DVec2]) -> Maps<'a> {
+        for (gradients, &stretch) in self.gradient.iter_mut().zip(stretch) {
+            gradients.iter_mut().for_each(|g| *g /= stretch);
+        }
+        self
+    }
+
+    /// How much each face is stretched along and across its field, at the corners `x`, as far as [`MOST_STRETCHED`] goes.
+    pub fn stretches(&self, x: &[f64]) -> Vec<DVec2> {
+        let each = |f: usize| {
+            let j = self.jacobian(f, x);
+            let (least, most) = (DVec2::splat(1.0 / MOST_STRETCHED), DVec2::splat(MOST_STRETCHED));
+            DVec2::new(j.x_axis.length(), j.y_axis.length()).clamp(least, most)
+        };
+        (0..self.gradient.len()).map(each).collect()
     }
 
     /// True once no more work may go into the maps.

@@ -40,6 +40,9 @@ const LATTICE_BITS: i32 = 40;
 /// not untangle the second may.
 const SOFTNESS: [f64; 2] = [0.1, 0.01];
 
+/// How often a map with whole numbers takes the stretches that it has come to for those that it should have.
+const STRETCHES: usize = 2;
+
 /// A map of a mesh to the plane, triangle by triangle.
 ///
 /// Seen from both of its triangles an edge has the same length, and the same direction but for quarter turns: with `d`
@@ -179,6 +182,12 @@ pub(super) fn smooth_integers(
         }
     };
     untangle::untangle(&maps, &laplacian, &mut free, 0.0, observer)?;
+    // Whole numbers make cells oblong: a map that holds on to squares would shear them.
+    for _ in 0..STRETCHES {
+        let stretch = maps.stretches(&seams.coordinates(&free));
+        let stretched = Maps::new(mesh, charts, &seams, scale, false).stretched(&stretch);
+        untangle::untangle(&stretched, &laplacian, &mut free, 0.0, observer)?;
+    }
     Ok(Ok(certified((mesh, adjacency), &maps, charts, free)))
 }
 

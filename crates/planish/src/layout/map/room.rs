@@ -42,15 +42,22 @@ impl<'a> Room<'a> {
         self.adjacency.fan(v).map(|h| self.mesh.origin(next(h)))
     }
 
-    /// The cones that stand beside a line or another cone.
+    /// The cones that have no room: those that stand beside a line or another cone, and those with fewer faces around them
+    /// than right angles, which would be mapped to flat ones.
     /// * `index` - of each vertex
     pub fn tight(&self, index: &[i32]) -> Vec<u32> {
         let is_tight = |v: &u32| {
-            index[*v as usize] != 0 && !self.on_line[*v as usize] && {
-                self.beside(*v).any(|w| self.on_line[w as usize] || index[w as usize] != 0)
-            }
+            let is_beside = |w: u32| self.on_line[w as usize] || index[w as usize] != 0;
+            let is_cone = index[*v as usize] != 0 && !self.on_line[*v as usize];
+            is_cone && self.beside(*v).any(is_beside) || self.is_short_of_faces(*v, index[*v as usize])
         };
         (0..index.len() as u32).filter(is_tight).collect()
+    }
+
+    /// True if a vertex with this index has fewer faces than right angles, and more of these than a regular one.
+    fn is_short_of_faces(&self, v: u32, index: i32) -> bool {
+        let regular = if self.adjacency.is_boundary_vertex(v) { 2 } else { 4 };
+        index < 0 && (self.adjacency.fan(v).count() as i32) < regular - index
     }
 
     /// Moves `cones` to the nearest vertices with room, if there are any, and makes `theta` smooth again around their ways.
@@ -83,8 +90,12 @@ impl<'a> Room<'a> {
 
     /// The half-edges from a cone to the nearest vertex with room.
     fn way(&self, cone: u32, index: &[i32]) -> Option<Vec<u32>> {
+        if self.on_line[cone as usize] {
+            return None;
+        }
         let is_bound = |v: u32| self.on_line[v as usize] || (index[v as usize] != 0 && v != cone);
-        let has_room = |v: u32| !self.beside(v).any(is_bound);
+        let index_of_cone = index[cone as usize];
+        let has_room = |v: u32| !self.beside(v).any(is_bound) && !self.is_short_of_faces(v, index_of_cone);
         let mut from: HashMap<u32, u32> = HashMap::from([(cone, NONE)]);
         let mut queue = VecDeque::from([cone]);
         while let Some(v) = queue.pop_front() {
