@@ -6,7 +6,8 @@
 //! ```text
 //! E = sum over triangles of  area ( arg² u + arg² v + STRETCH (stretch² u + stretch² v) ),   stretch g = (|g| - 1/|g|) / 2
 //! ```
-//! with `u` and `v` the gradients of both coordinates, as complex numbers along the axes that they should lie on.
+//! with `u` and `v` the gradients of both coordinates, as complex numbers along the axes that they should lie on. Areas and sizes are
+//! those of the surface: a seamless map squeezes limbs, which would get too few squares by their size in the map.
 //!
 //! It is lowered by walks, as in [`super::walks`]. A step of a walk changes one triangle, so its cost is known, and a walk that
 //! lowers the energy is a cycle of negative cost in the graph of all steps, which is found as Bellman 1958, *On a Routing
@@ -22,6 +23,9 @@ use glam::{DMat2, DVec2, I64Vec2};
 /// among .1, .2 and .4 on ten measured meshes: with less, strips of cells find no room; with more, cells are sheared.
 const STRETCH: f64 = 0.2;
 
+/// Where the map squeezes or stretches the surface by more than this, squares are not asked to make up for all of it. Chosen.
+const MOST_GROWTH: f64 = 5.0;
+
 /// Walks in succession that lower the energy by their steps but not when measured, until none is sought any more.
 const MAX_FAILURES: usize = 100;
 
@@ -35,22 +39,27 @@ const MAX_ROUNDS: usize = 400;
 pub(super) struct Form {
     /// For each triangle what makes its Jacobian of its first two edges.
     inverse: Vec<DMat2>,
-    /// Part of the area of the map.
+    /// Part of the area of the surface.
     share: Vec<f64>,
     /// Of a square.
     price: f64,
 }
 
 impl Form {
-    /// * `scale` - of the squares asked for, against the map
+    /// * `parts` - of each face of the input of the area of the surface and of the map
+    /// * `scale` - of the squares asked for, against the map in the mean
     /// * `price` - energy of each square besides, for more or fewer of them
-    pub fn new(whole: &Whole, scale: f64, price: f64) -> Form {
+    pub fn new(whole: &Whole, parts: &[DVec2], scale: f64, price: f64) -> Form {
         let edges = |t: usize| DMat2::from_cols(whole.flat.edge[3 * t], whole.flat.edge[3 * t + 1]);
-        let area: Vec<f64> = (0..whole.flat.len()).map(|t| edges(t).determinant()).collect();
-        let sum: f64 = area.iter().sum();
+        let total: f64 = (0..whole.flat.len()).map(|t| edges(t).determinant()).sum();
+        // How much longer the surface is there than in the map; where no mark lies as in the mean.
+        let growth = |t: usize| {
+            let sum: DVec2 = whole.flat.marks[t].iter().map(|mark| parts[mark.face as usize]).sum();
+            if sum.y > 0.0 { (sum.x / sum.y).sqrt().clamp(1.0 / MOST_GROWTH, MOST_GROWTH) } else { 1.0 }
+        };
         Form {
-            inverse: (0..whole.flat.len()).map(|t| (edges(t) * scale).inverse()).collect(),
-            share: area.iter().map(|a| a / sum).collect(),
+            inverse: (0..whole.flat.len()).map(|t| (edges(t) * scale * growth(t)).inverse()).collect(),
+            share: (0..whole.flat.len()).map(|t| edges(t).determinant() / total * growth(t).powi(2)).collect(),
             price,
         }
     }
@@ -209,11 +218,17 @@ fn cycles(before: &[Option<(State, usize)>]) -> Vec<Cycle> {
 }
 
 /// Lowers the energy until no walk of unit changes does.
-/// * `scale`, `price` - as in [`Form::new`]
+/// * `parts`, `scale`, `price` - as in [`Form::new`]
 /// # Errors
 /// [`Cancelled`] by the observer.
-pub(super) fn descend(whole: &mut Whole, scale: f64, price: f64, observer: &dyn Observer) -> Result<(), Cancelled> {
-    let form = Form::new(whole, scale, price);
+pub(super) fn descend(
+    whole: &mut Whole,
+    parts: &[DVec2],
+    scale: f64,
+    price: f64,
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
+    let form = Form::new(whole, parts, scale, price);
     let mut steps = Steps::new(whole, &form);
     // Triangles whose steps are out of date, or cost more than they do.
     let mut stale: Vec<usize> = Vec::new();

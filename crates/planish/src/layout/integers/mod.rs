@@ -105,7 +105,7 @@ pub(super) fn quantize(
     observer.progress(0.4);
     let total: f64 = map.uv.iter().map(area).sum();
     let triangles = flat.len();
-    let whole = integers(flat, total, scale, observer)?.ok_or(QuantizeError::Stuck { triangles })?;
+    let whole = integers(flat, &parts(mesh, map), total, scale, observer)?.ok_or(QuantizeError::Stuck { triangles })?;
     let flat = &whole.flat;
     observer.progress(0.8);
     let edges: Vec<DVec2> = whole.q.iter().map(|q| q.as_dvec2()).collect();
@@ -116,9 +116,25 @@ pub(super) fn quantize(
     Ok(IntegerMap { uv, kept: (0..kept.len() as u32).filter(|&v| kept[v as usize]).collect(), squares })
 }
 
+/// The parts that each face has of the area of the surface and of the map.
+fn parts(mesh: &TriMesh, map: &SeamlessMap) -> Vec<DVec2> {
+    let areas: Vec<DVec2> = (map.uv.iter().enumerate())
+        .map(|(f, [a, b, c])| DVec2::new(mesh.area(f), (*b - *a).perp_dot(*c - *a) / 2.0))
+        .collect();
+    let sum: DVec2 = areas.iter().sum();
+    areas.into_iter().map(|area| area / sum).collect()
+}
+
 /// Whole edge vectors for a thinned mesh; `None` if there are none with all triangles upright.
+/// * `parts` - [`parts`]
 /// * `area` - of the map
-fn integers(flat: Flat, area: f64, scale: Scale, observer: &dyn Observer) -> Result<Option<Whole>, Cancelled> {
+fn integers(
+    flat: Flat,
+    parts: &[DVec2],
+    area: f64,
+    scale: Scale,
+    observer: &dyn Observer,
+) -> Result<Option<Whole>, Cancelled> {
     let asked = match scale {
         Scale::Coarsest => flat.len() as f64 / 2.0,
         Scale::Squares(count) => count as f64,
@@ -135,7 +151,7 @@ fn integers(flat: Flat, area: f64, scale: Scale, observer: &dyn Observer) -> Res
     let (mut price, mut high, mut low) = (0.0, None, None);
     let mut change = FIRST_PRICE / asked;
     for _ in 0..ROUNDS {
-        settle(&mut whole, ratio, price, observer)?;
+        settle(&mut whole, parts, ratio, price, observer)?;
         if best.as_ref().is_none_or(|b| off(&whole).abs() < off(b).abs()) {
             best = Some(whole.clone());
         }
@@ -154,9 +170,15 @@ fn integers(flat: Flat, area: f64, scale: Scale, observer: &dyn Observer) -> Res
 }
 
 /// Brings the vectors near to the map at a scale, where each square has a price: walks and flips in turn.
-fn settle(whole: &mut Whole, scale: f64, price: f64, observer: &dyn Observer) -> Result<(), Cancelled> {
+fn settle(
+    whole: &mut Whole,
+    parts: &[DVec2],
+    scale: f64,
+    price: f64,
+    observer: &dyn Observer,
+) -> Result<(), Cancelled> {
     for _ in 0..FLIP_ROUNDS {
-        form::descend(whole, scale, price, observer)?;
+        form::descend(whole, parts, scale, price, observer)?;
         if !whole.flip_edges() {
             break;
         }

@@ -94,7 +94,9 @@ fn components_are_counted_together_and_one_without_a_cone_is_kept_too() {
     let made = solid(&cuboid([1, 1, 1]), 6).beside(&torus(3, 2, 6)).beside(&flat(&[[0, 0], [1, 0]], 6));
     let found = squares_of(&made, &made.lines, Scale::Coarsest);
     assert_eq!((found.squares, found.kept.len()), (6 + 1 + 1, 8 + 1 + 4));
-    assert_eq!(squares_of(&made, &made.lines, Scale::Squares(14)).squares, 14);
+    // Squares are as large on all surfaces; those of the torus are uneven.
+    let found = squares_of(&made, &made.lines, Scale::Squares(14)).squares;
+    assert!((12..=16).contains(&found), "{found}");
 }
 
 #[test]
@@ -186,8 +188,9 @@ fn columns_and_rows_of_an_l_get_numbers_of_squares_that_none_beats_with_one_more
     let mut thinned = Flat::new(&made.mesh, &made.adjacency, &made.map, &made.lines);
     let stays = thin::corners(&thinned);
     thin::thin(&mut thinned, &stays, &Silent).unwrap();
+    let parts = vec![DVec2::ONE; made.mesh.triangles.len()];
     let mut whole = Whole::start(thinned.compact(), 3.0, &Silent).unwrap().unwrap();
-    form::descend(&mut whole, 1.0, 0.0, &Silent).unwrap();
+    form::descend(&mut whole, &parts, 1.0, 0.0, &Silent).unwrap();
     // Edges join corners at the ends of columns and rows.
     let image = |d: f64, sizes: [f64; 2], numbers: [i64; 2]| {
         let ends =
@@ -199,7 +202,7 @@ fn columns_and_rows_of_an_l_get_numbers_of_squares_that_none_beats_with_one_more
         let vector = |e: &DVec2| I64Vec2::new(image(e.x, widths, columns), image(e.y, heights, rows));
         whole.flat.edge.iter().map(vector).collect()
     };
-    let form = form::Form::new(&whole, 1.0, 0.0);
+    let form = form::Form::new(&whole, &parts, 1.0, 0.0);
     let mut other = whole.clone();
     let mut energy = |q: Vec<I64Vec2>| {
         other.q = q;
