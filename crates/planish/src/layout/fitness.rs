@@ -135,7 +135,7 @@ pub(super) fn good_part(covers: &[Cover]) -> f64 {
 }
 
 /// True if most cells lie on open surface and so many of these are bad that, if they stay as many, no number of cells up to `most` is
-/// enough: what shears a map between its cones is not cured by more cells. Along lines another map may help.
+/// enough. With more cells fewer are sheared, but seldom so few before the largest number. Along lines another map may help.
 pub(super) fn is_beyond(covers: &[Cover], most: f64) -> bool {
     let open: Vec<&Cover> = covers.iter().filter(|c| c.is_open).collect();
     let bad = open.iter().filter(|c| !c.is_good()).count();

@@ -70,8 +70,8 @@ pub(super) enum QuantizeError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Rounds of steering the price of a square towards the number of squares asked for, and how near is near enough.
-const ROUNDS: usize = 10;
+/// Prices of a square that are tried on the way towards the number of squares asked for, and how near is near enough.
+const MAX_PRICES: usize = 10;
 const NEAR: f64 = 0.04;
 
 /// The first price of all squares asked for, against an energy of 1 of the whole map.
@@ -150,7 +150,7 @@ fn integers(
     // What a square costs; what gave too few and too many of them; and by how much it changes until both are known.
     let (mut price, mut high, mut low) = (0.0, None, None);
     let mut change = FIRST_PRICE / asked;
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_PRICES {
         settle(&mut whole, parts, ratio, price, observer)?;
         if best.as_ref().is_none_or(|b| off(&whole).abs() < off(b).abs()) {
             best = Some(whole.clone());
