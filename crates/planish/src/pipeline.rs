@@ -24,8 +24,8 @@ mod truth;
 pub use bricks::{BRICK_POINTS, BrickMesh, BrickPlan, BrickWelder, clean_brick, mesh_bricks, mesh_scan};
 pub use deform::{Move, deform, join, matched, moved};
 pub use quality::{
-    FOLDED_DEG, SEAM_ANGLE_WARNING_DEG, displaced_mesh, displaced_patches, inner_angles, span_count, surface_mesh,
-    surface_mesh_cut, surface_patches, worst_seams,
+    FOLDED_DEG, displaced_mesh, displaced_patches, inner_angles, span_count, surface_mesh, surface_mesh_cut,
+    surface_patches, worst_seams,
 };
 pub use record::{Figure, PipelineObserver, Quality, StageRecord, Warning};
 pub use rework::{Earlier, Remade, remake, rework};
@@ -607,7 +607,8 @@ fn surfaces_through(
         // What crosses the plane is its own image only with knots that are.
         fit.knots = KnotSpacing::Even;
     }
-    let stitch = StitchParams { smoothing: fit.smoothing, ..params.stitch.clone() };
+    let (smoothing, tolerance) = (fit.smoothing, fit.rms_allowed(grids));
+    let stitch = StitchParams { smoothing, tolerance, ..params.stitch.clone() };
     let mut fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &fit, o), control)?;
     // Seams are smoothed between images already, and what that takes from their symmetry is given back.
     symmetric(true, &mut fitted);

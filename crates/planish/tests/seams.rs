@@ -320,6 +320,46 @@ fn an_edge_of_62_degrees_that_a_person_calls_smooth_is_rounded_whatever_that_cos
     assert!(is.max < bound, "{was:?} to {is:?} for {bound}");
 }
 
+/// A sheet of four patches that bends by 80 degrees about their middle curve, on an arc of 1.3 knot spans of 9 control points, and
+/// waves along it.
+fn rounded_ridge() -> Patchwork {
+    let (bend, radius) = (80f64.to_radians(), 0.16);
+    let profile = |s: f64| {
+        // By arc length from the ridge.
+        let turned = (s.abs() / radius).min(bend / 2.0);
+        let straight = s.abs() - radius * turned;
+        let way = radius * turned.sin() + straight * turned.cos();
+        (way * s.signum(), radius * (turned.cos() - 1.0) - straight * turned.sin())
+    };
+    sheet(2, 2, [false, false], [33, 33], |x, y| {
+        let (way, height) = profile(y - 1.0);
+        DVec3::new(x, way, height + 0.01 * (5.0 * x).sin())
+    })
+}
+
+#[test]
+fn a_seam_along_a_narrow_ridge_is_smooth_within_what_the_tolerance_of_the_fit_leaves() {
+    let work = rounded_ridge();
+    let smoothing = FitParams::default().smoothing;
+    let fit = FitParams { smoothing, ..params(9, Continuity::G1) };
+    let at = |tolerance: f64| {
+        let [_, after] = both(&work, &fit, &StitchParams { tolerance, smoothing, ..StitchParams::default() });
+        (angles(&work, &after)[1], surface::deviation(&after, &work.grids).rms, after)
+    };
+    let (bent, ..) = at(0.0);
+    let tolerance = 0.005;
+    let (smooth, rms, after) = at(tolerance);
+    assert!(bent > 1.0 && smooth <= 0.05 && rms <= tolerance, "{bent} and {smooth} degrees, RMS {rms}");
+    // The corner on the ridge goes inwards with it, in all four patches.
+    let corner = work.grids[0].points[33 * 33 - 1];
+    let nearest = |s: &Surface| {
+        let ends = [0, s.cols - 1].into_iter().flat_map(|i| [0, s.rows - 1].map(|j| s.at(i, j)));
+        ends.min_by(|a, b| a.distance(corner).total_cmp(&b.distance(corner))).unwrap() - corner
+    };
+    let moves: Vec<DVec3> = after.iter().map(nearest).collect();
+    assert!(moves.iter().all(|way| *way == moves[0]) && moves[0].z < -1e-4, "{moves:?}");
+}
+
 #[test]
 fn after_an_edit_of_one_patch_only_those_that_share_a_corner_with_it_are_solved_again() {
     let mut work = ball(6, 17);

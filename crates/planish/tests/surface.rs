@@ -419,7 +419,7 @@ fn seams_of_a_rough_scan_become_smooth_and_cost_the_fit_half_of_its_accuracy_at_
 }
 
 #[test]
-fn stitching_keeps_seams_bit_identical_and_corners_in_place() {
+fn stitching_keeps_seams_bit_identical_and_moves_corners_by_less_than_the_fit_misses() {
     for work in [
         cube(31, CurveKind::Smooth, blob),
         torus(17),
@@ -433,9 +433,18 @@ fn stitching_keeps_seams_bit_identical_and_corners_in_place() {
             let points = boundary_points(&work, &after, c);
             assert!(points.windows(2).all(|w| w[0] == w[1]));
         }
-        for (a, b) in before.iter().zip(&after) {
-            for (i, j) in [(0, 0), (7, 0), (0, 7), (7, 7)] {
-                assert_eq!(a.at(i, j), b.at(i, j));
+        // Corners with smooth seams all around go along their normals, by less than the fit misses; all others stay.
+        let uses = work.network.uses();
+        let is_inner = |c: usize| uses[c].len() == 2 && work.network.curves[c].kind.is_smooth();
+        let is_held = |corner: u32| {
+            let mut curves = work.network.curves.iter().enumerate();
+            curves.any(|(c, curve)| curve.corners.contains(&corner) && !is_inner(c))
+        };
+        let most = surface::deviation(&before, &work.grids).max;
+        for (p, (a, b)) in before.iter().zip(&after).enumerate() {
+            for (k, (i, j)) in [(0, 0), (7, 0), (7, 7), (0, 7)].into_iter().enumerate() {
+                let way = a.at(i, j).distance(b.at(i, j));
+                assert!(way <= if is_held(work.network.corner(p, k)) { 0.0 } else { most }, "{way} of {most}");
             }
             assert!(b.control.iter().all(|p| p.is_finite()));
         }

@@ -12,7 +12,7 @@ use crate::network::{CurveKind, Network, PatchMesh};
 use crate::observe::{Cancelled, Observer, Part};
 use crate::relief::{self, PatchedMesh};
 use crate::surface::basis::uniform_parameters;
-use crate::surface::{self, Deviation, EdgeInSeam, SeamQuality, Surface};
+use crate::surface::{self, BENT_DEG, Deviation, EdgeInSeam, SeamQuality, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -25,8 +25,6 @@ const CUTS_PER_SPAN: usize = 6;
 const CHORD_SHARE: f64 = 0.05;
 /// Distances below this share of the diagonal are not told apart: the precision of files with `f32` positions.
 const FLOAT_PRECISION: f64 = 1e-7;
-/// Smooth seams that bend by more are told to the user: half a degree is the default of a common CAD program.
-pub const SEAM_ANGLE_WARNING_DEG: f64 = 0.5;
 
 /// What [`measure`] finds.
 pub(super) struct Measured {
@@ -354,10 +352,10 @@ fn seam_figures(
     }
     let rms = if total > 0.0 { (squares / total).sqrt() } else { 0.0 };
     quality.insert("seam.angle_rms_deg".into(), Figure::Number(rms));
-    let bent = smooth.iter().filter(|s| inner_of(s) > SEAM_ANGLE_WARNING_DEG).count();
+    let bent = smooth.iter().filter(|s| inner_of(s) > BENT_DEG).count();
     if bent > 0 {
         let text = format!(
-            "{bent} of {} smooth seams bend by more than {SEAM_ANGLE_WARNING_DEG} degrees somewhere, {widest:.2} at most; \
+            "{bent} of {} smooth seams bend by more than {BENT_DEG} degrees somewhere, {widest:.2} at most; \
              along all smooth seams it is {rms:.2} RMS.",
             smooth.len()
         );

@@ -135,6 +135,20 @@ impl Direction {
         self.factors[inset].solve(&mut rhs[inset..n - inset]);
         net[inset..n - inset].copy_from_slice(&rhs[inset..n - inset]);
     }
+
+    /// A fitted curve with its ends moved to these places, where there are any, and what is between them fitted again for that.
+    pub fn with_ends(&self, mut curve: Vec<DVec3>, ends: [Option<DVec3>; 2]) -> Vec<DVec3> {
+        let last = curve.len() - 1;
+        let mut moves = vec![DVec3::ZERO; curve.len()];
+        for (end, at) in [0, last].into_iter().zip(ends) {
+            moves[end] = at.map_or(DVec3::ZERO, |at| at - curve[end]);
+        }
+        self.fit_curve(std::iter::repeat(DVec3::ZERO), &mut moves, 1);
+        curve.iter_mut().zip(moves).for_each(|(point, way)| *point += way);
+        // To the bit.
+        (curve[0], curve[last]) = (ends[0].unwrap_or(curve[0]), ends[1].unwrap_or(curve[last]));
+        curve
+    }
 }
 
 /// Adds `weight` per unit of the parameter times the squared second differences of the control points by their Greville

@@ -34,7 +34,7 @@ pub use quality::{
     normal_deviation_of, seam_angles,
 };
 pub use retouch::retouch;
-pub use seam::{EDGE_ANGLE_DEG, EdgeInSeam, StitchParams, edges_in_seams, stitch, stitch_near};
+pub use seam::{BENT_DEG, EDGE_ANGLE_DEG, EdgeInSeam, StitchParams, edges_in_seams, stitch, stitch_near};
 pub(crate) use sides::{check, check_grids, node};
 
 use glam::DVec3;

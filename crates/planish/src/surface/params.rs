@@ -88,6 +88,11 @@ impl FitParams {
         }
     }
 
+    /// The distance that a tolerance of the RMS allows, world units; 0 without such a one.
+    pub fn rms_allowed(&self, grids: &[Grid]) -> f64 {
+        if self.tolerance_of == Measure::Rms { self.allowed(grids) } else { 0.0 }
+    }
+
     /// The distance that the tolerance allows, world units; 0 without one.
     pub(super) fn allowed(&self, grids: &[Grid]) -> f64 {
         match self.resolution {

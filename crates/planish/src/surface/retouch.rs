@@ -8,7 +8,7 @@ use super::fit::{Directions, project, surface_of};
 use super::fold::folds;
 use super::network_fit::{SMOOTHING, fill, fit_curve, patch_directions};
 use super::params::FitParams;
-use super::sides::{along_curve, check, knots, side_len};
+use super::sides::{along_curve, check, corners_of, knots, side_len};
 use super::{FitError, Surface};
 use crate::grid::Grid;
 use crate::network::Network;
@@ -44,6 +44,10 @@ pub fn retouch(
         let c = s.curve as usize;
         (nodes[c], knots[c].clone())
     }))?;
+    // A corner at which a curve stays is where the surfaces have it, which smooth seams may have moved.
+    let others = (0..network.curves.len()).filter(|&c| !is_new(c as u32));
+    let stays: Vec<u32> = others.flat_map(|c| network.curves[c].corners).collect();
+    let corners = corners_of(network, surfaces, |_, corner| stays.contains(&corner));
     let mut boundary: Vec<Vec<DVec3>> = vec![Vec::new(); network.curves.len()];
     for &p in &which {
         for (k, side) in network.patches[p].sides.iter().enumerate() {
@@ -55,10 +59,9 @@ pub fn retouch(
                 let (points, rows, cols) = (&grids[p].points, grids[p].rows, grids[p].cols);
                 let points = along_curve(points, rows, cols, k, side.reversed, 0);
                 let direction = directions.get(nodes[c], &knots[c]);
-                match params.smoothing {
-                    0.0 => fit_curve(&points, direction),
-                    weight => fit_curve(&points, &direction.smoothed(weight)?),
-                }
+                let direction = &direction.smoothed(params.smoothing)?;
+                let ends = network.curves[c].corners.map(|k| corners[k as usize]);
+                direction.with_ends(fit_curve(&points, direction), ends)
             } else {
                 let s = &surfaces[p];
                 debug_assert_eq!(side_len(s.rows, s.cols, k), counts[c]);

@@ -51,6 +51,24 @@ pub(crate) fn curve_nodes(network: &Network, uses: &[Vec<(u32, u8)>], grids: &[G
         .collect()
 }
 
+/// Where surfaces have the corners of the network, for each `(patch, corner)` that is wanted.
+pub(crate) fn corners_of(
+    network: &Network,
+    surfaces: &[Surface],
+    is_wanted: impl Fn(usize, u32) -> bool,
+) -> Vec<Option<DVec3>> {
+    let mut corners = vec![None; network.corners.len()];
+    for (p, s) in surfaces.iter().enumerate() {
+        for k in 0..4 {
+            let corner = network.corner(p, k);
+            if is_wanted(p, corner) {
+                corners[corner as usize] = Some(s.control[node(s.rows, s.cols, k, 0, 0)]);
+            }
+        }
+    }
+    corners
+}
+
 /// Checks that arrays of one kind (`what`) are one per patch, shaped as they say, and agree in number along
 /// every curve. Returns the count along each curve, 0 for a curve without a patch.
 pub(crate) fn check(

@@ -37,7 +37,13 @@ impl Misses {
         (sum / count + self.mean) / 2.0
     }
 
-    /// The same for all its nodes.
+    /// The squared move per node that a tolerance (RMS, world units) leaves a patch beside what it misses itself.
+    pub fn left_of(&self, tolerance: f64, patch: usize) -> f64 {
+        let (sum, count) = self.squares[patch];
+        (tolerance * tolerance - sum / count).max(0.0)
+    }
+
+    /// [`Misses::afford`] for all its nodes.
     pub fn afford_all(&self, patch: usize) -> f64 {
         self.afford(patch) * self.squares[patch].1
     }

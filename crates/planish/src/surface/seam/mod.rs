@@ -21,5 +21,5 @@ mod wish;
 mod work;
 
 pub use meet::{EDGE_ANGLE_DEG, EdgeInSeam, edges_in_seams};
-pub use params::StitchParams;
+pub use params::{BENT_DEG, StitchParams};
 pub use stitch::{stitch, stitch_near};

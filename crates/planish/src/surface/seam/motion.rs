@@ -8,9 +8,9 @@ use glam::DVec3;
 /// No unknown.
 const NONE: u32 = u32::MAX;
 
-/// How a control point moves: at most two unknowns with their directions.
-pub(crate) type Motion = [(u32, DVec3); 2];
-pub(crate) const FIXED: Motion = [(NONE, DVec3::ZERO); 2];
+/// How a control point moves: at most three unknowns with their directions.
+pub(crate) type Motion = [(u32, DVec3); 3];
+pub(crate) const FIXED: Motion = [(NONE, DVec3::ZERO); 3];
 
 pub(crate) fn terms(motion: &Motion) -> impl Iterator<Item = (usize, DVec3)> {
     motion.iter().filter(|(unknown, _)| *unknown != NONE).map(|&(unknown, way)| (unknown as usize, way))
@@ -31,6 +31,8 @@ pub(crate) fn motions(work: &Work, filled: &[Filled], curves: &[Vec<DVec3>]) -> 
     let normal = |p: usize, u: f64, v: f64| work.means[p].mend(filled[p].surface.jet(u, v).area_vector(), u, v);
     let tilts: Vec<Vec<u32>> =
         (0..work.planes.len()).map(|k| work.planes.get(k).tilts.iter().map(|_| next()).collect()).collect();
+    // What may tilt may go along its normal, too.
+    let lifts: Vec<u32> = tilts.iter().map(|tilts| if tilts.is_empty() { NONE } else { next() }).collect();
     let mut motions: Vec<Vec<Motion>> = filled.iter().map(|f| vec![FIXED; f.surface.control.len()]).collect();
     for c in (0..work.uses.len()).filter(|&c| work.is_smooth_seam(c) && !work.is_held(c)) {
         let (n, knots) = (work.knots[c].control(), work.knots[c].list());
@@ -50,6 +52,11 @@ pub(crate) fn motions(work: &Work, filled: &[Filled], curves: &[Vec<DVec3>]) -> 
                     for (slot, (&unknown, axis)) in motion.iter_mut().zip(tilts[number].iter().zip(&plane.tilts)) {
                         *slot = (unknown, plane.normal * axis.dot(leg));
                     }
+                    let lift = (lifts[number], plane.normal);
+                    for side in work.uses[c].iter().map(|&at| work.side(at)) {
+                        motions[side.patch][side.node(e * (n - 1), 0)] = [lift, FIXED[0], FIXED[0]];
+                    }
+                    motion[2] = lift;
                     motion
                 }
                 None => {
@@ -58,7 +65,7 @@ pub(crate) fn motions(work: &Work, filled: &[Filled], curves: &[Vec<DVec3>]) -> 
                         let (u, v) = place(side.side, side.reversed, greville(knots, i));
                         normal(side.patch, u, v)
                     });
-                    [(next(), both.sum::<DVec3>().normalize_or(DVec3::Z)), (NONE, DVec3::ZERO)]
+                    [(next(), both.sum::<DVec3>().normalize_or(DVec3::Z)), FIXED[0], FIXED[0]]
                 }
             };
             for &at in &work.uses[c] {
@@ -72,7 +79,7 @@ pub(crate) fn motions(work: &Work, filled: &[Filled], curves: &[Vec<DVec3>]) -> 
         for j in 1..s.rows - 1 {
             for i in (1..s.cols - 1).filter(|&i| j == 1 || j == s.rows - 2 || i == 1 || i == s.cols - 2) {
                 let way = normal(p, greville(&s.knots_u, i), greville(&s.knots_v, j));
-                motions[p][j * s.cols + i] = [(next(), way), (NONE, DVec3::ZERO)];
+                motions[p][j * s.cols + i] = [(next(), way), FIXED[0], FIXED[0]];
             }
         }
     }

@@ -2,11 +2,12 @@
 //!
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §8.1.3.
 //!
-//! Unknown are the moves, along the normal, of the control points on smooth seams and in the ring beside all sides; the
-//! inside follows as the fit has it. What they cost the fit and what is left of the angles is minimised together:
+//! Unknown are the moves, along the normal, of the control points on smooth seams and in the ring beside all sides, and of
+//! corners with smooth seams all around; the inside follows as the fit has it. What they cost the fit and what is left of
+//! the angles is minimised together:
 //!
 //! ```text
-//! sum over patches  (RMS of the move / loss)^2  +  sum over seams  weight (RMS angle / tolerance)^2
+//! sum over patches  (RMS of the move / miss)^2  +  sum over seams  weight (RMS angle / tolerance)^2
 //! ```
 //!
 //! The bends of moves cost as they do in the fit, or seams would have waves beside them. The angle is linearised
@@ -26,7 +27,7 @@ use crate::surface::fold::folds;
 use crate::surface::{FitError, Surface};
 use rayon::prelude::*;
 
-/// How often the weights around patches that fold, or lie too far off somewhere, are lowered.
+/// How often the weights around patches that fold, alone or with a neighbour, or lie too far off somewhere, are lowered.
 const EASINGS: usize = 4;
 /// Passes in which patches that turned over get their curves back: neighbours may turn over in turn.
 const REVERTS: usize = 3;
@@ -37,8 +38,8 @@ const REVERTS: usize = 3;
 /// * `grids` - those that `surfaces` were fitted to
 /// * `surfaces` - as [`super::fit_network`] returns them
 ///
-/// Corners stay where they are and seams stay without gaps; control points near seams move and all others are fitted again
-/// for that. A network without seams comes back as it is.
+/// Corners inside smooth seams move along their normals, all others stay where they are, and seams stay without gaps; control
+/// points near seams move and all others are fitted again for that. A network without seams comes back as it is.
 ///
 /// # Errors
 /// Lists that do not fit the network or each other, knots that differ along a chord, or the observer's wish.
@@ -102,7 +103,7 @@ fn solved(
         let (found, wanted) = (held.len(), network.patches.len());
         return Err(FitError::Count { what: "surfaces", found, wanted });
     }
-    let Some(work) = Work::new(network, grids, surfaces, stay, held, params.smoothing)? else {
+    let Some(work) = Work::new(network, grids, surfaces, stay, held, params)? else {
         return Ok(surfaces.to_vec());
     };
     observer.check()?;
@@ -142,9 +143,10 @@ fn solved(
     for easing in 0..=EASINGS {
         system.settle(observer)?;
         let made: Vec<Surface> = (0..filled.len()).into_par_iter().map(|p| system.surface(p)).collect();
+        let turned_back = system.beside_turned_back();
         let is_worse = |&p: &usize| {
             let is_far = work.rounded[p].is_none() && farthest(&made[p], &grids[p]) > allowed[p];
-            is_far || folds(&made[p], &grids[p]) > before[p]
+            is_far || turned_back[p] || folds(&made[p], &grids[p]) > before[p]
         };
         let worse: Vec<usize> = work.free().filter(is_worse).collect();
         observer.progress(0.2 + 0.8 * (easing + 1) as f64 / (EASINGS + 1) as f64);

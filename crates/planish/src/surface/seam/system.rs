@@ -2,7 +2,7 @@
 
 use super::bend::Side;
 use super::motion::{FIXED, Motion, holds, motions, terms};
-use super::params::StitchParams;
+use super::params::{BENT_DEG, StitchParams};
 use super::ring::Condensed;
 use super::sums::Sums;
 use super::wish::{FIRST_WEIGHT, Wish, wishes};
@@ -48,9 +48,10 @@ pub(crate) struct System<'a> {
     motions: Vec<Vec<Motion>>,
     wishes: Vec<Wish>,
     nets: Vec<Vec<DVec3>>,
+    /// For each of `wishes` the samples that are turned back before anything moves.
+    turned_back: Vec<usize>,
     /// For each patch the squared move that it can afford, times its nodes.
     afford: Vec<f64>,
-    share: f64,
     /// Where the entries of the normal equations lie: holds, patches and seams, one after the other.
     pattern: Arc<SparsePattern>,
     /// Those of holds and patches, which stay as they are.
@@ -73,19 +74,31 @@ impl<'a> System<'a> {
         let condensed: BTreeMap<_, Arc<Condensed>> = shapes.into_iter().map(one).collect();
         let condensed: Vec<Arc<Condensed>> = (0..filled.len()).map(|p| condensed[&shape(work, p)].clone()).collect();
         let (unknowns, motions) = motions(work, filled, curves);
-        let nets = filled.iter().map(|f| f.surface.control.clone()).collect();
+        let nets: Vec<Vec<DVec3>> = filled.iter().map(|f| f.surface.control.clone()).collect();
         let afford: Vec<f64> = (0..filled.len()).map(|p| work.afford(p)).collect();
-        let share = (1.0 + params.fit_loss).powi(2) - 1.0;
         let fits: Vec<Sums> =
             (0..filled.len()).into_par_iter().map(|p| fit_sums(&condensed[p], &motions[p], afford[p])).collect();
         let wishes = wishes(work, curves, params);
+        let turned_back = wishes.par_iter().map(|wish| wish.turned_back(&nets, &work.means)).collect();
         let turned: Vec<Sums> = wishes.iter().map(|wish| turned(wish, &motions)).collect();
         let places = (0..unknowns).map(|k| (k, k)).chain(fits.iter().chain(&turned).flat_map(Sums::places));
         let pattern = SparsePattern::watched(unknowns, places.collect(), &|| observer.cancelled()).ok_or(Cancelled)?;
         let pattern = Arc::new(pattern.map_err(|_| FitError::Unsolvable { unknowns })?);
         let holds = holds(filled, unknowns, &motions).into_iter().map(|hold| HOLD * hold);
         let fit_values = holds.chain(fits.iter().flat_map(|sums| sums.lower.iter().copied())).collect();
-        Ok(System { work, filled, condensed, unknowns, motions, wishes, nets, afford, share, pattern, fit_values })
+        Ok(System {
+            work,
+            filled,
+            condensed,
+            unknowns,
+            motions,
+            wishes,
+            nets,
+            turned_back,
+            afford,
+            pattern,
+            fit_values,
+        })
     }
 
     /// Moves of the outer control points of a patch.
@@ -116,11 +129,12 @@ impl<'a> System<'a> {
         (0..self.nets.len()).into_par_iter().map(|p| self.cost(p)).collect()
     }
 
-    /// Squared move of the whole over what it can afford.
+    /// Squared move of the whole over what it may lose.
     fn spent(&self, costs: &[f64]) -> f64 {
-        let afford: f64 = (0..self.nets.len()).filter(|&p| self.counts(p)).map(|p| self.afford[p]).sum();
+        let shares = &self.work.shares;
+        let may: f64 = (0..self.nets.len()).filter(|&p| self.counts(p)).map(|p| shares[p] * self.afford[p]).sum();
         let lost: f64 = costs.iter().zip(&self.afford).map(|(cost, afford)| cost * afford).sum();
-        if afford > 0.0 { lost / afford } else { 0.0 }
+        if lost > 0.0 { lost / may } else { 0.0 }
     }
 
     /// Solves until all seams meet the tolerance or none can be raised further.
@@ -139,14 +153,17 @@ impl<'a> System<'a> {
             let found: Vec<(f64, f64)> =
                 self.wishes.par_iter().map(|w| w.angles(&self.nets, &self.work.means)).collect();
             let mut raised = false;
-            let spent = self.spent(&costs) >= self.share;
+            let spent = self.spent(&costs) >= 1.0;
             for (wish, (most, squares)) in self.wishes.iter_mut().zip(found) {
                 let rms = (squares / wish.samples.len() as f64).sqrt();
                 let missed = most > wish.tolerance || rms > RMS_SHARE * wish.tolerance;
                 // A seam that turns far may fold its patches over; it does not get more than they can afford.
-                let bound = if spent || wish.aims { self.share } else { LOCAL * self.share };
+                let bound = if spent || wish.aims { 1.0 } else { LOCAL };
+                let is_bent = most > BENT_DEG.to_radians();
+                let share = |p: usize| if is_bent { self.work.shares[p] } else { self.work.share };
+                let affords = |s: &Side| costs[s.patch] < bound * share(s.patch);
                 let helps = wish.weight < 1.0 || most.max(rms) < HELPS * wish.last;
-                if missed && helps && wish.weight < wish.ceiling && wish.sides.iter().all(|s| costs[s.patch] < bound) {
+                if missed && helps && wish.weight < wish.ceiling && wish.sides.iter().all(affords) {
                     wish.weight = (wish.weight * RAISE).min(wish.ceiling);
                     wish.last = most.max(rms);
                     raised = true;
@@ -160,12 +177,12 @@ impl<'a> System<'a> {
         // The last raises may have cost more than there was: patches that lost more than their share give some back.
         for _ in 0..ROUNDS {
             let costs = self.costs();
-            if self.spent(&costs) <= self.share {
+            if self.spent(&costs) <= 1.0 {
                 break;
             }
             observer.check()?;
-            let share = self.share;
-            for wish in self.wishes.iter_mut().filter(|w| w.sides.iter().any(|s| costs[s.patch] > share)) {
+            let shares = &self.work.shares;
+            for wish in self.wishes.iter_mut().filter(|w| w.sides.iter().any(|s| costs[s.patch] > shares[s.patch])) {
                 wish.weight /= RAISE.sqrt();
             }
             self.step(observer)?;
@@ -226,6 +243,17 @@ impl<'a> System<'a> {
             }
         }
         sums
+    }
+
+    /// For each patch whether it lies beside a seam that is turned back at more places than before anything moved.
+    pub fn beside_turned_back(&self) -> Vec<bool> {
+        let is_worse = |(wish, before): (&Wish, &usize)| wish.turned_back(&self.nets, &self.work.means) > *before;
+        let worse: Vec<bool> = self.wishes.par_iter().zip(&self.turned_back).map(is_worse).collect();
+        let mut beside = vec![false; self.nets.len()];
+        for (wish, _) in self.wishes.iter().zip(worse).filter(|(_, worse)| *worse) {
+            wish.sides.iter().for_each(|side| beside[side.patch] = true);
+        }
+        beside
     }
 
     /// Lowers the weights around some patches, and starts anew; false if these are as low as they get.

@@ -74,6 +74,13 @@ impl Wish {
         self.sides.iter().filter_map(one).collect()
     }
 
+    /// Samples at which the normals that are to agree are more than a right angle apart: there the sides of a seam turn back on each
+    /// other.
+    pub fn turned_back(&self, nets: &[Vec<DVec3>], means: &[MeanNormals]) -> usize {
+        let angles = (0..self.samples.len()).filter_map(|s| self.turn(nets, means, s));
+        angles.filter(|turn| turn.angle.abs() > std::f64::consts::FRAC_PI_2).count()
+    }
+
     /// Largest angle where a normal is to be trusted, and the sum of the trusted squares.
     pub fn angles(&self, nets: &[Vec<DVec3>], means: &[MeanNormals]) -> (f64, f64) {
         let all = (0..self.samples.len()).filter_map(|s| self.turn(nets, means, s));

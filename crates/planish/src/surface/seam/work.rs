@@ -5,6 +5,7 @@ use super::corner::{Plane, Planes, planes};
 use super::curve::constrain;
 use super::meet::{Meets, roundings};
 use super::miss::Misses;
+use super::params::StitchParams;
 use crate::grid::Grid;
 use crate::network::{Network, Patch};
 use crate::observe::{Cancelled, Observer};
@@ -12,7 +13,7 @@ use crate::surface::basis::Knots;
 use crate::surface::fit::{Direction, Directions, Layout, project_net, surface_of};
 use crate::surface::fold::MeanNormals;
 use crate::surface::network_fit::{fill, patch_directions};
-use crate::surface::sides::{along_curve, check, check_grids, is_smooth, knots, node, side_len};
+use crate::surface::sides::{along_curve, check, check_grids, corners_of, is_smooth, knots, node, side_len};
 use crate::surface::{FitError, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -43,6 +44,10 @@ pub(crate) struct Work<'a> {
     /// For each patch beside curves that a person calls smooth, how far rounding these takes it from its grid: it may lose
     /// what it has to.
     pub rounded: Vec<Option<f64>>,
+    /// The share of the squared move that a patch can afford, which it may lose; and for each patch, where the tolerance of the fit
+    /// leaves it more.
+    pub share: f64,
+    pub shares: Vec<f64>,
     /// Surfaces that stay, and which; those of [`Work::surfaces`] are for the others.
     pub before: &'a [Surface],
     pub held: Vec<bool>,
@@ -57,14 +62,13 @@ pub(crate) struct Filled {
 impl<'a> Work<'a> {
     /// `None` if no two patches meet.
     /// * `before`, `held` - smoothed surfaces and which of them stay; as many as patches
-    /// * `smoothing` - weight of the bends of moves
     pub fn new(
         network: &'a Network,
         grids: &'a [Grid],
         surfaces: &'a [Surface],
         before: &'a [Surface],
         held: Vec<bool>,
-        smoothing: f64,
+        params: &StitchParams,
     ) -> Result<Option<Work<'a>>, FitError> {
         let nodes = check_grids(network, grids)?;
         let shapes: Vec<_> = surfaces.iter().map(|s| (s.rows, s.cols, s.control.len())).collect();
@@ -85,16 +89,29 @@ impl<'a> Work<'a> {
                 along_curve(&s.control, s.rows, s.cols, k as usize, side.reversed, 0)
             })
         };
-        let fitted: Vec<Vec<DVec3>> = uses.iter().map(curve).collect();
+        let [directions, plain] = [params.smoothing, 0.0].map(|weight| Directions::smoothed(layouts.clone(), weight));
+        let (directions, plain) = (directions?, plain?);
+        let corners = corners_of(network, before, |p, _| held[p]);
+        let mut fitted: Vec<Vec<DVec3>> = uses.iter().map(curve).collect();
+        for (c, fitted) in
+            fitted.iter_mut().enumerate().filter(|(c, _)| !uses[*c].iter().any(|(p, _)| held[*p as usize]))
+        {
+            let ends = network.curves[c].corners.map(|k| corners[k as usize]);
+            if ends.iter().any(Option::is_some) {
+                *fitted = directions.get(nodes[c], &knots[c]).with_ends(std::mem::take(fitted), ends);
+            }
+        }
         let means: Vec<MeanNormals> =
             grids.par_iter().zip(surfaces).map(|(g, s)| MeanNormals::new(g, [s.cols, s.rows])).collect();
         let misses = Misses::new(surfaces, grids);
         let breaks: Vec<Vec<f64>> = knots.iter().map(Knots::breaks).collect();
         let meets = Meets::new(network, grids, &means, &breaks, &misses);
         let smooth = |c: usize, end: usize| is_smooth(&network.curves[c]) && meets.is_smooth(c, end as f64);
+        let share = (1.0 + params.fit_loss).powi(2) - 1.0;
+        let room = |p: usize| misses.left_of(params.tolerance, p) / misses.afford(p);
+        let shares = (0..grids.len()).map(|p| share * room(p).max(1.0)).collect();
         let rounded = roundings(network, grids, &means, &breaks);
         let planes = planes(network, [surfaces, before], &held, &means, &fitted, &smooth);
-        let [directions, plain] = [smoothing, 0.0].map(|weight| Directions::smoothed(layouts.clone(), weight));
         Ok(Some(Work {
             network,
             grids,
@@ -102,14 +119,16 @@ impl<'a> Work<'a> {
             uses,
             nodes,
             knots,
-            directions: directions?,
-            plain: plain?,
+            directions,
+            plain,
             means,
             fitted,
             planes,
             meets,
             misses,
             rounded,
+            share,
+            shares,
             before,
             held,
         }))
