@@ -18,7 +18,7 @@ pub struct StitchParams {
     /// Largest angle by which a sharp seam's sides may turn from the normals of their own grids, degrees.
     #[schemars(extend("exclusiveMinimum" = 0.0, "unit" = "degrees"))]
     pub sharp_tolerance: f64,
-    /// Share by which the RMS and the largest distance of the fit may grow for the seams' sake. For a seam that bends by more than half a
+    /// Share by which the RMS of the fit may grow for the seams' sake. For a seam that bends by more than half a
     /// degree, the RMS of a patch may grow by this share of what the tolerance of the fit leaves it.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub fit_loss: f64,
