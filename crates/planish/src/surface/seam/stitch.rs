@@ -109,8 +109,7 @@ fn solved(
     observer.check()?;
     let before: Vec<usize> = surfaces.par_iter().zip(grids).map(|(s, g)| folds(s, g)).collect();
     // No place may be farther off than the farthest of the fit and, on top, the same share of it as moves have of all misses.
-    let share = ((1.0 + params.fit_loss).powi(2) - 1.0).sqrt();
-    let allowed = (1.0 + share) * work.misses.most;
+    let allowed = (1.0 + work.share.sqrt()) * work.misses.most;
     let mut curves = work.curves();
     let mut filled = work.filled(&curves, observer)?;
     // What a person wants rounded goes as far off as that takes.

@@ -44,8 +44,8 @@ pub(crate) struct Work<'a> {
     /// For each patch beside curves that a person calls smooth, how far rounding these takes it from its grid: it may lose
     /// what it has to.
     pub rounded: Vec<Option<f64>>,
-    /// The share of the squared move that a patch can afford, which it may lose; and for each patch, where the tolerance of the fit
-    /// leaves it more.
+    /// What a patch may lose, over the squared move that it can afford; and for each patch what it may lose to seams that bend
+    /// much, which is more where the tolerance of the fit leaves it more.
     pub share: f64,
     pub shares: Vec<f64>,
     /// Surfaces that stay, and which; those of [`Work::surfaces`] are for the others.
