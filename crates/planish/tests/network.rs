@@ -7,6 +7,7 @@ use planish::layout::{Known, LayoutError, LayoutParams, Method, layout};
 use planish::mend::close_holes;
 use planish::mesh::{Adjacency, FacePoint, FeatureTags, TriMesh, diagnose, sharp_edges};
 use planish::network::{Corner, Curve, CurveKind, ImprintError, Network, Patch, Side, imprint};
+use planish::pipeline::{self, Input, RunParams};
 use planish::synthetic::{self, shapes};
 use planish::{DVec3, Silent};
 
@@ -218,6 +219,15 @@ fn a_cylinder_of_2044_needles_has_a_network_along_its_form_of_30_patches_at_most
     assert!(laid.network.patches.len() <= 30, "{}", laid.network.patches.len());
     let rims = 2.0 * 512.0 * 6.0 * (std::f64::consts::PI / 512.0).sin();
     assert!((length(&mesh, &laid.network, CurveKind::Feature) / rims - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn regress_a_wedge_of_15_degrees_has_12_patches_whose_grids_and_seams_are_not_folded() {
+    let mesh = shapes::wedge(15.0, 40);
+    let made = pipeline::run(Input::from(&mesh), &RunParams::default(), &Silent).unwrap();
+    let figure = |key: &str| made.fitted.quality[key].value();
+    assert_eq!(["patches.count", "grid.folds", "seam.folded"].map(figure), [12.0, 0.0, 0.0]);
+    assert!(figure("seam.angle_max_deg") < 1e-3, "{}", figure("seam.angle_max_deg"));
 }
 
 #[test]

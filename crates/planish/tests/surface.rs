@@ -642,6 +642,17 @@ fn angles_along_a_seam_are_means_over_its_length() {
 }
 
 #[test]
+fn regress_a_flat_sheet_with_uneven_steps_gets_spans_until_it_does_not_turn_over() {
+    // Half of the way lies in a seventeenth of the steps. Along the normal two spans are as near as any number.
+    let step = |x: f64| 1.0 - (-12.0 * x).exp() + 0.05 * x;
+    let work = sheet(1, 1, [false, false], [81, 41], |x, y| DVec3::new(step(x), y, 0.0));
+    let by = |resolution| fit(&work, &FitParams { resolution, smoothing: 0.0, ..FitParams::default() }).remove(0);
+    assert!(surface::folds(&by(Resolution::Control([5, 5])), &work.grids[0]) > 0);
+    let found = by(Resolution::Tolerance(1e-3));
+    assert!(surface::folds(&found, &work.grids[0]) == 0 && found.cols < 10, "{} x {}", found.rows, found.cols);
+}
+
+#[test]
 fn a_patch_that_folds_is_smoothed_and_leaves_its_neighbours_as_they_are() {
     // One patch with waves, none on its sides: they stand up from it or hang over.
     let waves = |size: f64, overhanging: bool| {

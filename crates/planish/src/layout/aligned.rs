@@ -358,7 +358,8 @@ impl Aligned {
             if least > MOST_UNASKED && !params.coarsest {
                 return Ok((None, Some(AlignError::Count { found: whole.squares })));
             }
-            coarsest = Some(whole);
+            // Its vectors are the shortest, which says nothing of how cells look: it is laid only where it is asked for.
+            coarsest = params.coarsest.then_some(whole);
             let most = if params.coarsest { least } else { MOST_UNASKED };
             GROWTH.map(|growth| growth * least).into_iter().filter(|n| *n <= most).map(|n| n as usize).collect()
         };
@@ -437,14 +438,14 @@ impl Aligned {
         let mut bench = Bench::new(mesh, adjacency, complex).ok_or(AlignError::Misplaced)?;
         let rounds = SETTLING_PER_SMOOTHING * params.smoothing;
         let squares = bench.complex.live_cells().count();
-        improve::settle(&mut bench, squares, rounds, observer).map_err(|_| Cancelled)?;
+        improve::settle_along_lines(&mut bench, squares, rounds, observer).map_err(|_| Cancelled)?;
         let covers = fitness::covers(&bench);
         let good_part = fitness::good_part(&covers);
         let joined = fitness::joined(&bench, params.patches);
         let patches = joined.live_cells().count();
         if patches < squares && !params.coarsest {
             bench = Bench::new(mesh, adjacency, joined).ok_or(AlignError::Misplaced)?;
-            improve::settle(&mut bench, patches, rounds, observer).map_err(|_| Cancelled)?;
+            improve::settle_along_lines(&mut bench, patches, rounds, observer).map_err(|_| Cancelled)?;
         }
         let worth = Worth::new(bench.complex.live_cells().count(), asked(params), good_part);
         Ok(Draft { bench, worth, covers, deviation_deg: mapped.deviation_deg })

@@ -6,6 +6,8 @@
 use super::partition::polygon::{self, Sectors, VALENCE_COST};
 use super::recut::{Bench, Change, Union, outline_with_cells};
 use super::shape::{Shape, Trace};
+use super::slide::Slide;
+use crate::geom::polyline;
 use crate::network::disk::Met;
 use glam::{DVec2, DVec3};
 use std::cell::RefCell;
@@ -121,6 +123,45 @@ impl<'a> Scale<'a> {
         Some((self.cost_of(&change) - least?, change))
     }
 
+    /// The place of its line where the cells of a slide cost least, and what they then cost less; `None` if that is where it is.
+    pub fn slid(&self, slide: &Slide) -> Option<(f64, usize)> {
+        let points = &self.bench.mesh.points;
+        let along = polyline::arc_lengths(slide.line.iter().map(|&v| points[v as usize]));
+        let last = along.len() - 1;
+        let outlines = slide.sides.iter().map(|flank| outline_with_cells(&self.bench.complex, &flank.change));
+        let outlines = outlines.collect::<Option<Vec<_>>>()?;
+        let fills = slide.sides.iter().zip(&outlines).map(|(flank, around)| Fill::new(self, &flank.change, around));
+        let mut fills = fills.collect::<Option<Vec<_>>>()?;
+        let mut cost = |at: usize| -> Option<f64> {
+            let costs = slide.sides.iter().zip(&mut fills).map(|(flank, fill)| {
+                fill.move_corner(flank.corner, slide.position(&fill.union.disk, &fill.union.corners, flank, at)?);
+                fill.cost(&flank.change.lines, &[])
+            });
+            costs.sum()
+        };
+        // As it would be drawn anew where it stands: arcs may have been straighter than in the map of a union.
+        let before = cost(slide.at)?;
+        let (mut least, mut best) = (before, slide.at);
+        for step in NODE_STEPS {
+            loop {
+                let from = best;
+                // Steps of the shorter way, at least to the next vertex: what is crowded spreads bit by bit, with its cells.
+                let step = step * along[from].min(along[last] - along[from]);
+                let back = (1..from).rev().find(|&i| along[i - 1] < along[from] - step);
+                let ahead = (from + 1..last).find(|&i| along[i + 1] > along[from] + step);
+                for at in back.into_iter().chain(ahead) {
+                    if let Some(cost) = cost(at).filter(|cost| *cost < least) {
+                        (least, best) = (cost, at);
+                    }
+                }
+                if best == from {
+                    break;
+                }
+            }
+        }
+        (best != slide.at).then_some((before - least, best))
+    }
+
     /// What the sectors at the outline cost more when corner `i` goes from `cells[i]` cells to `now[i]`.
     fn sector_cost(&self, around: &[(u32, usize)], now: &[usize]) -> f64 {
         let mut more: BTreeMap<u32, f64> = BTreeMap::new();
@@ -173,8 +214,20 @@ impl<'a> Fill<'a> {
     fn move_node(&mut self, v: u32) {
         let n = self.around.len();
         self.vertex[n] = v;
-        self.traces.borrow_mut().retain(|&(i, j), _| i != n && j != n);
-        self.costs.borrow_mut().retain(|quad, _| !quad.contains(&n));
+        self.forget(n);
+    }
+
+    /// Moves a corner of the outline to a place of the boundary.
+    fn move_corner(&mut self, corner: usize, place: usize) {
+        self.union.corners[corner] = place;
+        self.vertex[corner] = self.union.disk.boundary[place];
+        self.forget(corner);
+    }
+
+    /// Forgets what was measured with a corner.
+    fn forget(&mut self, corner: usize) {
+        self.traces.borrow_mut().retain(|&(i, j), _| i != corner && j != corner);
+        self.costs.borrow_mut().retain(|quad, _| !quad.contains(&corner));
     }
 
     /// The fillings worth a look: the best one without a node inside, and those with one node, joined to every

@@ -4,11 +4,12 @@
 //! cells in every sector. A change refills the union of two cells or of the cells around a node; drawn lines
 //! stay inside it. See `docs/methods/layout.md`, steps 6 and 7.
 
+use super::LayoutError;
 use super::complex::{Complex, Node};
 use super::fill::{Gain, Scale};
 use super::partition::polygon;
 use super::recut::{Bench, Change, outline};
-use super::{LayoutError, slide};
+use super::slide::{self, Slide};
 use crate::mesh::disjoint::disjoint;
 use crate::observe::Observer;
 use rayon::prelude::*;
@@ -43,7 +44,7 @@ pub(super) fn relax(bench: &mut Bench, observer: &dyn Observer) -> Result<(), La
     bench.sweep(&nodes, |complex, stars, n| star_change(complex, &stars[n as usize]));
     straighten(bench, observer)?;
     cancelled()?;
-    slide::slide(bench, &nodes);
+    slide::slide_across(bench, &nodes);
     Ok(())
 }
 
@@ -96,7 +97,29 @@ pub(super) fn settle(
     settle_some(bench, patches, rounds, fresh, &mut Known::new(), observer).map(|_| ())
 }
 
-/// The same around the nodes in `fresh`. Returns the nodes of cells that were drawn anew.
+/// The same, and nodes inside lines slide along these.
+pub(super) fn settle_along_lines(
+    bench: &mut Bench,
+    patches: usize,
+    rounds: usize,
+    observer: &dyn Observer,
+) -> Result<(), LayoutError> {
+    let (mut fresh, mut known) = (vec![true; bench.complex.nodes.len()], Known::new());
+    for _ in 0..rounds {
+        let mut drawn = settle_some(bench, patches, 1, fresh.clone(), &mut known, observer)?;
+        fresh.iter_mut().zip(&drawn).for_each(|(fresh, drawn)| *fresh |= drawn);
+        for half in slide(bench, patches, &fresh).into_iter().flat_map(|cell| bench.complex.loop_of(cell)) {
+            drawn[bench.complex.from(*half) as usize] = true;
+        }
+        if !drawn.contains(&true) {
+            break;
+        }
+        fresh = drawn;
+    }
+    Ok(())
+}
+
+/// As [`settle`] around the nodes in `fresh`. Returns the nodes of cells that were drawn anew.
 fn settle_some(
     bench: &mut Bench,
     patches: usize,
@@ -123,6 +146,26 @@ fn settle_some(
         bench.apply(&chosen);
     }
     Ok(all)
+}
+
+/// Slides nodes inside lines, whose cells have a node in `fresh`, to where that makes cells better, in a batch of disjoint
+/// ones. Returns the cells that were drawn anew.
+fn slide(bench: &mut Bench, patches: usize, fresh: &[bool]) -> Vec<u32> {
+    let complex = &bench.complex;
+    let scale = Scale::new(bench, patches);
+    let slides = complex.stars().into_iter().filter_map(|star| Slide::new(complex, &star)).filter(|slide| {
+        let mut halves = slide.cells().into_iter().flat_map(|c| complex.loop_of(c));
+        halves.any(|&h| fresh[complex.from(h) as usize])
+    });
+    let slides: Vec<Slide> = slides.collect();
+    let gains: Vec<Option<(f64, usize)>> = slides.par_iter().map(|slide| scale.slid(slide)).collect();
+    let mut found: Vec<(f64, (Slide, usize))> = (slides.into_iter().zip(gains))
+        .filter_map(|(slide, gain)| gain.filter(|g| g.0 > LEAST_SETTLING).map(|(gain, at)| (gain, (slide, at))))
+        .collect();
+    found.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.0.node.cmp(&y.1.0.node)));
+    let (now, _) = disjoint(found, |(_, (slide, _))| slide.cells(), |(_, slide)| Some(slide));
+    slide::apply(bench, &now);
+    now.iter().flat_map(|(slide, _)| slide.cells()).collect()
 }
 
 /// The nodes of the cells of a change.
@@ -220,4 +263,36 @@ pub(super) fn arc_change(complex: &Complex, a: u32) -> Option<Change> {
     let at = |h: u32| around.iter().position(|&g| g == h);
     change.lines.push((at(complex.following(2 * a + 1))?, at(complex.following(2 * a))?));
     Some(change)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::partition::{Ground, outline};
+    use super::*;
+    use crate::mesh::Adjacency;
+    use crate::observe::Silent;
+    use crate::synthetic::shapes;
+
+    #[test]
+    fn a_curve_across_a_sheet_twice_as_long_as_wide_slides_from_an_eighth_of_its_length_to_the_middle() {
+        let (cols, rows) = (40, 20);
+        let mesh = shapes::rectangle(2.0, 1.0, cols, rows);
+        let adjacency = Adjacency::new(&mesh);
+        let (low, high) = (mesh.bounds().min, mesh.bounds().max);
+        let is_left = |f: usize| mesh.corners(f).iter().map(|p| p.x - low.x).sum::<f64>() < 3.0 / 4.0;
+        let label: Vec<u32> = (0..mesh.triangles.len()).map(|f| u32::from(!is_left(f))).collect();
+        let is_corner = |x: f64, y: f64| [low.x, high.x].contains(&x) && [low.y, high.y].contains(&y);
+        let corner: Vec<bool> = mesh.points.iter().map(|p| is_corner(p.x, p.y)).collect();
+        let lines = vec![false; adjacency.opposite.len()];
+        let complex = outline::outline(&Ground::new(&mesh, &adjacency, &lines), &label, 2, &corner);
+        let mut bench = Bench::new(&mesh, &adjacency, complex).expect("two cells");
+        let ends = |bench: &Bench| -> Vec<f64> {
+            let arc = bench.complex.live_arcs().find(|&a| bench.complex.arc(2 * a).kind.is_smooth());
+            let nodes = bench.complex.arc(2 * arc.expect("the curve")).nodes;
+            nodes.map(|n| mesh.points[bench.complex.nodes[n as usize].vertex as usize].x - low.x).to_vec()
+        };
+        assert!(ends(&bench).iter().all(|x| (x - 0.25).abs() < 1e-9), "{:?}", ends(&bench));
+        settle_along_lines(&mut bench, 2, 24, &Silent).unwrap();
+        assert!(ends(&bench).iter().all(|x| (x - 1.0).abs() < 0.11), "{:?}", ends(&bench));
+    }
 }

@@ -70,9 +70,11 @@ pub fn fit_network(
     let mut surfaces = fit(&knots, &smoothing)?;
     if matches!(params.resolution, Resolution::Tolerance(_)) {
         for _ in 0..COUNT_ROUNDS {
-            let left = |(s, g): (&Surface, &Grid)| params.tolerance_of.of(&heights(s, g));
-            let over: Vec<bool> = surfaces.par_iter().zip(grids).map(|of| left(of) > allowed).collect();
-            let patches = network.patches.iter().zip(&over).filter(|(_, over)| **over);
+            // On a flat face a surface is as near as can be, and may still turn over within the face.
+            let is_short =
+                |(s, g): (&Surface, &Grid)| params.tolerance_of.of(&heights(s, g)) > allowed || folds(s, g) > 0;
+            let short: Vec<bool> = surfaces.par_iter().zip(grids).map(is_short).collect();
+            let patches = network.patches.iter().zip(&short).filter(|(_, short)| **short);
             if !plan.refine(patches.flat_map(|(patch, _)| patch.sides.map(|side| side.curve as usize))) {
                 break;
             }

@@ -110,6 +110,44 @@ pub fn cuboid(size: DVec3, n: usize) -> TriMesh {
     mesh
 }
 
+/// A wedge with two walls of length 1 on both sides of an edge of some degrees and of length 1, and flat ends. `n` edges of
+/// the mesh along each edge of the wedge.
+pub fn wedge(degrees: f64, n: usize) -> TriMesh {
+    let step =
+        |sign: f64| DVec3::new((degrees.to_radians() / 2.0).cos(), sign * (degrees.to_radians() / 2.0).sin(), 0.0);
+    let [lower, upper] = [step(-1.0), step(1.0)];
+    let mut mesh = TriMesh::default();
+    let mut ids: BTreeMap<[usize; 3], u32> = BTreeMap::new();
+    // Steps along both walls, away from the edge, and along the edge.
+    let mut face = |corners: [[usize; 3]; 3]| {
+        let triangle = corners.map(|[i, j, k]| {
+            *ids.entry([i, j, k]).or_insert_with(|| {
+                mesh.points.push((lower * i as f64 + upper * j as f64 + DVec3::Z * k as f64) / n as f64);
+                mesh.points.len() as u32 - 1
+            })
+        });
+        mesh.triangles.push(triangle);
+    };
+    for (i, j) in (0..n).flat_map(|i| (0..n - i).map(move |j| (i, j))) {
+        let upright = [[i, j], [i + 1, j], [i, j + 1]];
+        let turned = [[i + 1, j], [i + 1, j + 1], [i, j + 1]];
+        for [a, b, c] in [upright, turned].into_iter().take(if i + j + 1 < n { 2 } else { 1 }) {
+            face([a, b, c].map(|[i, j]| [i, j, n]));
+            face([a, c, b].map(|[i, j]| [i, j, 0]));
+        }
+    }
+    // Counter-clockwise around the ends.
+    let around = (0..n).map(|i| [[i, 0], [i + 1, 0]]);
+    let around = around.chain((0..n).map(|i| [[n - i, i], [n - i - 1, i + 1]]));
+    let around = around.chain((0..n).map(|i| [[0, n - i], [0, n - i - 1]]));
+    for ([p, q], k) in around.flat_map(|side| (0..n).map(move |k| (side, k))) {
+        let at = |[i, j]: [usize; 2], k| [i, j, k];
+        face([at(p, k), at(q, k), at(q, k + 1)]);
+        face([at(p, k), at(q, k + 1), at(p, k + 1)]);
+    }
+    mesh
+}
+
 /// An open saddle sheet `z = height * x y` over `[-1, 1]²`, `(n + 1)²` vertices.
 pub fn saddle(height: f64, n: usize) -> TriMesh {
     sheet(n, n, false, false, |u, v| {
@@ -330,6 +368,7 @@ mod tests {
             (torus(2.0, 0.5, 96, 48), 0, 2.0 * PI * PI * 2.0 * 0.25),
             (cylinder(0.5, 3.0, 64), 2, PI * 0.25 * 3.0),
             (cuboid(DVec3::new(1.0, 2.0, 3.0), 4), 2, 6.0),
+            (wedge(15.0, 6), 2, 15_f64.to_radians().sin() / 2.0),
         ] {
             assert_eq!(count(&mesh), (euler, 0));
             assert!((volume(&mesh) / exact - 1.0).abs() < 0.02, "{} of {exact}", volume(&mesh));
