@@ -358,17 +358,19 @@ impl Aligned {
             if least > MOST_UNASKED && !params.coarsest {
                 return Ok((None, Some(AlignError::Count { found: whole.squares })));
             }
-            // Its vectors are the shortest, which says nothing of how cells look: it is laid only where it is asked for.
-            coarsest = params.coarsest.then_some(whole);
-            let most = if params.coarsest { least } else { MOST_UNASKED };
-            GROWTH.map(|growth| growth * least).into_iter().filter(|n| *n <= most).map(|n| n as usize).collect()
+            let mut tried = vec![whole.squares];
+            coarsest = Some(whole);
+            if !params.coarsest {
+                // The same number by form, for the shortest vectors say nothing of how cells look; then more.
+                tried.extend(GROWTH.map(|n| n * least).into_iter().filter(|n| *n <= MOST_UNASKED).map(|n| n as usize));
+            }
+            tried
         };
-        let count = tried.len();
+        let (count, first) = (tried.len(), tried.first().copied());
         let most = tried.iter().map(|&n| n as f64).fold(MOST_UNASKED, f64::max);
         let mut tried = VecDeque::from(tried);
         let mut is_far = false;
         while let Some(squares) = tried.pop_front() {
-            let is_first = tried.len() + 1 == count;
             observer.progress(0.9 - 0.6 * (tried.len() + 1) as f64 / count as f64);
             let whole = match coarsest.take() {
                 Some(coarsest) => Ok(coarsest),
@@ -397,7 +399,7 @@ impl Aligned {
                 break;
             }
             // What has no room for two numbers of squares has none for more.
-            if !is_first && best.is_none() && trouble.as_ref().is_some_and(|e| !e.places().is_empty()) {
+            if Some(squares) != first && best.is_none() && trouble.as_ref().is_some_and(|e| !e.places().is_empty()) {
                 break;
             }
         }
