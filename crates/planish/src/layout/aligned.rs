@@ -208,7 +208,7 @@ pub(super) struct Laid {
     pub deviation_deg: f64,
     /// What it is worth.
     pub worth: Worth,
-    /// True if its form gives it more bad cells than any number of cells in question would outweigh.
+    /// True if no number in question is good and this is none of the lines' doing: another map would hardly be better.
     is_far: bool,
 }
 
@@ -326,15 +326,27 @@ pub(super) fn lay(
 struct Draft<'a> {
     bench: Bench<'a>,
     worth: Worth,
+    /// Of its cells before rows that no grid needs went.
     covers: Vec<Cover>,
     deviation_deg: f64,
 }
 
+impl Draft<'_> {
+    /// True if this is taken rather than the other: for it is good, or of two good ones the coarser, or of others worth more.
+    fn is_better(&self, other: &Draft) -> bool {
+        match (self.worth.is_enough(), other.worth.is_enough()) {
+            (true, true) => self.covers.len() < other.covers.len(),
+            (false, false) => self.worth.exceeds(other.worth),
+            (is_enough, _) => is_enough,
+        }
+    }
+}
+
 impl Aligned {
-    /// The first good network, of the numbers of patches in question, else the best; and what was in the way of others.
+    /// The network of fewest squares that is good, of the numbers in question, else the best; and what was in the way of
+    /// others.
     ///
-    /// If no number in question would outweigh the bad cells of the first network ([`fitness::is_beyond`]), as on shapes of limbs and
-    /// folds, the largest number that has room is taken, or that which is asked for.
+    /// Where the first is not good the largest number comes next: if that is not good either those between hardly ever are.
     fn choose(
         &self,
         params: &LayoutParams,
@@ -343,52 +355,29 @@ impl Aligned {
         if let Err(folded) = self.unfolded(&self.mapped) {
             return Ok((None, Some(folded)));
         }
-        let mut trouble = None;
-        let mut best: Option<Draft> = None;
-        let mut coarsest = None;
-        let tried: Vec<usize> = if let Some(asked) = asked(params) {
-            NEAR_ASKED.map(|near| ((near * asked as f64).round() as usize).max(1)).to_vec()
-        } else {
-            let whole = match self.quantized(Scale::Coarsest, observer) {
-                Ok(whole) => whole,
-                Err(QuantizeError::Cancelled(cancelled)) => return Err(cancelled),
-                Err(e) => return Ok((None, Some(e.into()))),
-            };
-            let least = whole.squares as f64;
-            if least > MOST_UNASKED && !params.coarsest {
-                return Ok((None, Some(AlignError::Count { found: whole.squares })));
-            }
-            let mut tried = vec![whole.squares];
-            coarsest = Some(whole);
-            if !params.coarsest {
-                // The same number by form, for the shortest vectors say nothing of how cells look; then more.
-                tried.extend(GROWTH.map(|n| n * least).into_iter().filter(|n| *n <= MOST_UNASKED).map(|n| n as usize));
-            }
-            tried
+        let mut scales = match self.scales(params, observer) {
+            Ok(scales) => VecDeque::from(scales),
+            Err(AlignError::Cancelled(cancelled)) => return Err(cancelled),
+            Err(e) => return Ok((None, Some(e))),
         };
-        let (count, first) = (tried.len(), tried.first().copied());
-        let most = tried.iter().map(|&n| n as f64).fold(MOST_UNASKED, f64::max);
-        let mut tried = VecDeque::from(tried);
-        let mut is_far = false;
-        while let Some(squares) = tried.pop_front() {
-            observer.progress(0.9 - 0.6 * (tried.len() + 1) as f64 / count as f64);
-            let whole = match coarsest.take() {
-                Some(coarsest) => Ok(coarsest),
-                None => self.quantized(Scale::Squares(squares), observer).map_err(AlignError::from),
-            };
-            let draft = whole.and_then(|whole| self.draft(&whole, params, observer));
-            match draft {
+        let (count, largest) = (scales.len(), scales.iter().map(|(squares, _)| *squares).max());
+        let (mut best, mut trouble, mut is_far): (Option<Draft>, Option<AlignError>, bool) = (None, None, false);
+        while let Some((squares, scale)) = scales.pop_front() {
+            observer.progress(0.9 - 0.6 * (scales.len() + 1) as f64 / count as f64);
+            match self.quantized(scale, observer).and_then(|whole| self.draft(&whole, params, observer)) {
                 Ok(draft) => {
-                    let mut is_last = draft.worth.is_enough() || is_far;
-                    if best.is_none() && fitness::is_beyond(&draft.covers, most) {
-                        is_far = true;
-                        is_last |= asked(params).is_some() && draft.worth.is_kept();
-                        tried.make_contiguous().sort_by(|a, b| b.cmp(a));
+                    let is_enough = draft.worth.is_enough();
+                    let is_largest = Some(squares) == largest;
+                    if is_largest && !is_enough {
+                        is_far = fitness::is_open(&draft.covers);
+                    } else if best.is_none() && draft.worth.is_kept() && !is_enough {
+                        scales.make_contiguous().sort_by_key(|&(squares, _)| (Some(squares) != largest, squares));
                     }
-                    if best.as_ref().is_none_or(|best| draft.worth.exceeds(best.worth)) {
+                    if best.as_ref().is_none_or(|best| draft.is_better(best)) {
                         best = Some(draft);
                     }
-                    if is_last {
+                    // Below a good largest number there may be others.
+                    if is_enough != is_largest {
                         break;
                     }
                 }
@@ -399,7 +388,7 @@ impl Aligned {
                 break;
             }
             // What has no room for two numbers of squares has none for more.
-            if Some(squares) != first && best.is_none() && trouble.as_ref().is_some_and(|e| !e.places().is_empty()) {
+            if count > scales.len() + 1 && best.is_none() && trouble.as_ref().is_some_and(|e| !e.places().is_empty()) {
                 break;
             }
         }
@@ -414,10 +403,32 @@ impl Aligned {
         Ok((laid, trouble))
     }
 
+    /// The scales in question with their numbers of squares, in the order in which they are tried.
+    /// # Errors
+    /// [`AlignError`], among others `Count`.
+    fn scales(&self, params: &LayoutParams, observer: &dyn Observer) -> Result<Vec<(usize, Scale)>, AlignError> {
+        let by_form = |squares: usize| (squares, Scale::Squares(squares));
+        if let Some(asked) = asked(params) {
+            return Ok(NEAR_ASKED.map(|near| by_form(((near * asked as f64).round() as usize).max(1))).to_vec());
+        }
+        if params.coarsest {
+            return Ok(vec![(1, Scale::Coarsest)]);
+        }
+        let least = self.quantized(Scale::Coarsest, observer)?.squares;
+        if least as f64 > MOST_UNASKED {
+            return Err(AlignError::Count { found: least });
+        }
+        let numbers = GROWTH.map(|n| n * least as f64).into_iter().filter(|n| *n <= MOST_UNASKED);
+        Ok(numbers.map(|n| by_form(n as usize)).collect())
+    }
+
     /// Whole numbers for the cones and lines.
-    fn quantized(&self, scale: Scale, observer: &dyn Observer) -> Result<IntegerMap, QuantizeError> {
+    fn quantized(&self, scale: Scale, observer: &dyn Observer) -> Result<IntegerMap, AlignError> {
         let Proxy { mesh, adjacency, lines, .. } = &*self.proxy;
-        integers::quantize(mesh, adjacency, &self.mapped.map, lines, scale, observer)
+        match integers::quantize(mesh, adjacency, &self.mapped.map, lines, scale, observer) {
+            Err(QuantizeError::Cancelled(cancelled)) => Err(cancelled.into()),
+            whole => Ok(whole?),
+        }
     }
 
     /// The layout on the proxy whose cells are the unit squares, settled as `params` say: what the map squeezes is spread.
@@ -441,11 +452,17 @@ impl Aligned {
         let rounds = SETTLING_PER_SMOOTHING * params.smoothing;
         let squares = bench.complex.live_cells().count();
         improve::settle_along_lines(&mut bench, squares, rounds, observer).map_err(|_| Cancelled)?;
-        let covers = fitness::covers(&bench);
+        let mut covers = fitness::covers(&bench);
+        if !params.coarsest && !fitness::is_good(fitness::good_part(&covers)) {
+            // Whole numbers have cones in the way of each other.
+            improve::improve(&mut bench, squares, observer).map_err(|_| Cancelled)?;
+            improve::settle_along_lines(&mut bench, squares, rounds, observer).map_err(|_| Cancelled)?;
+            covers = fitness::covers(&bench);
+        }
         let good_part = fitness::good_part(&covers);
         let joined = fitness::joined(&bench, params.patches);
         let patches = joined.live_cells().count();
-        if patches < squares && !params.coarsest {
+        if patches < covers.len() && !params.coarsest {
             bench = Bench::new(mesh, adjacency, joined).ok_or(AlignError::Misplaced)?;
             improve::settle_along_lines(&mut bench, patches, rounds, observer).map_err(|_| Cancelled)?;
         }
