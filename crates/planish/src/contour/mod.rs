@@ -157,16 +157,10 @@ pub fn extract(
         (0..layers).step_by(LAYERS_PER_TASK).map(|from| (from, (from + LAYERS_PER_TASK).min(layers))).collect();
 
     let mut points = hit_positions(field);
-    let octree = params.adaptive.filter(|t| *t > 0.0).map(|tolerance| {
-        let cells = chunks.par_iter().flat_map_iter(|&(from, to)| {
-            let mut cells = Vec::new();
-            walk::walk(field, from, to, |cell| cells.push(octree::candidate(cell, base)));
-            cells
-        });
-        // Standard cells have no features to keep, but no reason to bend either.
-        let sharp = if params.plain { SMOOTH_COSINE } else { limits.faint };
-        Octree::new(field, base, cells.collect(), sharp, tolerance)
-    });
+    // Standard cells have no features to keep, but no reason to bend either.
+    let sharp = if params.plain { SMOOTH_COSINE } else { limits.faint };
+    let tolerance = params.adaptive.filter(|t| *t > 0.0);
+    let octree = tolerance.map(|tolerance| larger_cells(field, base, &chunks, sharp, tolerance));
     let merged = |at: [usize; 3]| octree.as_ref().is_some_and(|o| o.is_merged(at));
     let surveys: Option<Vec<Survey>> = chunks
         .par_iter()
@@ -212,18 +206,79 @@ pub fn extract(
     if (outer + inner) as u64 >= FIRST_INNER as u64 {
         return Err(ContourError::TooLarge { vertices: outer + inner });
     }
-    let count = surveys.iter().map(Survey::triangles).chain(sheets.iter().map(|s| s.triangles.len())).sum();
-    if count == 0 {
-        return Err(ContourError::Nothing { cells: field.lattice.cells });
-    }
     points.reserve(faces.len() + inner);
     points.extend(faces.positions());
     let mut kinds = vec![FeatureKind::None; hits];
     kinds.extend(faces.kinds());
+    let Joined { mut mesh, mut kinds, mut edges, mut counts } = joined(points, kinds, &surveys, &sheets, &mut wishes);
+    let (vertices, triangles) = (mesh.points.len(), mesh.triangles.len());
+    if triangles == 0 {
+        return Err(ContourError::Nothing { cells: field.lattice.cells });
+    }
+    let cells = || {
+        let (mut cells, mut first) = (Vec::new(), 0);
+        for (survey, sheet) in surveys.iter().zip(&sheets) {
+            survey.merged_cells(sheet, first, &mut cells);
+            first += (survey.triangles() + sheet.triangles.len()) as u32;
+        }
+        if octree.is_some() {
+            cells.par_sort_unstable_by_key(|c| [c.0[2], c.0[1], c.0[0]]);
+        }
+        cells
+    };
+    let polished =
+        polish::polish(&mut mesh, field, base, cells, &wishes, creases, &mut kinds, &mut edges, limits.sharp);
+    (counts.moved, counts.kept) = (polished.moved, polished.kept);
+    // Every hit is a vertex, but at the boundary of what is known, in larger cells, and where vertices were merged or added.
+    let unchanged = mesh.triangles.len() == triangles && mesh.points.len() == vertices;
+    let complete = !field.sides.unknown && octree.is_none() && unchanged;
+    let mut extracted = Extracted { mesh, tags: tags(kinds, edges), counts };
+    if !complete {
+        drop_unused(&mut extracted);
+    }
+    extracted.tags.mark(&mut extracted.mesh);
+    observer.progress(1.0);
+    Ok(extracted)
+}
+
+/// The cells that flat ones are merged to.
+/// * `chunks` - layers of each task
+fn larger_cells<'a>(
+    field: &'a Directed,
+    base: [u32; 3],
+    chunks: &[(usize, usize)],
+    sharp: f64,
+    tolerance: f64,
+) -> Octree<'a> {
+    let cells = chunks.par_iter().flat_map_iter(|&(from, to)| {
+        let mut cells = Vec::new();
+        walk::walk(field, from, to, |cell| cells.push(octree::candidate(cell, base)));
+        cells
+    });
+    Octree::new(field, base, cells.collect(), sharp, tolerance)
+}
+
+/// All parts of a surface in one mesh.
+struct Joined {
+    mesh: TriMesh,
+    kinds: Vec<FeatureKind>,
+    edges: Vec<[u32; 2]>,
+    counts: ContourCounts,
+}
+
+/// Joins the parts; their wishes come after the others.
+/// * `points`, `kinds` - of the vertices on the edges and faces of cells
+fn joined(
+    mut points: Vec<DVec3>,
+    mut kinds: Vec<FeatureKind>,
+    surveys: &[Survey],
+    sheets: &[Sheet],
+    wishes: &mut Vec<(u32, DVec3)>,
+) -> Joined {
     let mut counts = ContourCounts::default();
-    let mut triangles = Vec::with_capacity(count);
-    let mut edges = Vec::new();
-    for (survey, sheet) in surveys.iter().zip(&sheets) {
+    let count = surveys.iter().map(Survey::triangles).chain(sheets.iter().map(|s| s.triangles.len())).sum();
+    let (mut triangles, mut edges) = (Vec::with_capacity(count), Vec::new());
+    for (survey, sheet) in surveys.iter().zip(sheets) {
         // Inner vertices get their numbers after all those before.
         let first = points.len() as u32;
         let name = |id: u32| if id >= FIRST_INNER { id - FIRST_INNER + first } else { id };
@@ -236,32 +291,7 @@ pub fn extract(
         counts.fallbacks += sheet.fallbacks;
         counts.pushed += sheet.pushed;
     }
-    let mut mesh = TriMesh::new(points, triangles);
-    let cells = || {
-        let (mut cells, mut first) = (Vec::new(), 0);
-        for (survey, sheet) in surveys.iter().zip(&sheets) {
-            survey.merged_cells(sheet, first, &mut cells);
-            first += (survey.triangles() + sheet.triangles.len()) as u32;
-        }
-        if octree.is_some() {
-            cells.par_sort_unstable_by_key(|c| [c.0[2], c.0[1], c.0[0]]);
-        }
-        cells
-    };
-    let vertices = mesh.points.len();
-    let polished =
-        polish::polish(&mut mesh, field, base, cells, &wishes, creases, &mut kinds, &mut edges, limits.sharp);
-    (counts.moved, counts.kept) = (polished.moved, polished.kept);
-    // Every hit is a vertex, but at the boundary of what is known, in larger cells, and where vertices were merged or added.
-    let unchanged = mesh.triangles.len() == count && mesh.points.len() == vertices;
-    let complete = !field.sides.unknown && octree.is_none() && unchanged;
-    let mut extracted = Extracted { mesh, tags: tags(kinds, edges), counts };
-    if !complete {
-        drop_unused(&mut extracted);
-    }
-    extracted.tags.mark(&mut extracted.mesh);
-    observer.progress(1.0);
-    Ok(extracted)
+    Joined { mesh: TriMesh::new(points, triangles), kinds, edges, counts }
 }
 
 fn thresholds(field: &Directed, creases: Option<&dyn Creases>, params: &ContourParams) -> Thresholds {

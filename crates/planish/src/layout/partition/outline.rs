@@ -77,127 +77,174 @@ pub(in crate::layout) fn corners(ground: &Ground, reach: f64) -> Vec<bool> {
 
 /// The complex of the cells that `label` names.
 pub(in crate::layout) fn outline(ground: &Ground, label: &[u32], count: usize, corner: &[bool]) -> Complex {
-    let mesh = ground.mesh;
-    let barrier = ground.barriers(label);
-    let from = |h: u32| mesh.triangles[h as usize / 3][h as usize % 3];
-    let kind = |h: u32| {
-        if ground.adjacency.opposite[h as usize] == NONE {
+    let mut outline = Outline {
+        ground,
+        label,
+        barrier: ground.barriers(label),
+        node: vec![NONE; ground.mesh.points.len()],
+        complex: Complex { cells: vec![None; count], ..Complex::default() },
+    };
+    outline.make_nodes(corner);
+    outline.part_loops(corner);
+    let half_of = outline.make_arcs();
+    outline.make_cells(&half_of);
+    outline.complex
+}
+
+/// The complex of a partition while it is made.
+struct Outline<'a> {
+    ground: &'a Ground<'a>,
+    label: &'a [u32],
+    /// For each half-edge whether it parts two cells, or lies on a line or the boundary.
+    barrier: Vec<bool>,
+    /// For each vertex its node.
+    node: Vec<u32>,
+    complex: Complex,
+}
+
+impl Outline<'_> {
+    fn from(&self, h: u32) -> u32 {
+        self.ground.mesh.origin(h)
+    }
+
+    fn node_of(&self, v: u32) -> u32 {
+        self.node[v as usize]
+    }
+
+    fn barriers(&self) -> Vec<u32> {
+        (0..self.barrier.len() as u32).filter(|&h| self.barrier[h as usize]).collect()
+    }
+
+    fn kind(&self, h: u32) -> CurveKind {
+        if self.ground.adjacency.opposite[h as usize] == NONE {
             CurveKind::Boundary
-        } else if ground.sharp[h as usize] {
+        } else if self.ground.sharp[h as usize] {
             CurveKind::Feature
         } else {
             CurveKind::Smooth
         }
-    };
-    // Barrier edges at each vertex, as half-edges that leave it (or enter it, on the boundary).
-    let mut degree = vec![0u32; mesh.points.len()];
-    let mut kinds: Vec<[u32; 3]> = vec![[0; 3]; mesh.points.len()];
-    for h in (0..barrier.len() as u32).filter(|&h| barrier[h as usize]) {
-        let o = ground.adjacency.opposite[h as usize];
-        if o == NONE || h < o {
-            for v in [from(h), from(next(h))] {
-                degree[v as usize] += 1;
-                kinds[v as usize][kind(h) as usize] += 1;
+    }
+
+    fn make_node(&mut self, v: u32, corner: &[bool]) {
+        if self.node_of(v) == NONE {
+            self.node[v as usize] = self.complex.nodes.len() as u32;
+            self.complex.nodes.push(Node { vertex: v, stays: corner[v as usize] });
+        }
+    }
+
+    /// Nodes at corners, and where barriers meet, end or change their kind.
+    fn make_nodes(&mut self, corner: &[bool]) {
+        let points = self.ground.mesh.points.len();
+        let mut kinds: Vec<[u32; 3]> = vec![[0; 3]; points];
+        for h in self.barriers() {
+            let o = self.ground.adjacency.opposite[h as usize];
+            if o == NONE || h < o {
+                for v in [self.from(h), self.from(next(h))] {
+                    kinds[v as usize][self.kind(h) as usize] += 1;
+                }
+            }
+        }
+        for v in 0..points as u32 {
+            let degree: u32 = kinds[v as usize].iter().sum();
+            let is_mixed = kinds[v as usize].iter().filter(|&&k| k > 0).count() > 1;
+            if degree > 0 && (degree != 2 || is_mixed || corner[v as usize]) {
+                self.make_node(v, corner);
             }
         }
     }
-    let mut node = vec![NONE; mesh.points.len()];
-    let mut complex = Complex { cells: vec![None; count], ..Complex::default() };
-    let make = |v: u32, node: &mut [u32], complex: &mut Complex| {
-        if node[v as usize] == NONE {
-            node[v as usize] = complex.nodes.len() as u32;
-            complex.nodes.push(Node { vertex: v, stays: corner[v as usize] });
-        }
-    };
-    for v in 0..mesh.points.len() as u32 {
-        let mixed = kinds[v as usize].iter().filter(|&&k| k > 0).count() > 1;
-        if degree[v as usize] > 0 && (degree[v as usize] != 2 || mixed || corner[v as usize]) {
-            make(v, &mut node, &mut complex);
-        }
-    }
-    // Loops without a node get some, evenly spaced by count.
-    let mut seen = vec![false; barrier.len()];
-    let chain_from = |h: u32, node: &[u32]| {
+
+    /// The barriers from a half-edge to the next node, or once around.
+    fn chain_from(&self, h: u32) -> Vec<u32> {
         let mut chain = vec![h];
         let mut g = h;
-        while node[from(next(g)) as usize] == NONE {
-            g = next_around(ground.adjacency, &barrier, g);
+        while self.node_of(self.from(next(g))) == NONE {
+            g = next_around(self.ground.adjacency, &self.barrier, g);
             if g == h {
                 break;
             }
             chain.push(g);
         }
         chain
-    };
-    for h in (0..barrier.len() as u32).filter(|&h| barrier[h as usize] && node[from(h) as usize] != NONE) {
-        for g in chain_from(h, &node) {
-            seen[g as usize] = true;
-        }
     }
-    for h in 0..barrier.len() as u32 {
-        if !barrier[h as usize] || seen[h as usize] || node[from(h) as usize] != NONE {
-            continue;
+
+    /// Loops without a node get some, evenly spaced by count.
+    fn part_loops(&mut self, corner: &[bool]) {
+        let mut seen = vec![false; self.barrier.len()];
+        for h in self.barriers() {
+            if self.node_of(self.from(h)) != NONE {
+                self.chain_from(h).into_iter().for_each(|g| seen[g as usize] = true);
+            }
         }
-        let chain = chain_from(h, &node);
-        for i in 0..LOOP_NODES.min(chain.len()) {
-            make(from(chain[i * chain.len() / LOOP_NODES.min(chain.len())]), &mut node, &mut complex);
-        }
-        for g in chain {
-            seen[g as usize] = true;
-            let o = ground.adjacency.opposite[g as usize];
-            if o != NONE {
-                seen[o as usize] = true;
+        for h in self.barriers() {
+            if seen[h as usize] || self.node_of(self.from(h)) != NONE {
+                continue;
+            }
+            let chain = self.chain_from(h);
+            let count = LOOP_NODES.min(chain.len());
+            for i in 0..count {
+                self.make_node(self.from(chain[i * chain.len() / count]), corner);
+            }
+            for g in chain {
+                seen[g as usize] = true;
+                let o = self.ground.adjacency.opposite[g as usize];
+                if o != NONE {
+                    seen[o as usize] = true;
+                }
             }
         }
     }
-    // Arcs, then loops.
-    let mut half_of = vec![NONE; barrier.len()];
-    for h in (0..barrier.len() as u32).filter(|&h| barrier[h as usize]) {
-        if node[from(h) as usize] == NONE || half_of[h as usize] != NONE {
-            continue;
-        }
-        let chain = chain_from(h, &node);
-        let a = complex.arcs.len() as u32;
-        half_of[h as usize] = 2 * a;
-        let last = *chain.last().expect("at least the first half-edge");
-        let back = ground.adjacency.opposite[last as usize];
-        let mut right = NONE;
-        if back != NONE {
-            half_of[back as usize] = 2 * a + 1;
-            right = label[back as usize / 3];
-        }
-        let mut places: Vec<Place> = chain.iter().map(|&g| Place::Vertex(from(g))).collect();
-        places.push(Place::Vertex(from(next(last))));
-        complex.arcs.push(Some(Arc {
-            nodes: [node[from(h) as usize], node[from(next(last)) as usize]],
-            kind: kind(h),
-            chain: places,
-            cells: [label[h as usize / 3], right],
-        }));
-    }
-    for h in 0..barrier.len() as u32 {
-        let first = half_of[h as usize];
-        if first == NONE {
-            continue;
-        }
-        let c = label[h as usize / 3] as usize;
-        if complex.cells[c].is_some() {
-            continue;
-        }
-        let mut sides = Vec::new();
-        let mut g = h;
-        loop {
-            if half_of[g as usize] != NONE {
-                sides.push(half_of[g as usize]);
+
+    /// The arcs from node to node; returns for the half-edges that they begin with, from either end, their half-arc.
+    fn make_arcs(&mut self) -> Vec<u32> {
+        let mut half_of = vec![NONE; self.barrier.len()];
+        for h in self.barriers() {
+            if self.node_of(self.from(h)) == NONE || half_of[h as usize] != NONE {
+                continue;
             }
-            g = next_around(ground.adjacency, &barrier, g);
-            if g == h {
-                break;
+            let chain = self.chain_from(h);
+            let a = self.complex.arcs.len() as u32;
+            half_of[h as usize] = 2 * a;
+            let last = *chain.last().expect("at least the first half-edge");
+            let back = self.ground.adjacency.opposite[last as usize];
+            let mut right = NONE;
+            if back != NONE {
+                half_of[back as usize] = 2 * a + 1;
+                right = self.label[back as usize / 3];
             }
+            let end = self.from(next(last));
+            let mut places: Vec<Place> = chain.iter().map(|&g| Place::Vertex(self.from(g))).collect();
+            places.push(Place::Vertex(end));
+            self.complex.arcs.push(Some(Arc {
+                nodes: [self.node_of(self.from(h)), self.node_of(end)],
+                kind: self.kind(h),
+                chain: places,
+                cells: [self.label[h as usize / 3], right],
+            }));
         }
-        complex.cells[c] = Some(sides);
+        half_of
     }
-    complex
+
+    /// The sides of each cell in order.
+    fn make_cells(&mut self, half_of: &[u32]) {
+        for h in (0..half_of.len() as u32).filter(|&h| half_of[h as usize] != NONE) {
+            let cell = self.label[h as usize / 3] as usize;
+            if self.complex.cells[cell].is_some() {
+                continue;
+            }
+            let mut sides = Vec::new();
+            let mut g = h;
+            loop {
+                if half_of[g as usize] != NONE {
+                    sides.push(half_of[g as usize]);
+                }
+                g = next_around(self.ground.adjacency, &self.barrier, g);
+                if g == h {
+                    break;
+                }
+            }
+            self.complex.cells[cell] = Some(sides);
+        }
+    }
 }
 
 #[cfg(test)]
