@@ -360,18 +360,19 @@ impl Aligned {
             Err(AlignError::Cancelled(cancelled)) => return Err(cancelled),
             Err(e) => return Ok((None, Some(e))),
         };
-        let (count, largest) = (scales.len(), scales.iter().map(|(squares, _)| *squares).max());
+        let (first, largest) = (scales.front().copied(), scales.iter().copied().max());
+        let count = scales.len();
         let (mut best, mut trouble, mut is_far): (Option<Draft>, Option<AlignError>, bool) = (None, None, false);
-        while let Some((squares, scale)) = scales.pop_front() {
+        while let Some(scale) = scales.pop_front() {
             observer.progress(0.9 - 0.6 * (scales.len() + 1) as f64 / count as f64);
             match self.quantized(scale, observer).and_then(|whole| self.draft(&whole, params, observer)) {
                 Ok(draft) => {
                     let is_enough = draft.worth.is_enough();
-                    let is_largest = Some(squares) == largest;
+                    let is_largest = Some(scale) == largest;
                     if is_largest && !is_enough {
                         is_far = fitness::is_open(&draft.covers);
                     } else if best.is_none() && draft.worth.is_kept() && !is_enough {
-                        scales.make_contiguous().sort_by_key(|&(squares, _)| (Some(squares) != largest, squares));
+                        scales.make_contiguous().sort_by_key(|&scale| (Some(scale) != largest, scale));
                     }
                     if best.as_ref().is_none_or(|best| draft.is_better(best)) {
                         best = Some(draft);
@@ -388,7 +389,7 @@ impl Aligned {
                 break;
             }
             // What has no room for two numbers of squares has none for more.
-            if count > scales.len() + 1 && best.is_none() && trouble.as_ref().is_some_and(|e| !e.places().is_empty()) {
+            if Some(scale) != first && best.is_none() && trouble.as_ref().is_some_and(|e| !e.places().is_empty()) {
                 break;
             }
         }
@@ -403,23 +404,22 @@ impl Aligned {
         Ok((laid, trouble))
     }
 
-    /// The scales in question with their numbers of squares, in the order in which they are tried.
+    /// The scales in question, in the order in which they are tried.
     /// # Errors
     /// [`AlignError`], among others `Count`.
-    fn scales(&self, params: &LayoutParams, observer: &dyn Observer) -> Result<Vec<(usize, Scale)>, AlignError> {
-        let by_form = |squares: usize| (squares, Scale::Squares(squares));
+    fn scales(&self, params: &LayoutParams, observer: &dyn Observer) -> Result<Vec<Scale>, AlignError> {
         if let Some(asked) = asked(params) {
-            return Ok(NEAR_ASKED.map(|near| by_form(((near * asked as f64).round() as usize).max(1))).to_vec());
+            return Ok(NEAR_ASKED.map(|near| Scale::Squares(((near * asked as f64).round() as usize).max(1))).to_vec());
         }
         if params.coarsest {
-            return Ok(vec![(1, Scale::Coarsest)]);
+            return Ok(vec![Scale::Coarsest]);
         }
         let least = self.quantized(Scale::Coarsest, observer)?.squares;
         if least as f64 > MOST_UNASKED {
             return Err(AlignError::Count { found: least });
         }
         let numbers = GROWTH.map(|n| n * least as f64).into_iter().filter(|n| *n <= MOST_UNASKED);
-        Ok(numbers.map(|n| by_form(n as usize)).collect())
+        Ok(numbers.map(|n| Scale::Squares(n as usize)).collect())
     }
 
     /// Whole numbers for the cones and lines.

@@ -23,7 +23,7 @@ use glam::DVec2;
 use walks::Whole;
 
 /// How large the unit squares are to be.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Scale {
     /// As few squares as the cones and lines allow.
     Coarsest,
