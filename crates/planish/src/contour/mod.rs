@@ -150,8 +150,6 @@ pub fn extract(
     if hits as u64 >= FIRST_INNER as u64 {
         return Err(ContourError::TooLarge { vertices: hits });
     }
-    let [nx, ny, _] = [0, 1, 2].map(|a| field.axes[a].len() as u32);
-    let base = [0, nx, nx + ny];
     let layers = field.lattice.cells[2];
     let chunks: Vec<(usize, usize)> =
         (0..layers).step_by(LAYERS_PER_TASK).map(|from| (from, (from + LAYERS_PER_TASK).min(layers))).collect();
@@ -160,11 +158,11 @@ pub fn extract(
     // Standard cells have no features to keep, but no reason to bend either.
     let sharp = if params.plain { SMOOTH_COSINE } else { limits.faint };
     let tolerance = params.adaptive.filter(|t| *t > 0.0);
-    let octree = tolerance.map(|tolerance| larger_cells(field, base, &chunks, sharp, tolerance));
+    let octree = tolerance.map(|tolerance| larger_cells(field, &chunks, sharp, tolerance));
     let merged = |at: [usize; 3]| octree.as_ref().is_some_and(|o| o.is_merged(at));
     let surveys: Option<Vec<Survey>> = chunks
         .par_iter()
-        .map(|&layers| (!observer.cancelled()).then(|| survey::survey(field, &points, &limits, base, layers, merged)))
+        .map(|&layers| (!observer.cancelled()).then(|| survey::survey(field, &points, &limits, layers, merged)))
         .collect();
     let surveys = surveys.ok_or(Cancelled)?;
     observer.progress(0.3);
@@ -172,12 +170,13 @@ pub fn extract(
         .par_iter()
         .map(|survey| {
             let cells = survey.others.iter().filter(|_| !params.plain).map(|(cell, _)| cell);
-            (!observer.cancelled()).then(|| face::face_points(field, &limits, creases, base, cells))
+            (!observer.cancelled()).then(|| face::face_points(field, &limits, creases, cells))
         })
         .collect();
     let (faces, mut wishes) = FacePoints::join(field, parts.ok_or(Cancelled)?, hits as u32);
     observer.progress(0.6);
-    let patcher = Patcher { field, points: &points, limits: &limits, faces: &faces, refine: creases, base };
+    let patcher =
+        Patcher { field, points: &points, limits: &limits, faces: &faces, refine: creases, base: field.first_names() };
     let sheets: Option<Vec<Sheet>> = surveys
         .par_iter()
         .map(|survey| {
@@ -210,7 +209,7 @@ pub fn extract(
     points.extend(faces.positions());
     let mut kinds = vec![FeatureKind::None; hits];
     kinds.extend(faces.kinds());
-    let Joined { mut mesh, mut kinds, mut edges, mut counts } = joined(points, kinds, &surveys, &sheets, &mut wishes);
+    let Joined { mut mesh, mut tags, mut counts } = joined(points, kinds, &surveys, &sheets, &mut wishes);
     let (vertices, triangles) = (mesh.points.len(), mesh.triangles.len());
     if triangles == 0 {
         return Err(ContourError::Nothing { cells: field.lattice.cells });
@@ -226,13 +225,13 @@ pub fn extract(
         }
         cells
     };
-    let polished =
-        polish::polish(&mut mesh, field, base, cells, &wishes, creases, &mut kinds, &mut edges, limits.sharp);
+    let source = polish::Source { creases, sharp: limits.sharp };
+    let polished = polish::polish(&mut mesh, &mut tags, field, &wishes, cells, &source);
     (counts.moved, counts.kept) = (polished.moved, polished.kept);
     // Every hit is a vertex, but at the boundary of what is known, in larger cells, and where vertices were merged or added.
     let unchanged = mesh.triangles.len() == triangles && mesh.points.len() == vertices;
     let complete = !field.sides.unknown && octree.is_none() && unchanged;
-    let mut extracted = Extracted { mesh, tags: tags(kinds, edges), counts };
+    let mut extracted = Extracted { mesh, tags: in_order(tags), counts };
     if !complete {
         drop_unused(&mut extracted);
     }
@@ -243,26 +242,20 @@ pub fn extract(
 
 /// The cells that flat ones are merged to.
 /// * `chunks` - layers of each task
-fn larger_cells<'a>(
-    field: &'a Directed,
-    base: [u32; 3],
-    chunks: &[(usize, usize)],
-    sharp: f64,
-    tolerance: f64,
-) -> Octree<'a> {
+fn larger_cells<'a>(field: &'a Directed, chunks: &[(usize, usize)], sharp: f64, tolerance: f64) -> Octree<'a> {
     let cells = chunks.par_iter().flat_map_iter(|&(from, to)| {
-        let mut cells = Vec::new();
+        let (base, mut cells) = (field.first_names(), Vec::new());
         walk::walk(field, from, to, |cell| cells.push(octree::candidate(cell, base)));
         cells
     });
-    Octree::new(field, base, cells.collect(), sharp, tolerance)
+    Octree::new(field, cells.collect(), sharp, tolerance)
 }
 
 /// All parts of a surface in one mesh.
 struct Joined {
     mesh: TriMesh,
-    kinds: Vec<FeatureKind>,
-    edges: Vec<[u32; 2]>,
+    /// Edges in any order.
+    tags: FeatureTags,
     counts: ContourCounts,
 }
 
@@ -291,7 +284,7 @@ fn joined(
         counts.fallbacks += sheet.fallbacks;
         counts.pushed += sheet.pushed;
     }
-    Joined { mesh: TriMesh::new(points, triangles), kinds, edges, counts }
+    Joined { mesh: TriMesh::new(points, triangles), tags: FeatureTags { vertices: kinds, edges }, counts }
 }
 
 fn thresholds(field: &Directed, creases: Option<&dyn Creases>, params: &ContourParams) -> Thresholds {
@@ -303,11 +296,12 @@ fn thresholds(field: &Directed, creases: Option<&dyn Creases>, params: &ContourP
     Thresholds { sharp, corner: params.corner, faint: creases.map_or(sharp, |c| c.faint().max(sharp)) }
 }
 
-fn tags(vertices: Vec<FeatureKind>, edges: Vec<[u32; 2]>) -> FeatureTags {
-    let mut edges: Vec<[u32; 2]> = edges.into_iter().map(|[a, b]| [a.min(b), a.max(b)]).collect();
-    edges.par_sort_unstable();
-    edges.dedup();
-    FeatureTags { vertices, edges }
+/// Features whose edges came in any order, as [`FeatureTags`] has them.
+fn in_order(mut tags: FeatureTags) -> FeatureTags {
+    tags.edges.iter_mut().for_each(|[a, b]| (*a, *b) = ((*a).min(*b), (*a).max(*b)));
+    tags.edges.par_sort_unstable();
+    tags.edges.dedup();
+    tags
 }
 
 /// Rows whose hits a task places at once.

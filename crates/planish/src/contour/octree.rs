@@ -66,8 +66,8 @@ impl<'a> Octree<'a> {
     /// * `cells` - all cells that the surface passes
     /// * `sharp` - cosine below which two normals make a feature
     /// * `tolerance` - distance from a plane that is still flat, world units
-    pub fn new(field: &'a Directed, base: [u32; 3], cells: Vec<Candidate>, sharp: f64, tolerance: f64) -> Octree<'a> {
-        let mut octree = Octree { field, base, levels: Vec::new(), leaves: Vec::new() };
+    pub fn new(field: &'a Directed, cells: Vec<Candidate>, sharp: f64, tolerance: f64) -> Octree<'a> {
+        let mut octree = Octree { field, base: field.first_names(), levels: Vec::new(), leaves: Vec::new() };
         // Places of all cells of the level, and those of them that are flat.
         let mut current: Vec<([u32; 3], Option<Block>)> = cells
             .into_par_iter()

@@ -27,17 +27,16 @@ pub struct Survey {
 const ROUNDING: f64 = 1e-9;
 
 /// Looks at the cells of the layers `from..to`.
-/// * `points` - positions of the hits; `base` the first name of each axis
+/// * `points` - positions of the hits
 /// * `merged` - cells to leave out
 pub fn survey(
     field: &Directed,
     points: &[DVec3],
     limits: &Thresholds,
-    base: [u32; 3],
     (from, to): (usize, usize),
     merged: impl Fn([usize; 3]) -> bool,
 ) -> Survey {
-    let mut found = Survey::default();
+    let (mut found, base) = (Survey::default(), field.first_names());
     // Two normals this near to a third have a cosine above the threshold.
     let alike = ((1.0 + limits.faint) / 2.0).max(0.0).sqrt() + ROUNDING;
     walk(field, from, to, |cell| {

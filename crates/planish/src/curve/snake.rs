@@ -459,79 +459,15 @@ impl<'m> Snake<'m> {
     /// One fine solve: Gauss-Newton on moves in the tangent planes. Returns the largest move, world units, and
     /// whether the energy fell.
     fn solve(&mut self, params: &SnakeParams) -> (f64, bool) {
-        let n = self.points.len();
-        let normals: Vec<DVec3> = (0..n).map(|i| self.normal(i)).collect();
-        let mut slot = vec![NONE; n];
-        let mut count = 0u32;
-        // A free closed curve is folded flat, so that its ends lie beside each other in the system.
-        let whole = self.closed && (0..n).all(|i| self.moves(i));
-        let start = if whole { 0 } else { (0..n).find(|&i| !self.moves(i)).unwrap_or(0) };
-        let order: Vec<usize> = match whole {
-            true => (0..n).map(|k| if k % 2 == 0 { k / 2 } else { n - 1 - k / 2 }).collect(),
-            false => (0..n).map(|k| (start + k) % n).collect(),
-        };
-        for &i in &order {
-            if self.moves(i) {
-                slot[i] = count;
-                count += 1;
-            }
-        }
-        if count == 0 {
-            return (0.0, false);
-        }
-        let bases: Vec<[DVec3; 2]> = normals
-            .iter()
-            .map(
-                |&m| if m == DVec3::ZERO { [DVec3::X, DVec3::Y] } else { <[DVec3; 2]>::from(m.any_orthonormal_pair()) },
-            )
-            .collect();
-        let band = 2 * if whole { 5 } else { 2 } + 1;
-        let mut system = System { matrix: Banded::zero(2 * count as usize, band), rhs: vec![0.0; 2 * count as usize] };
-        let mut terms: Vec<(usize, f64)> = Vec::with_capacity(6);
-        let mut add = |parts: &[(usize, DVec3)], residual: f64, weight: f64, system: &mut System| {
-            terms.clear();
-            for &(i, g) in parts {
-                if slot[i] != NONE {
-                    for (c, axis) in bases[i].iter().enumerate() {
-                        terms.push((2 * slot[i] as usize + c, g.dot(*axis)));
-                    }
-                }
-            }
-            system.add(&terms, residual, weight);
-        };
-        for i in 0..n {
-            let Some(j) = self.along(i, 1) else { continue };
-            let d = self.at[j] - self.at[i];
-            let near = slot[i] != NONE || slot[j] != NONE;
-            let weight = self.link_weight(i, j, params) / 2.0;
-            if near && weight > 0.0 {
-                for axis in DVec3::AXES {
-                    add(&[(i, -axis), (j, axis)], d.dot(axis), weight, &mut system);
-                }
-            }
-            let Some(h) = self.along(i, -1) else { continue };
-            if !near && slot[h] == NONE {
-                continue;
-            }
-            let before = self.at[i] - self.at[h];
-            let (u, w) = (d.normalize_or_zero(), before.normalize_or_zero());
-            if params.arc_length > 0.0 {
-                let residual = d.length() - before.length();
-                add(&[(h, w), (i, -u - w), (j, u)], residual, params.arc_length / 2.0, &mut system);
-            }
-            let stiff = 2.0 * params.curvature * self.factors[i][1];
-            if stiff > 0.0 {
-                let c = (d - before) / 2.0;
-                for axis in bases[i] {
-                    add(&[(h, axis / 2.0), (i, -axis), (j, axis / 2.0)], c.dot(axis), stiff, &mut system);
-                }
-            }
-        }
+        let Some(mut system) = self.system() else { return (0.0, false) };
+        self.add_forces(params, &mut system);
         let pulled = self.field.is_some() && params.attraction > 0.0;
         if pulled {
-            for i in (0..n).filter(|&i| slot[i] != NONE) {
-                if let Some((normal, step)) = self.ridge_step(i, params) {
-                    add(&[(i, normal)], -step, params.attraction, &mut system);
+            for i in 0..self.points.len() {
+                if system.slot[i] != NONE
+                    && let Some((normal, step)) = self.ridge_step(i, params)
+                {
+                    system.add(&[(i, normal)], -step, params.attraction);
                 }
             }
         }
@@ -540,16 +476,10 @@ impl<'m> Snake<'m> {
         let (points, at) = (self.points.clone(), self.at.clone());
         let mut damping = self.damping;
         while damping <= GREATEST_DAMPING {
-            let Some(x) = system.solve(damping) else {
+            let Some(mut moves) = system.solve(damping) else {
                 damping *= DAMPING_STEP;
                 continue;
             };
-            let mut moves: Vec<DVec3> = (0..n)
-                .map(|i| match slot[i] {
-                    NONE => DVec3::ZERO,
-                    s => bases[i][0] * x[2 * s as usize] + bases[i][1] * x[2 * s as usize + 1],
-                })
-                .collect();
             let reach = moves.iter().map(|m| m.length()).fold(0.0, f64::max);
             if reach > longest {
                 moves.iter_mut().for_each(|m| *m *= longest / reach);
@@ -573,6 +503,67 @@ impl<'m> Snake<'m> {
             damping *= DAMPING_STEP;
         }
         (0.0, false)
+    }
+
+    /// The system of the points that move, still without a term; none if no point does.
+    fn system(&mut self) -> Option<System> {
+        let n = self.points.len();
+        let mut slot = vec![NONE; n];
+        let mut count = 0u32;
+        // A free closed curve is folded flat, so that its ends lie beside each other in the system.
+        let whole = self.closed && (0..n).all(|i| self.moves(i));
+        let start = if whole { 0 } else { (0..n).find(|&i| !self.moves(i)).unwrap_or(0) };
+        for k in 0..n {
+            let i = match whole {
+                true if k % 2 == 0 => k / 2,
+                true => n - 1 - k / 2,
+                false => (start + k) % n,
+            };
+            if self.moves(i) {
+                slot[i] = count;
+                count += 1;
+            }
+        }
+        let basis = |i: usize| match self.normal(i) {
+            DVec3::ZERO => [DVec3::X, DVec3::Y],
+            normal => <[DVec3; 2]>::from(normal.any_orthonormal_pair()),
+        };
+        let bases = (0..n).map(basis).collect();
+        let band = 2 * if whole { 5 } else { 2 } + 1;
+        let (matrix, rhs) = (Banded::zero(2 * count as usize, band), vec![0.0; 2 * count as usize]);
+        (count > 0).then_some(System { slot, bases, matrix, rhs, terms: Vec::with_capacity(6) })
+    }
+
+    /// Adds the fine forces: fairness, even spacing and stiffness.
+    fn add_forces(&self, params: &SnakeParams, system: &mut System) {
+        for i in 0..self.points.len() {
+            let Some(j) = self.along(i, 1) else { continue };
+            let d = self.at[j] - self.at[i];
+            let near = system.slot[i] != NONE || system.slot[j] != NONE;
+            let weight = self.link_weight(i, j, params) / 2.0;
+            if near && weight > 0.0 {
+                for axis in DVec3::AXES {
+                    system.add(&[(i, -axis), (j, axis)], d.dot(axis), weight);
+                }
+            }
+            let Some(h) = self.along(i, -1) else { continue };
+            if !near && system.slot[h] == NONE {
+                continue;
+            }
+            let before = self.at[i] - self.at[h];
+            let (u, w) = (d.normalize_or_zero(), before.normalize_or_zero());
+            if params.arc_length > 0.0 {
+                let residual = d.length() - before.length();
+                system.add(&[(h, w), (i, -u - w), (j, u)], residual, params.arc_length / 2.0);
+            }
+            let stiff = 2.0 * params.curvature * self.factors[i][1];
+            if stiff > 0.0 {
+                let c = (d - before) / 2.0;
+                for axis in system.bases[i] {
+                    system.add(&[(h, axis / 2.0), (i, -axis), (j, axis / 2.0)], c.dot(axis), stiff);
+                }
+            }
+        }
     }
 
     /// One sweep of a kind. Returns the largest move in mean spacings.
@@ -621,24 +612,36 @@ impl<'m> Snake<'m> {
     }
 }
 
-/// Normal equations of the fine solve.
+/// Normal equations of the fine solve: two moves in the tangent plane for each point that moves.
 struct System {
+    /// Number of each point among those that move, or [`NONE`].
+    slot: Vec<u32>,
+    /// Directions of the moves of each point.
+    bases: Vec<[DVec3; 2]>,
     matrix: Banded,
     rhs: Vec<f64>,
+    terms: Vec<(usize, f64)>,
 }
 
 impl System {
-    /// Adds `weight` times the square of `residual + sum of term x unknown`.
-    fn add(&mut self, terms: &[(usize, f64)], residual: f64, weight: f64) {
-        for (k, &(i, g)) in terms.iter().enumerate() {
+    /// Adds `weight` times the square of `residual + sum of part x move of its point`.
+    fn add(&mut self, parts: &[(usize, DVec3)], residual: f64, weight: f64) {
+        self.terms.clear();
+        for &(i, g) in parts.iter().filter(|part| self.slot[part.0] != NONE) {
+            for (c, axis) in self.bases[i].iter().enumerate() {
+                self.terms.push((2 * self.slot[i] as usize + c, g.dot(*axis)));
+            }
+        }
+        for (k, &(i, g)) in self.terms.iter().enumerate() {
             self.rhs[i] -= weight * g * residual;
-            for &(j, f) in &terms[..=k] {
+            for &(j, f) in &self.terms[..=k] {
                 self.matrix.add(i, j, weight * g * f);
             }
         }
     }
 
-    fn solve(&self, damping: f64) -> Option<Vec<f64>> {
+    /// The moves of all points, world units; none if the matrix with `damping` of its mean diagonal is singular.
+    fn solve(&self, damping: f64) -> Option<Vec<DVec3>> {
         let (mut matrix, mut rhs) = (self.matrix.clone(), self.rhs.clone());
         let n = matrix.len();
         let mean = (0..n).map(|i| matrix.get(i, i)).sum::<f64>() / n as f64;
@@ -649,6 +652,10 @@ impl System {
             matrix.add(i, i, damping * mean);
         }
         BandedCholesky::factor(matrix)?.solve(&mut rhs);
-        rhs.iter().all(|x| x.is_finite()).then_some(rhs)
+        let step = |(&slot, basis): (&u32, &[DVec3; 2])| match slot {
+            NONE => DVec3::ZERO,
+            s => basis[0] * rhs[2 * s as usize] + basis[1] * rhs[2 * s as usize + 1],
+        };
+        rhs.iter().all(|x| x.is_finite()).then(|| self.slot.iter().zip(&self.bases).map(step).collect())
     }
 }

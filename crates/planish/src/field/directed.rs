@@ -265,6 +265,12 @@ impl Directed {
         self.axes.iter().map(Hits::len).sum()
     }
 
+    /// Name of the first hit of each axis where hits are numbered axis after axis.
+    pub fn first_names(&self) -> [u32; 3] {
+        let [x, y, _] = [0, 1, 2].map(|a| self.axes[a].len() as u32);
+        [0, x, x + y]
+    }
+
     /// Position of hit number `n` of `axis`, which lies in `row`.
     pub fn position(&self, axis: usize, row: usize, n: usize) -> DVec3 {
         let (j, k) = (row % self.lattice.nodes(1), row / self.lattice.nodes(1));

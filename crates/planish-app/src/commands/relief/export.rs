@@ -1,6 +1,6 @@
 //! `planish relief export`: maps as images.
 
-use super::super::{Session, commit_report, write_failure};
+use super::super::{Session, commit_report, write_failure, write_text};
 use super::{displaced, folds, open, shape, wrong};
 use crate::args::relief::ReliefExport;
 use crate::failure::{Failure, Status};
@@ -19,7 +19,7 @@ use planish_io::maps::{
     usd_materials, write_maps,
 };
 use planish_io::report::{Report, count, number};
-use planish_io::{MappedMesh, UsdInput, WriteOptions};
+use planish_io::{MappedMesh, UsdInput, WriteError, WriteOptions};
 use std::path::Path;
 
 /// The base mesh beside the maps.
@@ -59,46 +59,12 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         Failure::usage("--tile", what).hint("raise it, or lower --texels")
     })?;
     let attributes = if args.attributes { attributes(&model, &shapes, &args.model)? } else { Vec::new() };
-    // What options change of a preset its program is to be told otherwise.
-    let as_wanted = |p: &&Preset| {
-        let wanted = (p.kind, p.frame, p.order, MapFile::of_word(p.file).unwrap_or_default());
-        wanted == (params.kind, params.frame, params.order, file)
-    };
-    let is_usd = args.usd || preset.is_some_and(|p| p.name == "usd");
-    let companions = [(args.base, BASE), (args.materialx, WIRING), (is_usd, SCENE)];
-    let options = MapOptions {
-        params: params.clone(),
-        file,
-        upside_down: preset.is_some_and(|p| p.upside_down),
-        max_error,
-        wiring: preset
-            .filter(as_wanted)
-            .map_or(String::new(), |p| p.wiring.split_whitespace().collect::<Vec<_>>().join(" ")),
-        relief: Some(relief_sum(&model.reliefs)),
-        units: model.units,
-        companions: companions.iter().filter(|(asked, _)| *asked).map(|(_, name)| name.to_string()).collect(),
-    };
     let folder = staged.path("");
     let failed = |e| write_failure(&args.model, &args.output, e);
+    let options = options(args, preset, file, &params, max_error, &model);
     let (sidecar, write) = session
         .step("write", || write_maps(&folder, &made, &attributes, &sheet, &model.surfaces, &options).map_err(failed))?;
-    if args.base {
-        let mesh = base(&model, &params, &sheet, args)?;
-        let options = WriteOptions { units: model.units, name: "base".into(), ..WriteOptions::default() };
-        placed::write_patches(&folder.join(BASE), mesh, model.shift, &options).map_err(failed)?;
-    }
-    if is_usd {
-        scene(&model, base(&model, &params, &sheet, args)?, &sidecar, &folder.join(SCENE), args)?;
-    }
-    if args.materialx {
-        match materialx(&sidecar) {
-            Some(text) => super::super::write_text(&folder.join(WIRING), &text)?,
-            None => {
-                let what = "cannot wire vectors in object space";
-                return Err(Failure::usage("--materialx", what).hint("add --frame tangent, or take --kind scalar"));
-            }
-        }
-    }
+    write_companions(args, &model, &sheet, &sidecar, &folder)?;
     let Measured { bytes, error, crack } = measured(&folder, &made, &model, &args.output)?;
     let triangles = model.mesh.triangles.len() as f64;
     let each =
@@ -109,17 +75,10 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
     if let Some(crack) = crack {
         report.quality.insert("relief.map_crack_max".into(), Figure::Number(crack));
     }
-    let mut others = Vec::new();
-    if let Some(e) = max_error {
-        let same = file == MapFile::Png && params.sheets == SheetKind::Atlas && params.gutter == 0;
-        let one = if same { None } else { in_one_png(&made, params.kind, e).map_err(failed)? };
-        let [half, dwa] = other_ways(&made, &sheet).map_err(failed)?;
-        let ways = [("one PNG", "png", one), ("half EXR", "half", Some(half)), ("DWA EXR", "dwa", Some(dwa))];
-        for (name, key, (bytes, error)) in ways.into_iter().filter_map(|(name, key, way)| Some((name, key, way?))) {
-            report.quality.insert(format!("relief.{key}_bytes"), Figure::Count(bytes));
-            report.quality.insert(format!("relief.{key}_error_max"), Figure::Number(error));
-            others.push((name, format!("{}, error {} {}", each(bytes), number(error), model.units)));
-        }
+    let others = max_error.map_or(Ok(Vec::new()), |e| others(&made, &sheet, &options, e)).map_err(failed)?;
+    for other in &others {
+        report.quality.insert(format!("relief.{}_bytes", other.key), Figure::Count(other.bytes));
+        report.quality.insert(format!("relief.{}_error_max", other.key), Figure::Number(other.error));
     }
     folds(&model, &mut report, &args.model)?;
     staged.commit()?;
@@ -136,8 +95,9 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         if params.kind != MapKind::Normal {
             table.row("largest", format!("{}{unit}", number(sidecar.largest)));
         }
-        for (name, value) in others {
-            table.row(format!("as {name}"), value);
+        for other in &others {
+            let value = format!("{}, error {} {}", each(other.bytes), number(other.error), model.units);
+            table.row(format!("as {}", other.name), value);
         }
         table.row("error", format!("{}{unit} at most, of what was written", number(error)));
         if !sidecar.wiring.is_empty() {
@@ -149,6 +109,88 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         table.print();
     }
     Ok(Status::Done)
+}
+
+/// How the maps are written.
+fn options(
+    args: &ReliefExport,
+    preset: Option<&Preset>,
+    file: MapFile,
+    params: &MapParams,
+    max_error: Option<f64>,
+    model: &Model,
+) -> MapOptions {
+    // What options change of a preset its program is to be told otherwise.
+    let as_wanted = |p: &&Preset| {
+        let wanted = (p.kind, p.frame, p.order, MapFile::of_word(p.file).unwrap_or_default());
+        wanted == (params.kind, params.frame, params.order, file)
+    };
+    let companions = [(args.base, BASE), (args.materialx, WIRING), (is_usd(args), SCENE)];
+    MapOptions {
+        params: params.clone(),
+        file,
+        upside_down: preset.is_some_and(|p| p.upside_down),
+        max_error,
+        wiring: preset
+            .filter(as_wanted)
+            .map_or(String::new(), |p| p.wiring.split_whitespace().collect::<Vec<_>>().join(" ")),
+        relief: Some(relief_sum(&model.reliefs)),
+        units: model.units,
+        companions: companions.iter().filter(|(asked, _)| *asked).map(|(_, name)| name.to_string()).collect(),
+    }
+}
+
+/// True if a USD scene is wanted beside the maps.
+fn is_usd(args: &ReliefExport) -> bool {
+    args.usd || args.preset.is_some_and(|p| p.name() == "usd")
+}
+
+/// Writes what goes beside the maps.
+fn write_companions(
+    args: &ReliefExport,
+    model: &Model,
+    sheet: &Sheet,
+    sidecar: &Sidecar,
+    folder: &Path,
+) -> Result<(), Failure> {
+    if args.base {
+        let mesh = base(model, &sidecar.params, sheet, args)?;
+        let options = WriteOptions { units: model.units, name: "base".into(), ..WriteOptions::default() };
+        placed::write_patches(&folder.join(BASE), mesh, model.shift, &options)
+            .map_err(|e| write_failure(&args.model, &args.output, e))?;
+    }
+    if is_usd(args) {
+        scene(model, base(model, &sidecar.params, sheet, args)?, sidecar, &folder.join(SCENE), args)?;
+    }
+    if args.materialx {
+        let text = materialx(sidecar).ok_or_else(|| {
+            let what = "cannot wire vectors in object space";
+            Failure::usage("--materialx", what).hint("add --frame tangent, or take --kind scalar")
+        })?;
+        write_text(&folder.join(WIRING), &text)?;
+    }
+    Ok(())
+}
+
+/// Another way to write the same maps.
+struct Other {
+    name: &'static str,
+    /// As the report's keys have it.
+    key: &'static str,
+    bytes: u64,
+    error: f64,
+}
+
+/// What the maps would take when written otherwise.
+fn others(made: &[PatchMap], sheet: &Sheet, options: &MapOptions, max_error: f64) -> Result<Vec<Other>, WriteError> {
+    let params = &options.params;
+    let same = options.file == MapFile::Png && params.sheets == SheetKind::Atlas && params.gutter == 0;
+    let one = if same { None } else { in_one_png(made, params.kind, max_error)? };
+    let [half, dwa] = other_ways(made, sheet)?;
+    let ways = [("one PNG", "png", one), ("half EXR", "half", Some(half)), ("DWA EXR", "dwa", Some(dwa))];
+    let known =
+        |(name, key, way): (_, _, Option<(u64, f64)>)| way.map(|(bytes, error)| Other { name, key, bytes, error });
+    Ok(ways.into_iter().filter_map(known).collect())
 }
 
 /// The preset with the given options in place.

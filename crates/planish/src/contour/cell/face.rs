@@ -58,10 +58,9 @@ pub fn face_points<'a>(
     field: &Directed,
     limits: &Thresholds,
     refine: Option<&dyn Creases>,
-    base: [u32; 3],
     cells: impl Iterator<Item = &'a Cell>,
 ) -> Part {
-    let mut part = Part::default();
+    let (mut part, base) = (Part::default(), field.first_names());
     for cell in cells {
         // The three faces at the least node; every face between two cells is one of these.
         let ambiguous = AMBIGUOUS[cell.config as usize];

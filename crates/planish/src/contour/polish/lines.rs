@@ -5,7 +5,7 @@
 use super::local::Local;
 use crate::field::Creases;
 use crate::geom::KdTree;
-use crate::mesh::FeatureKind;
+use crate::mesh::{FeatureKind, FeatureTags};
 use glam::DVec3;
 
 /// A vertex that is this near to a corner of the source is there, in cells.
@@ -21,19 +21,36 @@ const PLACES_ON_EDGE: [f64; 3] = [0.25, 0.5, 0.75];
 
 /// Where lines run: for each feature vertex those beside it on its lines.
 pub struct Lines {
+    /// What each vertex of the mesh marks.
+    pub kinds: Vec<FeatureKind>,
+    /// Length of a cell.
+    pub size: f64,
     /// All vertices of lines, ascending.
     names: Vec<u32>,
     beside: Vec<Vec<u32>>,
 }
 
 impl Lines {
-    pub fn new(edges: &[[u32; 2]]) -> Lines {
-        let mut names: Vec<u32> = edges.iter().flatten().copied().collect();
+    /// Lines of features whose edges come in any order.
+    pub fn new(tags: FeatureTags, size: f64) -> Lines {
+        let mut names: Vec<u32> = tags.edges.iter().flatten().copied().collect();
         names.sort_unstable();
         names.dedup();
-        let mut lines = Lines { beside: vec![Vec::new(); names.len()], names };
-        edges.iter().for_each(|&[a, b]| lines.join(a, b));
+        let mut lines = Lines { kinds: tags.vertices, size, beside: vec![Vec::new(); names.len()], names };
+        tags.edges.iter().for_each(|&[a, b]| lines.join(a, b));
         lines
+    }
+
+    /// The features as they are now; edges in any order.
+    pub fn into_tags(self) -> FeatureTags {
+        let edges =
+            self.vertices().flat_map(|(v, beside)| beside.iter().filter(move |w| v < **w).map(move |&w| [v, w]));
+        FeatureTags { edges: edges.collect(), vertices: self.kinds }
+    }
+
+    /// Vertices where lines end, meet or have a corner, with those beside them.
+    pub fn special(&self) -> impl Iterator<Item = (u32, &[u32])> {
+        self.vertices().filter(|(v, beside)| beside.len() != 2 || self.kinds[*v as usize] == FeatureKind::Corner)
     }
 
     /// Vertices with others beside them, ascending.
@@ -88,13 +105,12 @@ impl Lines {
 pub fn follow(
     local: &mut Local,
     lines: &mut Lines,
-    kinds: &mut [FeatureKind],
+    sharp: f64,
     creases: &dyn Creases,
     corners: &[DVec3],
     came: &[u32],
-    size: f64,
-    sharp: f64,
 ) {
+    let size = lines.size;
     let tree = KdTree::new(corners);
     let is_corner = |p: DVec3| {
         let mut found = false;
@@ -106,7 +122,7 @@ pub fn follow(
     };
     let mut nodes: Vec<u32> = lines
         .vertices()
-        .filter(|(v, beside)| beside.len() == 1 || kinds[*v as usize] == FeatureKind::Corner)
+        .filter(|(v, beside)| beside.len() == 1 || lines.kinds[*v as usize] == FeatureKind::Corner)
         .map(|(v, _)| v)
         .filter(|&v| !local.star(v).is_empty())
         .collect();
@@ -131,7 +147,7 @@ pub fn follow(
         near.dedup();
         for w in near {
             let own = lines.beside(v);
-            let joins = kinds[w as usize] != FeatureKind::None
+            let joins = lines.kinds[w as usize] != FeatureKind::None
                 && !own.contains(&w)
                 && !own.iter().any(|x| lines.beside(w).contains(x))
                 && along(local.position(v), local.position(w));
@@ -145,25 +161,19 @@ pub fn follow(
             }
         }
         if lines.beside(v).len() == 2 && !is_corner(local.position(v)) {
-            kinds[v as usize] = FeatureKind::Edge;
+            lines.kinds[v as usize] = FeatureKind::Edge;
         }
     }
 }
 
 /// Vertices for lines of the source that share the faces of cells with others: a face carries one point. Places where
 /// the mesh passes by become new vertices; returns them.
-pub fn insert_missing(
-    local: &mut Local,
-    lines: &Lines,
-    kinds: &mut Vec<FeatureKind>,
-    crowded: &[(DVec3, [DVec3; 2])],
-    size: f64,
-) -> Vec<u32> {
-    let fixed = |a: u32, b: u32| lines.beside(a).contains(&b);
+pub fn insert_missing(local: &mut Local, lines: &mut Lines, crowded: &[(DVec3, [DVec3; 2])]) -> Vec<u32> {
     let mut made = Vec::new();
     for &place in crowded {
-        if let Some(v) = local.insert(place, [MISSED * size, ALONG_SIDE * size], fixed) {
-            kinds.push(FeatureKind::Edge);
+        let fixed = |a: u32, b: u32| lines.beside(a).contains(&b);
+        if let Some(v) = local.insert(place, [MISSED * lines.size, ALONG_SIDE * lines.size], fixed) {
+            lines.kinds.push(FeatureKind::Edge);
             made.push(v);
         }
     }
@@ -171,7 +181,7 @@ pub fn insert_missing(
 }
 
 /// Joins loose ends of lines with what they end beside: over an edge that is there, or that a flip makes.
-pub fn join_ends(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], sharp: f64) {
+pub fn join_ends(local: &mut Local, lines: &mut Lines, sharp: f64) {
     let ends: Vec<u32> = lines.vertices().filter(|(_, beside)| beside.len() == 1).map(|(v, _)| v).collect();
     for v in ends {
         if lines.beside(v).len() != 1 || local.star(v).is_empty() {
@@ -181,7 +191,7 @@ pub fn join_ends(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], sh
             let beside = lines.beside(w);
             w != v
                 && !beside.contains(&v)
-                && (beside.len() == 1 || (kinds[w as usize] == FeatureKind::Corner && !beside.is_empty()))
+                && (beside.len() == 1 || (lines.kinds[w as usize] == FeatureKind::Corner && !beside.is_empty()))
         };
         let ring = local.neighbours(v);
         if let Some(&w) = ring.iter().find(|&&w| joins(w, lines) && local.is_sharp(v, w, sharp)) {

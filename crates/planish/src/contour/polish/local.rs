@@ -104,13 +104,7 @@ impl Placed {
 impl<'a> Local<'a> {
     /// Makes ready for changes of `seeds` and their neighbours.
     /// * `cells` - all cells with triangles, in the order of z, y, x
-    pub fn new(
-        mesh: &'a mut TriMesh,
-        field: &'a Directed,
-        base: [u32; 3],
-        cells: Vec<CellRange>,
-        seeds: &[u32],
-    ) -> Local<'a> {
+    pub fn new(mesh: &'a mut TriMesh, field: &'a Directed, cells: Vec<CellRange>, seeds: &[u32]) -> Local<'a> {
         let mut which = vec![NONE; mesh.points.len()];
         for &v in seeds {
             which[v as usize] = 0;
@@ -153,7 +147,7 @@ impl<'a> Local<'a> {
         Local {
             mesh,
             field,
-            base,
+            base: field.first_names(),
             size,
             cells,
             rows,

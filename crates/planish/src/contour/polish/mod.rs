@@ -22,7 +22,7 @@ use super::polish::lines::{Lines, TAKEN, follow, insert_missing, join_ends};
 use super::polish::local::{CellRange, GONE, Lean, Local};
 use crate::field::{Creases, Directed};
 use crate::geom::KdTree;
-use crate::mesh::{DEGENERATE_AREA, FeatureKind, TriMesh};
+use crate::mesh::{DEGENERATE_AREA, FeatureKind, FeatureTags, TriMesh};
 use glam::DVec3;
 use std::collections::{BTreeSet, HashMap};
 
@@ -47,68 +47,111 @@ pub struct Polished {
     pub kept: usize,
 }
 
+/// What the source knows of its sharp lines, and what counts as sharp.
+pub struct Source<'a> {
+    /// Its corners and lines, if it lists them.
+    pub creases: Option<&'a dyn Creases>,
+    /// Cosine below which two normals make a feature.
+    pub sharp: f64,
+}
+
 /// Brings the vertices of `wishes` to their places, and merges triangles without area away.
+/// * `tags` - the features; changed along with the mesh, edges in any order
 /// * `cells` - makes the list of all cells with triangles, in the order of z, y, x
-/// * `kinds`, `edges` - the features; changed along with the mesh
 pub fn polish(
     mesh: &mut TriMesh,
+    tags: &mut FeatureTags,
     field: &Directed,
-    base: [u32; 3],
-    cells: impl FnOnce() -> Vec<CellRange>,
     wishes: &[Wish],
-    creases: Option<&dyn Creases>,
-    kinds: &mut Vec<FeatureKind>,
-    edges: &mut Vec<[u32; 2]>,
-    sharp: f64,
+    cells: impl FnOnce() -> Vec<CellRange>,
+    source: &Source,
 ) -> Polished {
-    let source = creases.map(|c| c.corners()).unwrap_or_default();
     let size = field.lattice.step.max_element();
-    let tagged = (0..kinds.len()).filter(|&v| kinds[v] != FeatureKind::None).map(|v| (v as u32, mesh.points[v]));
-    let (calls, untaken) = calls(&source, size, CALL, tagged);
+    let mut lines = Lines::new(std::mem::take(tags), size);
+    let creases = source.creases;
+    let corners = creases.map(|c| c.corners()).unwrap_or_default();
+    let crowded = creases.map(|c| c.crowded()).unwrap_or_default();
+    let on_lines = (0..lines.kinds.len()).filter(|&v| lines.kinds[v] != FeatureKind::None);
+    let (calls, untaken) = calls(&corners, size, CALL, on_lines.map(|v| (v as u32, mesh.points[v])));
     let thin = thin(mesh);
     let mut seeds: Vec<u32> = wishes.iter().map(|w| w.0).collect();
     seeds.extend(calls.iter().flat_map(|c| &c.1));
     seeds.extend(thin.iter().flat_map(|&t| mesh.triangles[t as usize]));
-    let crowded = creases.map(|c| c.crowded()).unwrap_or_default();
     let places: Vec<DVec3> = untaken.iter().copied().chain(crowded.iter().map(|c| c.0)).collect();
-    if !places.is_empty() {
-        // Any vertex near by may be needed there. Corners by layers of their size: most vertices are near none.
-        let layer = |p: &DVec3| ((p.z - field.lattice.origin.z) / size).floor().max(0.0) as usize;
-        let mut layers: Vec<Vec<DVec3>> = vec![Vec::new(); places.iter().map(layer).max().unwrap_or(0) + 2];
-        for p in &places {
-            let at = layer(p);
-            layers[at.saturating_sub(1)..=at + 1].iter_mut().for_each(|layer| layer.push(*p));
-        }
-        let near = |p: &DVec3| layers.get(layer(p)).is_some_and(|l| l.iter().any(|c| c.distance(*p) < size));
-        seeds.extend((0..mesh.points.len()).filter(|&v| near(&mesh.points[v])).map(|v| v as u32));
-    }
-    let mut lines = Lines::new(edges);
-    let special = |v: u32, beside: &[u32]| beside.len() != 2 || kinds[v as usize] == FeatureKind::Corner;
-    for (v, beside) in lines.vertices().filter(|(v, beside)| special(*v, beside)) {
+    seeds.extend(beside_places(&mesh.points, field.lattice.origin.z, &places, size));
+    for (v, beside) in lines.special() {
         // A corner may call the next vertices of the lines.
         seeds.push(v);
         seeds.extend(beside.iter().flat_map(|&w| lines.beside(w)).chain(beside));
     }
     if seeds.is_empty() {
+        *tags = lines.into_tags();
         return Polished::default();
     }
-    let mut local = Local::new(mesh, field, base, cells(), &seeds);
+    let mut local = Local::new(mesh, field, cells(), &seeds);
     let mut targets: HashMap<u32, DVec3> = wishes.iter().copied().collect();
     let count = targets.len();
     let mut open: Vec<u32> = wishes.iter().map(|w| w.0).collect();
     open.sort_unstable();
     open.dedup();
 
+    answer(&mut local, &mut lines, &calls, &mut targets, &mut open);
+    make_room(&mut local, &mut lines, &targets, &mut open);
+    let asked = corners.is_empty();
+    let (corners, mut came) = match creases {
+        Some(creases) if asked => (ask_corners(&mut local, &mut lines, creases, &mut open), Vec::new()),
+        _ if asked => Default::default(),
+        _ => (corners, call_again(&mut local, &mut lines, &untaken, &mut open)),
+    };
+    approach(&mut local, &targets, &mut open);
+    let kept = open.len();
+    gather(&mut local, &mut lines, &corners);
+    if let Some(creases) = creases.filter(|_| !asked) {
+        came.extend(insert_missing(&mut local, &mut lines, &crowded));
+        follow(&mut local, &mut lines, source.sharp, creases, &corners, &came);
+    }
+    join_ends(&mut local, &mut lines, source.sharp);
+    merge_thin(&mut local, &mut lines, thin);
+
+    mesh.triangles.retain(|t| *t != GONE);
+    *tags = lines.into_tags();
+    Polished { moved: count.saturating_sub(kept), kept }
+}
+
+/// The points within a cell's size of some places: any of them may be needed there.
+/// * `bottom` - z at which the layers of cells begin
+fn beside_places(points: &[DVec3], bottom: f64, places: &[DVec3], size: f64) -> Vec<u32> {
+    if places.is_empty() {
+        return Vec::new();
+    }
+    // Places by layers of their size: most points are near none.
+    let layer = |p: &DVec3| ((p.z - bottom) / size).floor().max(0.0) as usize;
+    let mut layers: Vec<Vec<DVec3>> = vec![Vec::new(); places.iter().map(layer).max().unwrap_or(0) + 2];
+    for p in places {
+        let at = layer(p);
+        layers[at.saturating_sub(1)..=at + 1].iter_mut().for_each(|layer| layer.push(*p));
+    }
+    let near = |p: &DVec3| layers.get(layer(p)).is_some_and(|l| l.iter().any(|c| c.distance(*p) < size));
+    (0..points.len()).filter(|&v| near(&points[v])).map(|v| v as u32).collect()
+}
+
+/// The first vertex that each corner calls comes there; if none has room, the nearest is to come later.
+fn answer(
+    local: &mut Local,
+    lines: &mut Lines,
+    calls: &[(DVec3, Vec<u32>)],
+    targets: &mut HashMap<u32, DVec3>,
+    open: &mut Vec<u32>,
+) {
     let mut arrived: Vec<u32> = Vec::new();
-    for (p, vertices) in &calls {
+    for (p, vertices) in calls {
         let free = |v: u32, arrived: &[u32]| !arrived.contains(&v);
         if let Some(&v) = vertices.iter().find(|&&v| free(v, &arrived) && local.shift(&[(v, *p)], Lean::NoMore)) {
-            kinds[v as usize] = FeatureKind::Corner;
+            lines.kinds[v as usize] = FeatureKind::Corner;
             arrived.push(v);
             open.retain(|&o| o != v);
         } else if let Some(&v) = vertices.iter().find(|&&v| free(v, &arrived)) {
-            // It may come later, when others made room.
-            kinds[v as usize] = FeatureKind::Corner;
+            lines.kinds[v as usize] = FeatureKind::Corner;
             targets.insert(v, *p);
             if open.binary_search(&v).is_err() {
                 open.push(v);
@@ -116,43 +159,25 @@ pub fn polish(
             }
         }
     }
-    let mut tried = [(); 3].map(|()| Tried { names: open.clone(), at: vec![None; open.len()] });
+}
+
+/// Vertices go where they belong: together, one by one, merged along their lines, with flips; again while some come.
+fn make_room(local: &mut Local, lines: &mut Lines, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32>) {
+    let [mut single, mut merged, mut flipped] =
+        [(); 3].map(|()| Tried { names: open.clone(), at: vec![None; open.len()] });
     for _ in 0..MOVE_ROUNDS {
         let before = open.len();
-        together(&mut local, &lines, &targets, &mut open);
-        let [single, merged, flipped] = &mut tried;
-        open.retain(|&v| !single.again(&local, &lines, &targets, v) || !local.shift(&[(v, targets[&v])], Lean::NoMore));
-        merge_along(&mut local, &mut lines, kinds, &targets, &mut open, merged);
+        together(local, lines, targets, open);
+        open.retain(|&v| !single.again(local, lines, targets, v) || !local.shift(&[(v, targets[&v])], Lean::NoMore));
+        merge_along(local, lines, targets, open, &mut merged);
         open.retain(|&v| {
             let fixed = |a: u32, b: u32| lines.beside(a).contains(&b);
-            !flipped.again(&local, &lines, &targets, v) || !local.flip_and_shift(v, targets[&v], fixed)
+            !flipped.again(local, lines, targets, v) || !local.flip_and_shift(v, targets[&v], fixed)
         });
         if open.is_empty() || open.len() == before {
             break;
         }
     }
-    let (mut corners, mut came) = (source, Vec::new());
-    if corners.is_empty() {
-        if let Some(creases) = creases {
-            corners = ask_corners(&mut local, &lines, kinds, creases, &mut open, size);
-        }
-    } else {
-        came = call_again(&mut local, &lines, kinds, &untaken, &mut open, size);
-    }
-    approach(&mut local, &targets, &mut open);
-    let kept = open.len();
-    gather(&mut local, &mut lines, kinds, &corners, size);
-    if let Some(creases) = creases.filter(|c| !c.corners().is_empty()) {
-        came.extend(insert_missing(&mut local, &lines, kinds, &crowded, size));
-        follow(&mut local, &mut lines, kinds, creases, &corners, &came, size, sharp);
-    }
-    join_ends(&mut local, &mut lines, kinds, sharp);
-    merge_thin(&mut local, &mut lines, kinds, thin);
-
-    mesh.triangles.retain(|t| *t != GONE);
-    *edges =
-        lines.vertices().flat_map(|(v, beside)| beside.iter().filter(move |&&w| v < w).map(move |&w| [v, w])).collect();
-    Polished { moved: count.saturating_sub(kept), kept }
 }
 
 /// Corners of the source that no vertex is at, each with the nearest of some vertices; and also those that have none of
@@ -187,35 +212,28 @@ fn calls(
 
 /// Corners of the source that no vertex is at yet call once more: first vertices of lines, which have come nearer since,
 /// then any. Returns those that came.
-fn call_again(
-    local: &mut Local,
-    lines: &Lines,
-    kinds: &mut [FeatureKind],
-    corners: &[DVec3],
-    open: &mut Vec<u32>,
-    size: f64,
-) -> Vec<u32> {
+fn call_again(local: &mut Local, lines: &mut Lines, corners: &[DVec3], open: &mut Vec<u32>) -> Vec<u32> {
     let mut came = Vec::new();
-    let mut ask = |local: &mut Local, calls: Vec<(DVec3, Vec<u32>)>| {
+    let mut ask = |local: &mut Local, lines: &mut Lines, calls: Vec<(DVec3, Vec<u32>)>| {
         for (p, vertices) in calls {
             let fixed = |a: u32, b: u32| lines.beside(a).contains(&b);
             let first = vertices
                 .into_iter()
                 .find(|&v| local.shift(&[(v, p)], Lean::NoMore) || local.flip_and_shift(v, p, fixed));
             if let Some(v) = first {
-                kinds[v as usize] = FeatureKind::Corner;
+                lines.kinds[v as usize] = FeatureKind::Corner;
                 open.retain(|&o| o != v);
                 came.push(v);
             }
         }
     };
     let on_lines = lines.vertices().map(|(v, _)| (v, local.position(v)));
-    let (again, untaken) = calls(corners, size, CALL, on_lines);
-    ask(local, again);
+    let (again, untaken) = calls(corners, lines.size, CALL, on_lines);
+    ask(local, lines, again);
     if !untaken.is_empty() {
         let all = (0..local.mesh.points.len() as u32).filter(|&v| !local.star(v).is_empty());
-        let (again, _) = calls(&untaken, size, CALL_ANY, all.map(|v| (v, local.position(v))));
-        ask(local, again);
+        let (again, _) = calls(&untaken, lines.size, CALL_ANY, all.map(|v| (v, local.position(v))));
+        ask(local, lines, again);
     }
     came
 }
@@ -272,7 +290,6 @@ fn together(local: &mut Local, lines: &Lines, targets: &HashMap<u32, DVec3>, ope
 fn merge_along(
     local: &mut Local,
     lines: &mut Lines,
-    kinds: &[FeatureKind],
     targets: &HashMap<u32, DVec3>,
     open: &mut Vec<u32>,
     tried: &mut Tried,
@@ -284,7 +301,7 @@ fn merge_along(
             at += 1;
             continue;
         }
-        let is_corner = |v: u32| kinds[v as usize] == FeatureKind::Corner;
+        let is_corner = |v: u32| lines.kinds[v as usize] == FeatureKind::Corner;
         let is_open = |v: u32, open: &[u32]| open.binary_search(&v).is_ok();
         let mut done = false;
         for w in lines.beside(v).to_vec() {
@@ -362,19 +379,9 @@ fn approach(local: &mut Local, targets: &HashMap<u32, DVec3>, open: &mut Vec<u32
 
 /// Asks the source for the corners near vertices where lines end, meet or seem to have a corner, and brings the nearest
 /// vertex of a line there. Returns the corners.
-fn ask_corners(
-    local: &mut Local,
-    lines: &Lines,
-    kinds: &mut [FeatureKind],
-    creases: &dyn Creases,
-    open: &mut Vec<u32>,
-    size: f64,
-) -> Vec<DVec3> {
-    let special: Vec<u32> = lines
-        .vertices()
-        .filter(|(v, beside)| beside.len() != 2 || kinds[*v as usize] == FeatureKind::Corner)
-        .map(|(v, _)| v)
-        .collect();
+fn ask_corners(local: &mut Local, lines: &mut Lines, creases: &dyn Creases, open: &mut Vec<u32>) -> Vec<DVec3> {
+    let size = lines.size;
+    let special: Vec<u32> = lines.special().map(|(v, _)| v).collect();
     let mut corners: Vec<DVec3> = Vec::new();
     for v in special {
         let mut ring = local.neighbours(v);
@@ -399,7 +406,7 @@ fn ask_corners(
             if local.shift(&[(w, corner)], Lean::NoMore)
                 || local.flip_and_shift(w, corner, |a, b| lines.beside(a).contains(&b))
             {
-                kinds[w as usize] = FeatureKind::Corner;
+                lines.kinds[w as usize] = FeatureKind::Corner;
                 open.retain(|&o| o != w);
                 break;
             }
@@ -409,10 +416,11 @@ fn ask_corners(
 }
 
 /// Vertices that pose as corners beside a corner of the source are merged into the one that is there.
-fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corners: &[DVec3], size: f64) {
+fn gather(local: &mut Local, lines: &mut Lines, corners: &[DVec3]) {
     if corners.is_empty() {
         return;
     }
+    let size = lines.size;
     let tree = KdTree::new(corners);
     // Distance of the nearest corner within reach.
     let off = |p: DVec3| {
@@ -420,16 +428,16 @@ fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corne
         tree.within(p, (CALL + TAKEN) * size, |_, c, _| least = least.min(c.distance(p)));
         least
     };
-    let mut vertices: Vec<u32> = Vec::new();
-    for (v, _) in lines.vertices() {
+    let mut posing: Vec<u32> = Vec::new();
+    for v in lines.vertices().map(|(v, _)| v).collect::<Vec<_>>() {
         let off = off(local.position(v));
         if off < TAKEN * size {
-            kinds[v as usize] = FeatureKind::Corner;
-        } else if off.is_finite() && kinds[v as usize] == FeatureKind::Corner {
-            vertices.push(v);
+            lines.kinds[v as usize] = FeatureKind::Corner;
+        } else if off.is_finite() && lines.kinds[v as usize] == FeatureKind::Corner {
+            posing.push(v);
         }
     }
-    for v in vertices {
+    for v in posing {
         let p = local.position(v);
         // The vertex at the nearest corner, if there is one within reach of a flip.
         let mut ring = local.neighbours(v);
@@ -444,7 +452,7 @@ fn gather(local: &mut Local, lines: &mut Lines, kinds: &mut [FeatureKind], corne
         );
         ring.sort_unstable();
         ring.dedup();
-        let taken = |w: u32| kinds[w as usize] == FeatureKind::Corner && off(local.position(w)) < TAKEN * size;
+        let taken = |w: u32| lines.kinds[w as usize] == FeatureKind::Corner && off(local.position(w)) < TAKEN * size;
         let goal = ring
             .into_iter()
             .filter(|&w| w != v && taken(w) && local.position(w).distance(p) < CALL * size)
@@ -481,7 +489,7 @@ fn thin(mesh: &TriMesh) -> Vec<u32> {
 }
 
 /// Merges the ends of the shortest edge of each triangle without area.
-fn merge_thin(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], thin: Vec<u32>) {
+fn merge_thin(local: &mut Local, lines: &mut Lines, thin: Vec<u32>) {
     for t in thin {
         let names = local.mesh.triangles[t as usize];
         if names == GONE {
@@ -494,7 +502,7 @@ fn merge_thin(local: &mut Local, lines: &mut Lines, kinds: &[FeatureKind], thin:
             .collect();
         sides.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (_, v, w) in sides {
-            let free = match kinds[v as usize] {
+            let free = match lines.kinds[v as usize] {
                 FeatureKind::None => true,
                 FeatureKind::Edge => lines.beside(v).contains(&w),
                 FeatureKind::Corner => false,
