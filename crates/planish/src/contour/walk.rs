@@ -113,15 +113,15 @@ fn row_of_cells(
                 }
             }
             cell.hit[..4].copy_from_slice(&next[..4]);
-            for l in 0..4 {
-                next[l] += crossed >> l & 1;
+            for (e, next) in next[..4].iter_mut().enumerate() {
+                *next += crossed >> e & 1;
             }
             // Edges 4 and 5, 6 and 7, 8 and 9, 10 and 11 lie in one list: at this node and at the next.
-            for l in 4..8 {
-                let e = 2 * l - 4;
-                cell.hit[e] = next[l];
-                next[l] += crossed >> e & 1;
-                cell.hit[e + 1] = next[l];
+            for (pair, next) in next[4..].iter_mut().enumerate() {
+                let e = 4 + 2 * pair;
+                cell.hit[e] = *next;
+                *next += crossed >> e & 1;
+                cell.hit[e + 1] = *next;
             }
             visit(&cell);
         }

@@ -14,10 +14,7 @@ pub(crate) fn solve<const N: usize>(a: &mut [[f64; N]; N], b: &mut [f64; N]) -> 
 pub(crate) fn factor<const N: usize>(a: &mut [[f64; N]; N]) -> bool {
     for i in 0..N {
         for j in 0..=i {
-            let mut sum = a[i][j];
-            for k in 0..j {
-                sum -= a[i][k] * a[j][k];
-            }
+            let sum = a[i][..j].iter().zip(&a[j][..j]).fold(a[i][j], |sum, (x, y)| sum - x * y);
             if i == j {
                 if !(sum > 0.0) {
                     return false;
@@ -50,15 +47,11 @@ pub(crate) fn substitute<const N: usize>(l: &[[f64; N]; N], b: &mut [f64; N]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::array::from_fn;
 
     #[test]
     fn cholesky_solves_a_4_by_4_system_within_1e_13_and_refuses_an_indefinite_one() {
-        let mut a = [[0.0; 4]; 4];
-        for i in 0..4 {
-            for j in 0..4 {
-                a[i][j] = 1.0 / (i + j + 1) as f64;
-            }
-        }
+        let mut a: [[f64; 4]; 4] = from_fn(|i| from_fn(|j| 1.0 / (i + j + 1) as f64));
         let x = [1.0, -2.0, 3.0, 0.5];
         let mut b = [0, 1, 2, 3].map(|i| (0..4).map(|j| a[i][j] * x[j]).sum());
         assert!(solve(&mut a, &mut b));

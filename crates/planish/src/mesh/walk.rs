@@ -219,9 +219,9 @@ fn on_vertex(mesh: &TriMesh, adjacency: &Adjacency, at: FacePoint, rest: DVec3) 
 fn advance(from: FacePoint, rates: [f64; 3]) -> (FacePoint, f64) {
     let mut share = 1.0;
     let mut hit = None;
-    for k in 0..3 {
-        if rates[k] < 0.0 && from.bary[k] + rates[k] < 0.0 {
-            let s = -from.bary[k] / rates[k];
+    for (k, (weight, rate)) in from.bary.into_iter().zip(rates).enumerate() {
+        if rate < 0.0 && weight + rate < 0.0 {
+            let s = -weight / rate;
             if s < share {
                 (share, hit) = (s, Some(k));
             }

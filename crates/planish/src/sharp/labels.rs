@@ -157,8 +157,7 @@ impl Energy<'_> {
             Some((self.off(f as u32, sheet), self.points[f]))
         };
         let offs: Vec<([f64; 2], f64)> = (0..labels.of.len()).into_par_iter().filter_map(of).collect();
-        let least = [LEAST_OFF_CELLS * self.cell, LEAST_TURN];
-        for k in 0..2 {
+        for (k, least) in [LEAST_OFF_CELLS * self.cell, LEAST_TURN].into_iter().enumerate() {
             let mut sorted: Vec<(f64, f64)> = offs.iter().map(|o| (o.0[k], o.1)).collect();
             sorted.par_sort_by(|a, b| a.0.total_cmp(&b.0));
             let half = sorted.iter().map(|s| s.1).sum::<f64>() / 2.0;
@@ -167,7 +166,7 @@ impl Energy<'_> {
                 sum += s.1;
                 sum >= half
             });
-            self.usual[k] = least[k].max(1.4826 * middle.map_or(0.0, |m| m.0));
+            self.usual[k] = least.max(1.4826 * middle.map_or(0.0, |m| m.0));
         }
     }
 

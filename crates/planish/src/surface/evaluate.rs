@@ -86,8 +86,8 @@ impl Surface {
         let (i, bu) = basis_at(&self.knots_u, u);
         let (j, bv) = basis_at(&self.knots_v, v);
         let mut jet = Jet::default();
-        for b in 0..4 {
-            let row = &self.control[(j + b) * self.cols + i..][..4];
+        for (b, row) in self.control[j * self.cols..].chunks(self.cols).take(4).enumerate() {
+            let row = &row[i..][..4];
             let sum = |w: &[f64; 4]| row[0] * w[0] + row[1] * w[1] + row[2] * w[2] + row[3] * w[3];
             let (p, d, dd) = (sum(&bu[0]), sum(&bu[1]), sum(&bu[2]));
             jet.point += p * bv[0][b];

@@ -127,9 +127,9 @@ impl Direction {
     pub fn fit_curve(&self, nodes: impl Iterator<Item = DVec3>, net: &mut [DVec3], inset: usize) {
         let n = net.len();
         let mut rhs = self.project(nodes);
-        for i in inset..n - inset {
+        for (i, sum) in (inset..).zip(&mut rhs[inset..n - inset]) {
             for j in self.gram.columns(i).filter(|&j| j < inset || j >= n - inset) {
-                rhs[i] -= net[j] * self.gram.get(i, j);
+                *sum -= net[j] * self.gram.get(i, j);
             }
         }
         self.factors[inset].solve(&mut rhs[inset..n - inset]);
@@ -261,8 +261,8 @@ fn sum_block(
         }
         r += 4;
     }
-    for r in r..weights.len() {
-        let (a, p) = (weights[r], &row(r)[..n]);
+    for (r, a) in weights.iter().enumerate().skip(r) {
+        let p = &row(r)[..n];
         for i in 0..n {
             s0[i] += p[i] * a[0];
             s1[i] += p[i] * a[1];

@@ -56,17 +56,15 @@ pub fn cut(input: &TriMesh, faces: &[u32], corners: [u32; 4]) -> PatchMesh {
     let mut local = vec![NONE; input.points.len()];
     let (mut points, mut origin, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
     for &f in faces {
-        let mut triangle = [0; 3];
-        for k in 0..3 {
+        triangles.push(std::array::from_fn(|k| {
             let v = input.triangles[f as usize][k] as usize;
             if local[v] == NONE {
                 local[v] = points.len() as u32;
                 points.push(input.points[v]);
                 origin.push(FacePoint::corner(f, k));
             }
-            triangle[k] = local[v];
-        }
-        triangles.push(triangle);
+            local[v]
+        }));
     }
     let mesh = TriMesh::new(points, triangles);
     let adjacency = Adjacency::new(&mesh);

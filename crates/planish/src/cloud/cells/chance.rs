@@ -88,8 +88,7 @@ impl<'a> Chances<'a> {
     pub fn shares(&self) -> Vec<Vec<f64>> {
         let count = self.rows[0].len();
         let mut shares = vec![vec![0.0; count]; self.rows.len()];
-        for q in 0..count {
-            let (found, n) = self.of(q);
+        for (q, (found, n)) in (0..count).map(|q| self.of(q)).enumerate() {
             match found[..n] {
                 [] => {}
                 [one] => shares[one.sheet][q] = 1.0,

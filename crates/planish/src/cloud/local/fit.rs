@@ -44,9 +44,9 @@ pub(crate) fn general(m: &Moments, guides: &[Guide], start: &[f64; 10]) -> Optio
     guides::add(guides, &mut matrix);
     let n = m.gradient_matrix();
     let trace: f64 = (0..10).map(|i| matrix[i][i]).sum();
-    for i in 0..10 {
+    for (i, row) in matrix.iter_mut().enumerate() {
         // On exact data the matrix is singular at the answer; the shift keeps the factor and moves nothing else.
-        matrix[i][i] += 1e-14 * trace;
+        row[i] += 1e-14 * trace;
     }
     if !small_cholesky::factor(&mut matrix) {
         return None;

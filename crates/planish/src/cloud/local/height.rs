@@ -127,7 +127,7 @@ pub(crate) fn framed_height(matrix: &[[f64; 10]; 10], start: Frame) -> Option<He
 
 /// A relative ridge at the level of rounding: collinear points leave directions without data.
 fn ridge<const N: usize>(g: &mut [[f64; N]; N]) {
-    for i in 0..N {
-        g[i][i] += 1e-13 * g[i][i] + 1e-300;
+    for (i, row) in g.iter_mut().enumerate() {
+        row[i] += 1e-13 * row[i] + 1e-300;
     }
 }

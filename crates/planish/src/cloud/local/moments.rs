@@ -115,10 +115,7 @@ impl Moments {
     /// Adds a point in local coordinates.
     #[inline]
     pub(crate) fn add(&mut self, y: DVec3, weight: f64) {
-        let m = monomials(y);
-        for k in 0..COUNT {
-            self.0[k] += weight * m[k];
-        }
+        self.0.iter_mut().zip(&monomials(y)).for_each(|(sum, m)| *sum += weight * m);
     }
 
     /// Adds the sums over other points.

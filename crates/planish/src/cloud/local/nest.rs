@@ -271,10 +271,7 @@ fn folds_of<const M: usize>(sheets: [Face; M], concave: u8) -> f64 {
         let (mut layers, mut above) = (1.0, 0);
         for k in (0..M).filter(|&k| k != own) {
             let foot = |j: usize| if j == k { 0.0 } else { at[j] - at[k] * turn[j][k] };
-            let mut f = foot(0);
-            for j in 1..M {
-                f = if least[j] { f.min(foot(j)) } else { f.max(foot(j)) };
-            }
+            let f = (1..M).fold(foot(0), |f, j| if least[j] { f.min(foot(j)) } else { f.max(foot(j)) });
             if f.abs() < ON_SURFACE_NOISE {
                 layers += turn[k][own].abs();
                 above |= 1 << k;

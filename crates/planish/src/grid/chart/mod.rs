@@ -221,10 +221,10 @@ fn place_in_face(input: &TriMesh, place: FacePoint, face: u32, position: DVec3) 
     let (from, to) = (input.triangles[place.face as usize], input.triangles[face as usize]);
     let mut bary = [0.0; 3];
     let mut shared = true;
-    for k in 0..3 {
-        if place.bary[k] != 0.0 {
-            match to.iter().position(|&v| v == from[k]) {
-                Some(j) => bary[j] = place.bary[k],
+    for (v, weight) in from.into_iter().zip(place.bary) {
+        if weight != 0.0 {
+            match to.iter().position(|&w| w == v) {
+                Some(j) => bary[j] = weight,
                 None => shared = false,
             }
         }

@@ -110,8 +110,8 @@ impl Chart {
                 }
             }
             let (t, k) = hit;
-            for j in 0..3 {
-                spot.bary[j] = (spot.bary[j] + t * rates[j]).max(0.0);
+            for (weight, rate) in spot.bary.iter_mut().zip(rates) {
+                *weight = (*weight + t * rate).max(0.0);
             }
             if k == 3 {
                 let sum: f64 = spot.bary.iter().sum();

@@ -103,17 +103,17 @@ fn slid(before: &[f64], (patch, k, grid): (&PatchMesh, usize, &Grid), other: (us
     let length = polyline::length(patch.sides[k].iter().map(|&v| patch.mesh.points[v as usize]));
     let point = |n: usize| grid.points[rim_node(k, n, grid.cols, grid.rows)];
     let mut wanted = before.to_vec();
-    for n in 1..SUB_PATCH_CELLS {
-        if !(length > 0.0) {
-            break;
-        }
+    if !(length > 0.0) {
+        return balanced(&wanted);
+    }
+    for (n, wanted) in (1..).zip(&mut wanted[1..SUB_PATCH_CELLS]) {
         let (a, p) = (inward(grid, k, n), point(n));
         let b = inward(other.1, other.0, SUB_PATCH_CELLS - n);
         let (near, far) = (a.distance(p), b.distance(p));
         if near + far > 0.0 {
             let between = a.lerp(b, near / (near + far));
             let along = (point(n + 1) - point(n - 1)).normalize_or_zero();
-            wanted[n] += (between - p).dot(along) / length;
+            *wanted += (between - p).dot(along) / length;
         }
     }
     balanced(&wanted)

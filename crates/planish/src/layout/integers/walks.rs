@@ -103,9 +103,9 @@ impl Whole {
             }
             let mut upright = true;
             let before = scales.clone();
-            for t in 0..whole.flat.len() {
+            for (t, &piece) in pieces.iter().enumerate() {
                 if whole.twice_area(t) <= 0 {
-                    let piece = pieces[t] as usize;
+                    let piece = piece as usize;
                     (scales[piece], upright) = (before[piece] * SCALE_STEP, false);
                 }
             }

@@ -36,7 +36,6 @@ impl Charts {
     /// The charts of `field`.
     /// * `roomy` - whether cones beside lines are moved off
     pub fn new(mesh: &TriMesh, adjacency: &Adjacency, lines: &[bool], field: &CrossField, roomy: bool) -> Charts {
-        let faces = mesh.triangles.len();
         let mut matching = Matching::new(adjacency, field);
         let mut index = matching.indices(mesh, adjacency);
         let mut theta = field.theta.clone();
@@ -55,10 +54,9 @@ impl Charts {
         let sectors =
             sectors(mesh, adjacency, lines).into_iter().map(|s| (width(&s), s)).map(|(w, s)| (s, w)).collect();
         let (turned, tree) = comb(adjacency, &jump);
-        for h in 0..3 * faces {
-            if adjacency.opposite[h] != NONE {
-                let (f, g) = (h / 3, adjacency.opposite[h] as usize / 3);
-                jump[h] = (jump[h] + turned[f] + 4 - turned[g]) % 4;
+        for (h, (jump, &o)) in jump.iter_mut().zip(&adjacency.opposite).enumerate() {
+            if o != NONE {
+                *jump = (*jump + turned[h / 3] + 4 - turned[o as usize / 3]) % 4;
             }
         }
         let axis = theta.iter().zip(&turned).map(|(theta, &m)| theta + f64::from(m) * FRAC_PI_2).collect();

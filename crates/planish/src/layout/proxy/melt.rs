@@ -388,8 +388,7 @@ impl<'a> Melt<'a> {
             _ if i == n - 1 => rim[n - 1],
             _ => star.line == Some(i),
         };
-        for i in 1..n - 1 {
-            let f = star.faces[i];
+        for (i, &f) in (1..).zip(star.fan()) {
             self.triangles[f as usize] = [apex, star.ring[i], star.ring[i + 1]];
             self.tagged[3 * f as usize..3 * f as usize + 3].copy_from_slice(&[spoke(i), rim[i], spoke(i + 1)]);
         }

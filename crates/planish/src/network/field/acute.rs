@@ -158,10 +158,8 @@ fn spread(
     (0..count).for_each(|v| defect[v] = if free(v) { defect[v] + TAU } else { 0.0 });
     // One step of diffusion of the density: (area + time * Laplacian) density = defect; the defects keep their sum.
     let time = radius * radius / 4.0;
-    let mut entries: Vec<(usize, usize, f64)> = Vec::new();
-    for v in 0..count {
-        entries.push((v, v, area[v].max(f64::MIN_POSITIVE)));
-    }
+    let mut entries: Vec<(usize, usize, f64)> =
+        area.iter().enumerate().map(|(v, area)| (v, v, area.max(f64::MIN_POSITIVE))).collect();
     for h in 0..3 * mesh.triangles.len() as u32 {
         let o = adjacency.opposite[h as usize];
         let (a, b) = (mesh.origin(h) as usize, mesh.origin(next(h)) as usize);

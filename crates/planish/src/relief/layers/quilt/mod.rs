@@ -185,7 +185,7 @@ fn begun(plan: &Plan, canvases: &[Option<Canvas>], p: usize) -> Canvas {
     let mut weights = vec![0.0; canvas.values.len()];
     for joint in plan.joints[p].iter().filter(|j| j.patch != p) {
         let Some(other) = &canvases[joint.patch] else { continue };
-        for k in 0..canvas.values.len() {
+        for (k, sum) in weights.iter_mut().enumerate() {
             let margin = plan.overlap as f64;
             let at = [(k % canvas.width) as f64 - margin, (k / canvas.width) as f64 - margin];
             let Some((there, depth)) = joint.beyond(here, &plan.charts[joint.patch], at) else { continue };
@@ -199,8 +199,8 @@ fn begun(plan: &Plan, canvases: &[Option<Canvas>], p: usize) -> Canvas {
                 canvas.known[k] = Pixel::Fixed;
             } else {
                 let weight = ((margin - depth) / depth).powi(2);
-                weights[k] += weight;
-                canvas.values[k] = canvas.values[k].lerp(d, weight / weights[k]);
+                *sum += weight;
+                canvas.values[k] = canvas.values[k].lerp(d, weight / *sum);
                 canvas.known[k] = Pixel::Filled;
             }
         }
