@@ -28,8 +28,8 @@ pub fn body(points: &[DVec3]) -> Option<Vec<u32>> {
     };
     let (middle, reach) = reach(finite().count() as u64, &pass).ok()??;
     // What is no number stays: the cleaning counts it.
-    let is_in = |i: &u32| !(points[*i as usize].distance(middle) > reach);
-    Some((0..points.len() as u32).filter(is_in).collect())
+    let is_far = |i: u32| points[i as usize].distance(middle) > reach;
+    Some((0..points.len() as u32).filter(|&i| !is_far(i)).collect())
 }
 
 /// Finite points, passed by as often as wanted.

@@ -211,7 +211,7 @@ fn check_place(point: &FacePoint, mesh: &TriMesh, name: impl Fn() -> String) -> 
         return Err(part(what, name(), "use the network with the mesh that it was made for"));
     }
     let sum: f64 = point.bary.iter().sum();
-    if point.bary.iter().any(|b| !(*b >= 0.0)) || (sum - 1.0).abs() > BARY_SLACK {
+    if !point.bary.iter().all(|b| *b >= 0.0) || (sum - 1.0).abs() > BARY_SLACK {
         let what = format!("barycentric coordinates {:?} are not three weights that sum to 1", point.bary);
         return Err(part(what, name(), "give weights from 0 to 1 that sum to 1"));
     }

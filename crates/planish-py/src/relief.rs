@@ -4,6 +4,7 @@ use crate::error::{class, hinted, told};
 use crate::surface::PyRelief;
 use crate::{array, json, watch};
 use planish::DVec3;
+use planish::geom::is_positive;
 use planish::model::{HistoryEntry, Model};
 use planish::observe::Observer;
 use planish::relief::layers::{self, Ground, Layer, Layers, Place, PlacePair, ReliefEdit};
@@ -52,7 +53,7 @@ pub fn transferred(
     let pairs = points.map(|given| pairs_of(given)).transpose()?;
     let share = if pairs.is_some() { REACH_OF_POINTS } else { REACH };
     let reach = reach.unwrap_or(share * model.mesh.bounds().diagonal());
-    if !(reach > 0.0) {
+    if !is_positive(reach) {
         return Err(PyValueError::new_err(format!("reach={reach}: a length above 0 is needed")));
     }
     let (maps, missed) = watch::run(py, "transfer", progress, |o| -> Result<_, ReliefError> {

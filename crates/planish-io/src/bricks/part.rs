@@ -7,7 +7,7 @@ use crate::rank::ranked;
 use glam::DVec3;
 use planish::cloud::Cloud;
 use planish::cloud::bricks::{Brick, Partition};
-use planish::geom::Aabb;
+use planish::geom::{Aabb, is_positive};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
@@ -179,7 +179,7 @@ fn sift(part: &Part, mut take: impl FnMut(&Record) -> io::Result<()>) -> io::Res
 fn divide(part: Part, folder: &Path, aabb: Aabb, most: (usize, u64), bricks: &mut Vec<Brick>) -> io::Result<()> {
     let size = part.bounds.size();
     let axis = (0..3).fold(0, |best, a| if size[a] > size[best] { a } else { best });
-    if part.count <= most.1.max(most.0 as u64) || !(size[axis] > 0.0) {
+    if part.count <= most.1.max(most.0 as u64) || !is_positive(size[axis]) {
         return write(part, folder, aabb, most.0, bricks);
     }
     let cut = cut(&part, axis)?;

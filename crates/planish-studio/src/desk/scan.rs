@@ -10,6 +10,7 @@ use crate::web::hub::Client;
 use planish::DVec3;
 use planish::cloud::{self, CleanParams, Cloud, ProjectParams};
 use planish::field::Spacing;
+use planish::geom::is_positive;
 use planish::mend;
 use planish::mesh::{Adjacency, FeatureTags, TriMesh, boundary_loops, next};
 use planish::observe::Observer;
@@ -158,7 +159,7 @@ impl Lasso {
     fn holds(&self, p: [f64; 3]) -> bool {
         let row = |r: usize| (0..3).map(|k| self.view[4 * k + r] * p[k]).sum::<f64>() + self.view[12 + r];
         let w = row(3);
-        if !(w > 0.0) {
+        if !is_positive(w) {
             return false;
         }
         let (x, y) = (row(0) / w, row(1) / w);

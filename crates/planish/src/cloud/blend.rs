@@ -11,7 +11,7 @@
 //! weighed anew (`docs/methods/samples.md`).
 
 use super::Cell;
-use crate::geom::Aabb;
+use crate::geom::{Aabb, is_positive};
 use glam::DVec3;
 
 /// Normals of cells that differ by less than this cosine are one side of an edge.
@@ -255,7 +255,7 @@ impl Heard {
     }
 
     fn blended(&self) -> Option<Blended> {
-        if !(self.weight > 0.0) {
+        if !is_positive(self.weight) {
             return None;
         }
         let n = self.count;

@@ -5,7 +5,7 @@
 
 use super::sites::cover;
 use super::{Blend, Cloud, CloudError, Samples};
-use crate::geom::KdTree;
+use crate::geom::{KdTree, is_positive};
 use crate::mesh::Attribute;
 use crate::observe::Observer;
 use glam::DVec3;
@@ -217,7 +217,7 @@ fn meet(a: super::Quadric, b: super::Quadric, p: DVec3) -> Option<DVec3> {
         // The least step that satisfies both to first order.
         let c = n.dot(m);
         let det = 1.0 - c * c;
-        if !(det > 1e-6) {
+        if det.is_nan() || det <= 1e-6 {
             return None;
         }
         let (s, t) = ((d - c * e) / det, (e - c * d) / det);
@@ -229,7 +229,7 @@ fn meet(a: super::Quadric, b: super::Quadric, p: DVec3) -> Option<DVec3> {
 /// Joins thinned feature points: every point to the nearest one on each of two sides.
 fn feature_lines(placed: &[Placed], gap: f64) -> Vec<Vec<DVec3>> {
     let all: Vec<DVec3> = placed.iter().filter_map(|p| p.edge).collect();
-    if all.len() < 2 || !(gap > 0.0) {
+    if all.len() < 2 || !is_positive(gap) {
         return Vec::new();
     }
     let tree = KdTree::new(&all);

@@ -37,7 +37,7 @@ impl LandmarkMap {
         }
         let center = from.iter().sum::<DVec3>() / count as f64;
         let scale = from.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
-        if !(scale > 0.0) || !scale.is_finite() {
+        if !(scale > 0.0 && scale.is_finite()) {
             return Err(wrong("they coincide"));
         }
         let from: Vec<DVec3> = from.iter().map(|p| (*p - center) / scale).collect();

@@ -4,6 +4,7 @@
 //! of the vertex normals along its edges gives a shape operator (least squares); those around a vertex are turned
 //! into its tangent plane and blended by area.
 
+use crate::geom::is_positive;
 use crate::mesh::{Adjacency, TriMesh};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -49,7 +50,7 @@ pub fn vertex_curvature(mesh: &TriMesh, adjacency: &Adjacency) -> Vec<VertexCurv
                 }
                 area += w;
             }
-            if !(area > 0.0) {
+            if !is_positive(area) {
                 return VertexCurvature::default();
             }
             let [e, f, g] = sum.map(|s| s / area);
@@ -95,7 +96,7 @@ fn of_triangle(mesh: &TriMesh, t: usize, normals: &[DVec3]) -> Option<[f64; 3]> 
     }
     // [uu uv 0; uv uu+vv uv; 0 uv vv] [e f g] = rhs
     let det = uu * ((uu + vv) * vv - uv * uv) - uv * uv * vv;
-    if !(det.abs() > f64::MIN_POSITIVE) {
+    if det.is_nan() || det.abs() <= f64::MIN_POSITIVE {
         return None;
     }
     let [r0, r1, r2] = rhs;

@@ -3,6 +3,7 @@
 use super::work::Work;
 use super::{ApplyError, Magnetism, Scalar, Spot};
 use crate::curve::{Magnet, PaintMode, PaintParams, SnapTargets, Stroke, SurfaceCurve, snap};
+use crate::geom::is_positive;
 use crate::mesh::{FacePoint, sharp_edges};
 
 /// How a stroke of an edit is painted.
@@ -17,7 +18,7 @@ impl Work<'_, '_> {
     /// The place of a pick: on a corner, a curve or a sharp edge within the snap distance, else where it was picked.
     fn pick(&self, spot: &Spot, brush: &Brush) -> Result<FacePoint, ApplyError> {
         let place = self.place(spot)?;
-        if !(brush.snap > 0.0) || matches!(spot, Spot::Corner { .. }) {
+        if !is_positive(brush.snap) || matches!(spot, Spot::Corner { .. }) {
             return Ok(place);
         }
         let network = &self.drawing.network;

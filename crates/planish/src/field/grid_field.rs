@@ -32,7 +32,7 @@ pub fn sample_grid(grid: &ScalarGrid, params: &GridParams, observer: &dyn Observ
     if nx * ny * nz != grid.values.len() {
         return fault(format!("{nx} x {ny} x {nz} samples are {}, but {} are there", nx * ny * nz, grid.values.len()));
     }
-    if !(grid.spacing.min_element() > 0.0) || !grid.spacing.is_finite() || !grid.origin.is_finite() {
+    if !(grid.spacing.min_element() > 0.0 && grid.spacing.is_finite() && grid.origin.is_finite()) {
         return fault(format!("a spacing of {:?} is none", grid.spacing.to_array()));
     }
     let levels = Levels::new(grid, params);

@@ -78,14 +78,14 @@ impl Lattice {
     pub fn around(bounds: &Aabb, spacing: Spacing) -> Result<Lattice, LatticeError> {
         let size = bounds.size();
         let long = size.max_element();
-        if !(long > 0.0) || !long.is_finite() {
+        if !(long > 0.0 && long.is_finite()) {
             return Err(LatticeError::Empty { size: size.to_array() });
         }
         let h = match spacing {
             Spacing::Voxel(h) => h,
             Spacing::Resolution(n) => long / n.max(1) as f64,
         };
-        if !(h > 0.0) || !h.is_finite() {
+        if !(h > 0.0 && h.is_finite()) {
             return Err(LatticeError::Step { step: h });
         }
         let cells = (size / h).to_array().map(|s| (s + 2.0 * MARGIN + 1.0).ceil());

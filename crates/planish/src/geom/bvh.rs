@@ -210,10 +210,9 @@ impl Bvh {
             let base = top;
             for (k, away) in squares(node).into_iter().enumerate() {
                 // Not so for a point that is no number.
-                if !(away <= reach) {
-                    continue;
+                if away <= reach {
+                    put(&mut stack, base, &mut top, (node.link[k], node.count[k], away));
                 }
-                put(&mut stack, base, &mut top, (node.link[k], node.count[k], away));
             }
         }
         found
@@ -408,7 +407,7 @@ fn split(items: &mut [Item]) -> usize {
     let axis = (0..3).fold(0, |m, k| if extent[k] > extent[m] { k } else { m });
     let bins = BINS.min(2 * items.len());
     let scale = bins as f32 / extent[axis];
-    if !(extent[axis] > 0.0) || !scale.is_finite() {
+    if !(extent[axis] > 0.0 && scale.is_finite()) {
         return items.len() / 2;
     }
     let bin = |i: &Item| (((center(i)[axis] - low[axis]) * scale) as usize).min(bins - 1);

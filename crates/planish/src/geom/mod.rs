@@ -16,6 +16,7 @@ pub(crate) use bvh::closest_in_triangle;
 pub use bvh::{Bvh, RayHit, SurfaceHit, Triangles};
 pub use face_point::FacePoint;
 pub use kd_tree::{KdTree, nearest_distances};
+pub use tolerance::is_positive;
 
 /// "No such": an index where there is nothing.
 pub const NONE: u32 = u32::MAX;

@@ -21,6 +21,11 @@ pub fn length(diagonal: f64) -> f64 {
     RELATIVE * diagonal
 }
 
+/// True above zero. False for what is not a number, so that `!is_positive(x)` refuses that as well.
+pub fn is_positive(x: f64) -> bool {
+    x > 0.0
+}
+
 /// A size that is not negative, kept off zero so that it can divide.
 pub fn divisor(size: f64) -> f64 {
     size.max(DIVISOR)

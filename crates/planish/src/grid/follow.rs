@@ -193,7 +193,8 @@ impl Map<'_> {
             let (at, u, v) = self.at(x);
             let (d, uu, uv, vv) = (p - at, u.dot(u), u.dot(v), v.dot(v));
             let det = uu * vv - uv * uv;
-            if !(det > 1e-9 * uu * vv) {
+            let is_regular = det > 1e-9 * uu * vv;
+            if !is_regular {
                 return None;
             }
             let (du, dv) = (d.dot(u), d.dot(v));
@@ -292,9 +293,8 @@ impl<'a> Carry<'a> {
                     shift[node] += out * (self.way_out(node, p, &mut hint) / cell - last.dot(out));
                 }
                 let far = shift[node].abs() / DVec2::new((cols - 1) as f64, (rows - 1) as f64);
-                if !(far.max_element() <= FARTHEST_SIDE)
-                    || far.dot(out.abs()) > FARTHEST_OUT && shift[node].dot(out) > 0.0
-                {
+                let is_small = far.max_element() <= FARTHEST_SIDE;
+                if !is_small || far.dot(out.abs()) > FARTHEST_OUT && shift[node].dot(out) > 0.0 {
                     return None;
                 }
             }

@@ -12,7 +12,8 @@ pub fn solve_dense(a: &mut [f64], b: &mut [f64], n: usize, columns: usize) -> bo
     let scale = a.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     for k in 0..n {
         let pivot = (k..n).max_by(|&i, &j| a[i * n + k].abs().total_cmp(&a[j * n + k].abs())).unwrap_or(k);
-        if !(a[pivot * n + k].abs() > PIVOT * scale) {
+        let is_regular = a[pivot * n + k].abs() > PIVOT * scale;
+        if !is_regular {
             return false;
         }
         if pivot != k {

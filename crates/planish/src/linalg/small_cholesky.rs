@@ -16,7 +16,7 @@ pub(crate) fn factor<const N: usize>(a: &mut [[f64; N]; N]) -> bool {
         for j in 0..=i {
             let sum = a[i][..j].iter().zip(&a[j][..j]).fold(a[i][j], |sum, (x, y)| sum - x * y);
             if i == j {
-                if !(sum > 0.0) {
+                if sum.is_nan() || sum <= 0.0 {
                     return false;
                 }
                 a[i][i] = sum.sqrt();

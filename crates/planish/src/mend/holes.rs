@@ -140,7 +140,8 @@ fn lid_over(mesh: &TriMesh, adjacency: &Adjacency, around: &[u32], rim: &[u32], 
         let lid: DVec3 = flat.iter().map(|t| cross(&points, t)).sum();
         let sides: DVec3 = around.iter().map(|&h| mesh.area_vector(h as usize / 3)).sum();
         let size: f64 = around.iter().map(|&h| mesh.area_vector(h as usize / 3).length()).sum();
-        if !(lid.dot(sides) > LID_FACING * area * size) {
+        let goes_on = lid.dot(sides) > LID_FACING * area * size;
+        if !goes_on {
             return None;
         }
     }

@@ -203,8 +203,8 @@ impl Pieces {
             let [a, b, c] = tri.map(|v| mesh.points[v as usize] - center);
             let area = (b - a).cross(c - a).length() / 2.0;
             all.area += area;
-            let thin = !(area > DEGENERATE_AREA * diagonal * diagonal);
-            all.degenerate += (repeats(tri) || thin) as usize;
+            let has_area = area > DEGENERATE_AREA * diagonal * diagonal;
+            all.degenerate += (repeats(tri) || !has_area) as usize;
             if repeats(tri) {
                 all.bare += 1;
                 continue;

@@ -10,6 +10,7 @@
 
 use super::intersect::intersections_of;
 use super::{Adjacency, FeatureKind, FeatureTags, MeshError, NONE, TriMesh, check, next, previous};
+use crate::geom::is_positive;
 use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -95,7 +96,7 @@ pub fn smooth(
         return Err(MeshError::Empty.into());
     }
     for (what, value) in [("noise", params.noise.unwrap_or(0.0)), ("strength", params.strength)] {
-        if !(value >= 0.0) || !value.is_finite() {
+        if !(value >= 0.0 && value.is_finite()) {
             return Err(SmoothError::Size { what, value });
         }
     }
@@ -359,7 +360,7 @@ fn restore_volume(from: &TriMesh, to: &mut TriMesh, adjacency: &Adjacency, tags:
             .sum()
     };
     let area: f64 = (0..to.triangles.len()).map(|t| to.area(t)).sum();
-    if !(area > 0.0) {
+    if !is_positive(area) {
         return;
     }
     let shift = (volume(from) - volume(to)) / area;

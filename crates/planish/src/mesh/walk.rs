@@ -8,6 +8,7 @@
 //! the edge; triangles without area are stepped over.
 
 use super::{Adjacency, FacePoint, NONE, TriMesh, next, previous};
+use crate::geom::is_positive;
 use crate::geom::tolerance::ON_EDGE;
 use glam::DVec3;
 
@@ -62,7 +63,8 @@ fn gradients(mesh: &TriMesh, face: u32) -> Option<([DVec3; 3], DVec3)> {
     let n = (b - a).cross(c - a);
     let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
     let square = n.length_squared();
-    if !(n.length() > NO_PLANE * longest) || square == 0.0 {
+    let has_plane = n.length() > NO_PLANE * longest && square != 0.0;
+    if !has_plane {
         return None;
     }
     Some(([n.cross(c - b) / square, n.cross(a - c) / square, n.cross(b - a) / square], n / square.sqrt()))
@@ -244,7 +246,7 @@ fn advance(from: FacePoint, rates: [f64; 3]) -> (FacePoint, f64) {
 fn cleaned(place: FacePoint) -> FacePoint {
     let bary = place.bary.map(|b| if b > ON_EDGE { b } else { 0.0 });
     let sum: f64 = bary.iter().sum();
-    if !(sum > 0.0) || !sum.is_finite() {
+    if !(sum > 0.0 && sum.is_finite()) {
         return FacePoint { face: place.face, bary: [1.0 / 3.0; 3] };
     }
     FacePoint { face: place.face, bary: bary.map(|b| b / sum) }
@@ -275,7 +277,7 @@ pub fn move_point_on_curve(points: &[DVec3], closed: bool, place: CurvePlace, di
     let mut rest = distance;
     if closed {
         let total: f64 = (0..segments).map(length).sum();
-        if !(total > 0.0) {
+        if !is_positive(total) {
             return place;
         }
         rest %= total;

@@ -3,6 +3,7 @@
 //! See `docs/methods/measuring.md`; the keys are in `docs/guide/report.md`.
 
 use super::{Figure, PipelineError, Quality, Warning};
+use crate::geom::is_positive;
 use crate::grid::{self, Grid};
 use crate::layout::Method;
 use crate::mend::Repairs;
@@ -411,7 +412,7 @@ const INNER_STEP: f64 = 2e-3;
 pub fn inner_angles(model: &Model) -> BTreeMap<u32, (f64, DVec3)> {
     let step = INNER_STEP * model.mesh.bounds().diagonal();
     let mut found: BTreeMap<u32, (f64, DVec3)> = BTreeMap::new();
-    if !(step > 0.0) {
+    if !is_positive(step) {
         return found;
     }
     for place in surface::seam_angles(&model.network, &model.surfaces, step).iter().filter(|p| p.angle_deg.is_finite())
@@ -427,7 +428,7 @@ pub fn inner_angles(model: &Model) -> BTreeMap<u32, (f64, DVec3)> {
 /// The angle that 95 of 100 of the length of all smooth seams do not exceed, degrees; 0 without such seams.
 fn angle_p95(model: &Model) -> f64 {
     let step = INNER_STEP * model.mesh.bounds().diagonal();
-    if !(step > 0.0) {
+    if !is_positive(step) {
         return 0.0;
     }
     let mut places = surface::seam_angles(&model.network, &model.surfaces, step);

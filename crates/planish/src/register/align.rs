@@ -205,7 +205,7 @@ fn round_step(samples: &[DVec3], reference: &Reference, at: &Placement, size: f6
     let (mut a, mut b) = ([[0.0; 6]; 6], [0.0; 6]);
     for (p, n, d) in pairs {
         let u = d / reach;
-        if !(u.abs() < 1.0) {
+        if u.is_nan() || u.abs() >= 1.0 {
             continue;
         }
         let weight = (1.0 - u * u).powi(2);

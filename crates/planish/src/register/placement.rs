@@ -83,7 +83,8 @@ impl Placement {
         });
         let (values, v) = eigen3(h.transpose() * h);
         let (v1, v2) = (v[2], v[1]);
-        if !(values[1].max(0.0).sqrt() > ON_A_LINE * values[2].max(0.0).sqrt()) {
+        let is_spread = values[1].max(0.0).sqrt() > ON_A_LINE * values[2].max(0.0).sqrt();
+        if !is_spread {
             return Err(PlacementError::OnALine);
         }
         let u1 = (h * v1).normalize_or_zero();

@@ -89,7 +89,8 @@ impl Displaced<'_> {
         let most = diagonal(self.surfaces);
         for (patch, relief) in self.reliefs.iter().enumerate() {
             // Numbers that are none are not shorter, either.
-            let found = relief.vectors.iter().map(|d| d.length()).find(|length| !(*length <= most));
+            let is_shorter = |length: f64| length <= most;
+            let found = relief.vectors.iter().map(|d| d.length()).find(|length| !is_shorter(*length));
             if let Some(length) = found {
                 let size = if most < 1e6 { format!("{most:.3}") } else { format!("{most:.3e}") };
                 let what = format!("patch {patch} would be displaced by {length:.3e}, and the model is {size} long");

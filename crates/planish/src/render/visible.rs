@@ -26,7 +26,7 @@ pub(super) fn see(mesh: &TriMesh, frame: &Frame) -> Seen {
     let mut bands: Vec<Vec<u32>> = vec![Vec::new(); height.div_ceil(BAND)];
     for (t, tri) in mesh.triangles.iter().enumerate() {
         let corners = tri.map(|v| projected[v as usize]);
-        if corners.iter().any(|c| !(c.2 > 0.0) || !c.0.is_finite() || !c.1.is_finite()) {
+        if !corners.iter().all(|c| c.2 > 0.0 && c.0.is_finite() && c.1.is_finite()) {
             continue;
         }
         let low = corners.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
@@ -93,7 +93,7 @@ fn fill(
         }
         let begin = (from - 0.5).ceil().max(0.0);
         let end = (to - 0.5).floor().min(width as f64 - 1.0);
-        if !(begin <= end) {
+        if begin > end {
             continue;
         }
         for column in begin as usize..=end as usize {

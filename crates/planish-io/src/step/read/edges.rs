@@ -188,9 +188,9 @@ fn divided(at: &dyn Fn(f64) -> DVec3, [a, b]: [f64; 2], depth: usize, fineness: 
     let chord = s - p;
     let off = |x: DVec3| (x - p).reject_from_normalized(chord.normalize_or_zero()).length();
     let is_near = [q, m, r].into_iter().all(|x| off(x) <= fineness.distance);
-    let turn = (m - p).angle_between(s - m);
+    let is_bent = (m - p).angle_between(s - m) > fineness.turn;
     let is_short = p.distance(m) + m.distance(s) <= fineness.distance;
-    if depth >= MOST_HALVINGS || is_short || (is_near && !(turn > fineness.turn)) {
+    if depth >= MOST_HALVINGS || is_short || (is_near && !is_bent) {
         return;
     }
     let middle = (a + b) / 2.0;

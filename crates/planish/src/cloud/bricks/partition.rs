@@ -3,7 +3,7 @@
 //!
 //! The bricks follow from the points alone, so that what is made of them does not depend on the machine.
 
-use crate::geom::Aabb;
+use crate::geom::{Aabb, is_positive};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -80,7 +80,7 @@ fn divide(points: &[DVec3], order: &mut [u32], from: usize, aabb: Aabb, most: us
     let bounds = Aabb::of(order.iter().map(|&i| &points[i as usize]));
     let size = bounds.size();
     let axis = (0..3).fold(0, |best, a| if size[a] > size[best] { a } else { best });
-    if order.len() <= most || !(size[axis] > 0.0) {
+    if order.len() <= most || !is_positive(size[axis]) {
         bricks.push(Brick { aabb, bounds, range: from..from + order.len() });
         return;
     }

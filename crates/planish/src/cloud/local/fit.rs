@@ -60,7 +60,7 @@ pub(crate) fn general(m: &Moments, guides: &[Guide], start: &[f64; 10]) -> Optio
         }
         small_cholesky::substitute(&matrix, &mut b);
         let norm = b.iter().map(|x| x * x).sum::<f64>().sqrt();
-        if !(norm > 0.0) || !norm.is_finite() {
+        if !(norm > 0.0 && norm.is_finite()) {
             return None;
         }
         a = b.map(|x| x / norm);

@@ -56,7 +56,8 @@ impl Quadric {
         for _ in 0..8 {
             let (d, n) = self.distance(foot);
             normal = n;
-            if !(d.abs() < self.scale) {
+            let is_near = d.abs() < self.scale;
+            if !is_near {
                 break;
             }
             foot -= d * n;

@@ -48,7 +48,8 @@ pub(crate) fn split(height: &Height, points: &Points, r: &[f64]) -> Option<Layer
     }
     let n = r.len() as f64;
     let (squares, fourths) = r.iter().fold((0.0, 0.0), |(s, f), x| (s + x * x, f + x * x * x * x));
-    if !(fourths * n < PEAKED * squares * squares) {
+    let is_dipped = fourths * n < PEAKED * squares * squares;
+    if !is_dipped {
         return None;
     }
     let (mut low, mut high) = (0.0, 0.0);

@@ -18,7 +18,7 @@ use crate::cloud::Quadric;
 use crate::cloud::local::height::{Frame, Height, framed_height};
 use crate::cloud::local::moments::Moments;
 use crate::cloud::local::points::Points;
-use crate::geom::KdTree;
+use crate::geom::{KdTree, is_positive};
 use glam::DVec3;
 
 /// A ball of so many points leaves a tenth of the noise; if it is this many noise levels wide it grows no further.
@@ -110,7 +110,7 @@ pub(crate) struct Prior {
 pub(crate) fn survey(tree: &KdTree, p: DVec3, reach: f64, prior: Prior, scratch: &mut Scratch) -> Option<Survey> {
     tree.nearest(p, SMALLEST, &mut scratch.near);
     let mut r0 = scratch.near.last()?.0.sqrt();
-    if !(r0 > 0.0) || scratch.near.len() < SMALLEST {
+    if !is_positive(r0) || scratch.near.len() < SMALLEST {
         return None;
     }
     let floor = KNOWN * prior.noise;
@@ -248,15 +248,8 @@ impl Ball {
         };
         let wide = (radii * own).max(NO_VOLUME * noise);
         // The first ball is as wide as the noise asks, but for rounding.
-        (!(ball * (1.0 + 1e-9) < wide)).then_some(Ball {
-            height,
-            layers,
-            noise,
-            hidden,
-            excess,
-            kurtosis,
-            count: inner.len(),
-        })
+        let is_narrow = ball * (1.0 + 1e-9) < wide;
+        (!is_narrow).then_some(Ball { height, layers, noise, hidden, excess, kurtosis, count: inner.len() })
     }
 
     /// Expected squared error where `usual` is the noise of the region.

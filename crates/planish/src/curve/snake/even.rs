@@ -10,7 +10,7 @@ use super::super::CurveError;
 use super::super::chain::{SurfaceCurve, sample};
 use super::super::strip::connect;
 use super::Snake;
-use crate::geom::polyline;
+use crate::geom::{is_positive, polyline};
 use crate::mesh::FacePoint;
 use crate::observe::Observer;
 
@@ -169,7 +169,7 @@ impl Snake<'_> {
 /// Greatest deviation of lengths from their mean, as a fraction.
 fn uneven(lengths: &[f64]) -> f64 {
     let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
-    if !(mean > 0.0) {
+    if !is_positive(mean) {
         return 0.0;
     }
     lengths.iter().map(|l| (l / mean - 1.0).abs()).fold(0.0, f64::max)

@@ -543,8 +543,9 @@ impl Range {
     }
 
     fn sine(self) -> Range {
+        let is_within_a_turn = self.high - self.low < TAU;
         // Beyond this the machine's own argument is too coarse to tell where it turns.
-        if !(self.high - self.low < TAU) || self.low.abs().max(self.high.abs()) > 1.0 / f64::EPSILON.sqrt() {
+        if !is_within_a_turn || self.low.abs().max(self.high.abs()) > 1.0 / f64::EPSILON.sqrt() {
             return if self.low.is_finite() && self.high.is_finite() { Range { low: -1.0, high: 1.0 } } else { ANY };
         }
         let (a, b) = (self.low.sin(), self.high.sin());

@@ -10,7 +10,7 @@
 //! refined alone. As sub-patches are relaxed one by one, there is no common relaxation along which weights could
 //! change.
 
-use crate::geom::polyline;
+use crate::geom::{is_positive, polyline};
 use crate::grid::side::{Stops, stop_share, turned};
 use crate::grid::{Grid, GridError, GridParams, SideStops, relax_at, rim_node};
 use crate::mesh::TriMesh;
@@ -102,10 +102,10 @@ pub(crate) fn read(
 fn slid(before: &[f64], (patch, k, grid): (&PatchMesh, usize, &Grid), other: (usize, &Grid)) -> Vec<f64> {
     let length = polyline::length(patch.sides[k].iter().map(|&v| patch.mesh.points[v as usize]));
     let point = |n: usize| grid.points[rim_node(k, n, grid.cols, grid.rows)];
-    let mut wanted = before.to_vec();
-    if !(length > 0.0) {
-        return balanced(&wanted);
+    if !is_positive(length) {
+        return balanced(before);
     }
+    let mut wanted = before.to_vec();
     for (n, wanted) in (1..).zip(&mut wanted[1..SUB_PATCH_CELLS]) {
         let (a, p) = (inward(grid, k, n), point(n));
         let b = inward(other.1, other.0, SUB_PATCH_CELLS - n);

@@ -5,6 +5,7 @@
 //! common, so a mesh can be thinned out to its cones whatever they are. Places are kept as edge vectors, which no shift of
 //! a chart touches.
 
+use crate::geom::is_positive;
 use crate::geom::predicates::orient2d;
 use crate::layout::map::{SeamlessMap, quarter_turn};
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
@@ -300,7 +301,7 @@ impl Flat {
 /// Area against the square of the longest edge; 0 if not counter-clockwise.
 pub(super) fn quality([a, b, c]: [DVec2; 3]) -> f64 {
     let twice = orient2d(a, b, c);
-    if !(twice > 0.0) {
+    if !is_positive(twice) {
         return 0.0;
     }
     0.5 * twice / (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared())

@@ -15,6 +15,7 @@ mod tests;
 mod thin;
 mod walks;
 
+use crate::geom::is_positive;
 use crate::layout::map::SeamlessMap;
 use crate::mesh::{Adjacency, NONE, TriMesh};
 use crate::observe::{Cancelled, Observer};
@@ -94,7 +95,7 @@ pub(super) fn quantize(
     observer: &dyn Observer,
 ) -> Result<IntegerMap, QuantizeError> {
     let area = |t: &[DVec2; 3]| (t[1] - t[0]).perp_dot(t[2] - t[0]) / 2.0;
-    if let Some(triangle) = map.uv.iter().position(|t| !(area(t) > 0.0)) {
+    if let Some(triangle) = map.uv.iter().position(|t| !is_positive(area(t))) {
         return Err(QuantizeError::Flipped { triangle });
     }
     let mut flat = Flat::new(mesh, adjacency, map, lines);

@@ -137,7 +137,8 @@ fn fill(places: &[DVec2], corners: &[usize], least: f64) -> Option<Vec<[usize; 3
             best[i * count + j] = found;
         }
     }
-    if !(best[count - 1].0 >= least) {
+    let is_fine = best[count - 1].0 >= least;
+    if !is_fine {
         return None;
     }
     let (mut triangles, mut stack) = (Vec::new(), vec![(0, count - 1)]);
@@ -160,7 +161,7 @@ fn make_delaunay(flat: &mut Flat, observer: &dyn Observer) -> Result<(), Cancell
         if steps.is_multiple_of(1 << 14) {
             observer.check()?;
         }
-        if flat.origin[h as usize] == NONE || flat.line[h as usize] || !(cotangents(flat, h) < FLIP) {
+        if flat.origin[h as usize] == NONE || flat.line[h as usize] || !asks_for_flip(flat, h) {
             continue;
         }
         let Some(patch) = flat.pair(h) else { continue };
@@ -172,13 +173,13 @@ fn make_delaunay(flat: &mut Flat, observer: &dyn Observer) -> Result<(), Cancell
     Ok(())
 }
 
-/// Sum of the cotangents of the angles against an inner edge.
-fn cotangents(flat: &Flat, h: u32) -> f64 {
+/// True if the cotangents of the angles against an inner edge sum to less than [`FLIP`].
+fn asks_for_flip(flat: &Flat, h: u32) -> bool {
     let one = |h: u32| {
         let (a, b) = (flat.edge[previous(h) as usize], -flat.edge[next(h) as usize]);
         a.dot(b) / a.perp_dot(b).abs()
     };
-    one(h) + one(flat.opposite[h as usize])
+    one(h) + one(flat.opposite[h as usize]) < FLIP
 }
 
 /// The other two triangles of a pair, if both are counter-clockwise and better than `least`.

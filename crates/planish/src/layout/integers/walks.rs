@@ -10,6 +10,7 @@
 
 use super::flat::{FLIPPED, Flat, quality};
 use crate::geom::graph::{Dense, Reached, Search};
+use crate::geom::is_positive;
 use crate::geom::random;
 use crate::layout::map::quarter_turn;
 use crate::mesh::{NONE, next, previous};
@@ -143,7 +144,8 @@ impl Whole {
             // Cotangents against the edge, by twice the areas.
             let cotangent = |i: usize| (places[0] - places[i]).dot(places[2] - places[i]) as f64;
             let sum = cotangent(1) / det([0, 1, 2]) as f64 + cotangent(3) / det([0, 2, 3]) as f64;
-            if !(sum < -GAIN) || FLIPPED.iter().any(|&t| det(t) <= 0) {
+            let is_gain = sum < -GAIN;
+            if !is_gain || FLIPPED.iter().any(|&t| det(t) <= 0) {
                 continue;
             }
             let Some(patch) = self.flat.pair(h) else { continue };
@@ -361,7 +363,7 @@ impl Whole {
         let change = unit(direction) * size;
         let now = self.q[h as usize];
         let gain = self.cost(h, now) - self.cost(h, now + change);
-        if !self.is_free(h, direction) || !(gain > 0.0) {
+        if !self.is_free(h, direction) || !is_positive(gain) {
             return false;
         }
         let limit = far.0 * gain + far.1;

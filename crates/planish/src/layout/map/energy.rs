@@ -178,8 +178,8 @@ impl<'a> Maps<'a> {
     /// The faces that keep no more than `part` of their determinant on the way from `before` to `after`.
     pub fn losing(&self, before: &[f64], after: &[f64], part: f64) -> Vec<u32> {
         let kept = |f: usize| self.jacobian(f, after).determinant() / self.jacobian(f, before).determinant();
-        let losing = |&f: &u32| !(kept(f as usize) > part);
-        (0..self.gradient.len() as u32).into_par_iter().with_min_len(512).filter(losing).collect()
+        let keeps = |f: u32| kept(f as usize) > part;
+        (0..self.gradient.len() as u32).into_par_iter().with_min_len(512).filter(|&f| !keeps(f)).collect()
     }
 
     /// Adds the gradient by the corners of face `f` from that by its Jacobian.

@@ -409,7 +409,8 @@ impl<'a> Collapse<'a> {
         let tolerance = self.tolerances[a as usize].min(self.tolerances[b as usize]);
         let weight = self.quadrics[a as usize].weight + self.quadrics[b as usize].weight;
         // Without a tolerance and without area there is no number to compare with.
-        !(cost > tolerance * tolerance * weight)
+        let is_beyond = cost > tolerance * tolerance * weight;
+        !is_beyond
     }
 
     /// Half-edges that leave `v`.

@@ -11,6 +11,7 @@ use super::quilt::{self, Synthesise};
 use super::region::Region;
 use super::transfer;
 use super::{Layer, Layers};
+use crate::geom::is_positive;
 use crate::network::Network;
 use crate::observe::Observer;
 use crate::surface::{Jet, Surface};
@@ -386,7 +387,7 @@ fn layer_of(
             plain(within(region, &|p, k, d| (d - soft[p].vectors[k]) * *amount)?)
         }
         ReliefEdit::Threshold(Threshold { height, region }) => {
-            if !(*height > 0.0) {
+            if !is_positive(*height) {
                 return Err(refused("a threshold needs a height above 0"));
             }
             let low = |_: usize, _: usize, d: DVec3| if d.length() < *height { -d } else { DVec3::ZERO };

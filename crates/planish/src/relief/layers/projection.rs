@@ -4,6 +4,7 @@
 //! pixels take the levels whose pixels are as far apart as they are, else lines of the image would break into steps.
 
 use super::ground::{Ground, Place, Texel};
+use crate::geom::is_positive;
 use crate::relief::ReliefError;
 use glam::{DVec2, DVec3};
 
@@ -119,7 +120,7 @@ impl Projection {
             return Err(refused("the image of the {} is empty"));
         }
         let depth = spot.depth.unwrap_or(spot.width / 2.0);
-        if !(depth > 0.0) {
+        if !is_positive(depth) {
             return Err(refused("the {} needs a depth above 0"));
         }
         let (middle, normal) = ground.locate(spot.at, &format!("the {what}"))?;

@@ -3,6 +3,7 @@
 use super::super::{Relief, ReliefError};
 use super::ground::{Ground, Place, Texel};
 use super::projection::{Pictures, Projection, Spot};
+use crate::geom::is_positive;
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -46,7 +47,7 @@ impl Region {
         if let Some(p) = self.patches.iter().find(|&&p| p as usize >= ground.shapes.len()) {
             return refused(format!("there is no patch {p} among {}", ground.shapes.len()));
         }
-        if !(self.feather >= 0.0) {
+        if self.feather.is_nan() || self.feather < 0.0 {
             return refused("the feather is a width of 0 or more".into());
         }
         if self.at.is_none() && (self.radius != 0.0 || self.feather != 0.0) {
@@ -63,7 +64,7 @@ impl Region {
             _ => return refused("up, width and depth of a region are those of its image; name the image".into()),
         };
         let is_ball = self.at.is_some() && (mask.is_none() || self.radius != 0.0);
-        if is_ball && !(self.radius > 0.0) {
+        if is_ball && !is_positive(self.radius) {
             return refused("a region around a place needs a radius above 0".into());
         }
         let place = self.at.as_ref().map(|place| ground.locate(place, "the region")).transpose()?;

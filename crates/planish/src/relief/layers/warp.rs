@@ -11,7 +11,7 @@
 
 use super::super::{Displaced, ReliefError, closest};
 use super::ground::{Ground, Place};
-use crate::geom::Aabb;
+use crate::geom::{Aabb, is_positive};
 use crate::linalg::{eigen3, solve_dense};
 use crate::observe::Observer;
 use crate::register::Placement;
@@ -91,7 +91,8 @@ impl Warp {
         for side in 0..2 {
             let size = Aabb::of(pairs.iter().map(|p| &p[side])).diagonal();
             for (k, a) in pairs.iter().enumerate() {
-                if let Some(l) = pairs[..k].iter().position(|b| !(a[side].distance(b[side]) > SAME * size)) {
+                let is_apart = |b: &[DVec3; 2]| a[side].distance(b[side]) > SAME * size;
+                if let Some(l) = pairs[..k].iter().position(|b| !is_apart(b)) {
                     let whose = ["from", "to"][side];
                     return refused(format!(
                         "pairs {} and {} have the same place `{whose}`; take one away",
@@ -102,7 +103,7 @@ impl Warp {
             }
         }
         let (linear, shift, affine) = base(pairs)?;
-        if !(linear.determinant() > 0.0) {
+        if !is_positive(linear.determinant()) {
             return refused("the pairs make a mirror image; transfer does not mirror".into());
         }
         let places: Vec<DVec3> = pairs.iter().map(|p| p[0]).collect();
@@ -259,7 +260,8 @@ fn put_on(
         }
     }
     let found = closest(surfaces, &points, observer)?;
-    if let Some((k, far)) = found.iter().enumerate().find(|(_, f)| !(f.distance <= limit)) {
+    let is_on = |distance: f64| distance <= limit;
+    if let Some((k, far)) = found.iter().enumerate().find(|(_, f)| !is_on(f.distance)) {
         let what = format!("the place is {:.4} away from the surface; give one on it", far.distance);
         return Err(refused(k, what));
     }
