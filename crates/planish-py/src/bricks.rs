@@ -123,6 +123,7 @@ impl PyBricks {
     /// * the keywords of `Cloud.mesh`; memory is what one brick's lattice may take
     #[staticmethod]
     #[pyo3(signature = (scan, folder, *, most=524288, columns=None, classes=None, close=None, memory=None, progress=None, **parameters))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn create(
         py: Python,
         scan: &Bound<PyAny>,

@@ -26,11 +26,11 @@ mod sizes;
 
 pub use divide::{DivideError, divide};
 pub use feature::curve::{FeatureGrid, Sections, relax_with_features};
-pub use feature::network::{Drawn, check_features, family_of, relax_network};
+pub use feature::network::{Drawn, Here, check_features, family_of, relax_network};
 pub use feature::{Family, FeatureCurve, FeatureError};
 pub use follow::follow;
 pub use quality::{GridQuality, measure};
-pub use resample::{Here, Relaxer, densify, resample, resample_by};
+pub use resample::{Relaxer, densify, resample, resample_by};
 pub use sizes::choose_sizes;
 
 use crate::grid::chart::locate::Spot;

@@ -3,7 +3,7 @@
 //! [K98] §5.6 ends at a density; here misses decide (`docs/methods/grids.md`, step 8).
 
 use super::feature::FeatureError;
-use super::feature::network::{Drawn, give_sums, relax_some};
+use super::feature::network::{Drawn, Here, give_sums};
 use super::quality::{folds, miss};
 use super::sizes::{bounds, total};
 use super::{Grid, GridError, GridParams, Job, choose_sizes, relax_jobs};
@@ -81,28 +81,14 @@ pub trait Relaxer: Sync {
     fn relax(&self, which: &[usize], sizes: &[Size], observer: &dyn Observer) -> Result<Vec<Grid>, FeatureError>;
 }
 
-/// Relaxes patches in this process.
-pub struct Here<'a> {
-    /// The mesh that places refer to.
-    pub input: &'a TriMesh,
-    /// Its network.
-    pub network: &'a Network,
-    /// The patches of the network.
-    pub patches: &'a [PatchMesh],
-    /// Feature curves and sections; mostly empty.
-    pub drawn: Drawn<'a>,
-    /// How grids are made.
-    pub params: &'a GridParams,
-}
-
 impl Relaxer for Here<'_> {
     fn relax(&self, which: &[usize], sizes: &[Size], observer: &dyn Observer) -> Result<Vec<Grid>, FeatureError> {
-        let Here { input, network, patches, drawn, params } = *self;
+        let Here { input, patches, drawn, params, .. } = *self;
         if drawn.0.is_empty() && drawn.1.is_empty() {
             let jobs: Vec<Job> = which.iter().map(|&p| (p, &patches[p], sizes[p])).collect();
             return Ok(relax_jobs(input, &jobs, &[], params, observer)?);
         }
-        relax_some(input, network, patches, sizes, drawn, which, params, observer)
+        self.relax_some(which, sizes, observer)
     }
 }
 

@@ -60,10 +60,8 @@ pub fn caps(
     triangle: &mut dyn FnMut([u32; 3]),
 ) {
     let middle = (corners[0] + corners[7]) / 2.0;
-    let pieces = pieces(corners, loops);
-    let region = regions(&pieces);
-    // The two regions beside each loop: that of the body and that of free space.
-    let sides: Vec<[usize; 2]> = loops.iter().map(|l| beside(l, &pieces, &region, config)).collect();
+    let boundary = Boundary::new(corners, config, loops);
+    let Boundary { region, sides, .. } = &boundary;
     // Regions that are reached from `start` without passing a loop for which `stop` holds.
     let reach = |start: usize, stop: &dyn Fn(usize) -> bool| {
         let mut seen = 1u8 << start;
@@ -110,8 +108,18 @@ pub fn caps(
         }
     }
     for patch in &patches {
-        push_in(patch, loops, &pieces, &region, config, middle, vertex, triangle);
+        boundary.push_in(patch, middle, vertex, triangle);
     }
+}
+
+/// The boundary of a cell, cut along the loops on it.
+struct Boundary<'a> {
+    loops: &'a [&'a [Corner]],
+    pieces: Vec<Piece>,
+    /// As of [`regions`].
+    region: [usize; 8],
+    /// The two regions beside each loop: that of the body and that of free space.
+    sides: Vec<[usize; 2]>,
 }
 
 /// A part of a face between its segments: a polygon, counter-clockwise seen from outside the cell.
@@ -254,9 +262,7 @@ pub fn loops_between(
     from: usize,
     to: usize,
 ) -> Option<[usize; 2]> {
-    let pieces = pieces(corners, loops);
-    let region = regions(&pieces);
-    let sides: Vec<[usize; 2]> = loops.iter().map(|l| beside(l, &pieces, &region, config)).collect();
+    let Boundary { region, sides, .. } = Boundary::new(corners, config, loops);
     let (from, to) = (region[from], region[to]);
     for (l, a) in sides.iter().enumerate() {
         for (m, b) in sides.iter().enumerate() {
@@ -272,53 +278,60 @@ pub fn loops_between(
     None
 }
 
-fn push_in(
-    patch: &Patch,
-    loops: &[&[Corner]],
-    pieces: &[Piece],
-    region: &[usize; 8],
-    config: u8,
-    middle: DVec3,
-    vertex: &mut dyn FnMut(DVec3) -> u32,
-    triangle: &mut dyn FnMut([u32; 3]),
-) {
-    let scale = 1.0 - PUSH * patch.depth as f64;
-    let mut made: Vec<(u64, u32)> = Vec::new();
-    let mut shrunk = |n: Node, vertex: &mut dyn FnMut(DVec3) -> u32| match made.iter().find(|m| m.0 == n.key) {
-        Some(m) => m.1,
-        None => {
-            let id = vertex(middle + (n.p - middle) * scale);
-            made.push((n.key, id));
-            id
-        }
-    };
-    for &l in &patch.loops {
-        let l = loops[l];
-        for k in 0..l.len() {
-            let (a, b) = (&l[k], &l[(k + 1) % l.len()]);
-            let (sa, sb) = (shrunk(node(a), vertex), shrunk(node(b), vertex));
-            triangle([a.id, b.id, sb]);
-            triangle([a.id, sb, sa]);
-        }
+impl<'a> Boundary<'a> {
+    fn new(corners: &[DVec3; 8], config: u8, loops: &'a [&'a [Corner]]) -> Boundary<'a> {
+        let pieces = pieces(corners, loops);
+        let region = regions(&pieces);
+        let sides = loops.iter().map(|l| beside(l, &pieces, &region, config)).collect();
+        Boundary { loops, pieces, region, sides }
     }
-    // The side on which the loops see the patch: a cap of the body is seen from the middle.
-    let Some(first) = patch.loops.first().map(|&l| beside(loops[l], pieces, region, config)) else { return };
-    let body = patch.regions >> first[0] & 1 != 0;
-    for piece in pieces {
-        let own = piece.corners.first().is_some_and(|&c| patch.regions >> region[c] & 1 != 0);
-        if !own {
-            continue;
-        }
-        let axis = piece.face / 2;
-        let flat = |p: DVec3| {
-            let q = DVec2::new(p[(axis + 1) % 3], p[(axis + 2) % 3]);
-            // Faces with an odd number look along their axis.
-            if piece.face % 2 == 1 { q } else { DVec2::new(q.y, q.x) }
+
+    /// Makes a patch: its caps, shrunk towards the middle, and the collars around them.
+    fn push_in(
+        &self,
+        patch: &Patch,
+        middle: DVec3,
+        vertex: &mut dyn FnMut(DVec3) -> u32,
+        triangle: &mut dyn FnMut([u32; 3]),
+    ) {
+        let scale = 1.0 - PUSH * patch.depth as f64;
+        let mut made: Vec<(u64, u32)> = Vec::new();
+        let mut shrunk = |n: Node, vertex: &mut dyn FnMut(DVec3) -> u32| match made.iter().find(|m| m.0 == n.key) {
+            Some(m) => m.1,
+            None => {
+                let id = vertex(middle + (n.p - middle) * scale);
+                made.push((n.key, id));
+                id
+            }
         };
-        let outline: Vec<DVec2> = piece.outline.iter().map(|n| flat(n.p)).collect();
-        for t in ears(&outline) {
-            let ids = t.map(|k| shrunk(piece.outline[k], vertex));
-            triangle(if body { [ids[0], ids[2], ids[1]] } else { ids });
+        for &l in &patch.loops {
+            let l = self.loops[l];
+            for k in 0..l.len() {
+                let (a, b) = (&l[k], &l[(k + 1) % l.len()]);
+                let (sa, sb) = (shrunk(node(a), vertex), shrunk(node(b), vertex));
+                triangle([a.id, b.id, sb]);
+                triangle([a.id, sb, sa]);
+            }
+        }
+        // The side on which the loops see the patch: a cap of the body is seen from the middle.
+        let Some(first) = patch.loops.first().map(|&l| self.sides[l]) else { return };
+        let body = patch.regions >> first[0] & 1 != 0;
+        for piece in &self.pieces {
+            let own = piece.corners.first().is_some_and(|&c| patch.regions >> self.region[c] & 1 != 0);
+            if !own {
+                continue;
+            }
+            let axis = piece.face / 2;
+            let flat = |p: DVec3| {
+                let q = DVec2::new(p[(axis + 1) % 3], p[(axis + 2) % 3]);
+                // Faces with an odd number look along their axis.
+                if piece.face % 2 == 1 { q } else { DVec2::new(q.y, q.x) }
+            };
+            let outline: Vec<DVec2> = piece.outline.iter().map(|n| flat(n.p)).collect();
+            for t in ears(&outline) {
+                let ids = t.map(|k| shrunk(piece.outline[k], vertex));
+                triangle(if body { [ids[0], ids[2], ids[1]] } else { ids });
+            }
         }
     }
 }

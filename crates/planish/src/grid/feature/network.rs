@@ -22,6 +22,20 @@ const SAME_END: f64 = 1e-6;
 /// cells between theirs.
 pub type Drawn<'a> = (&'a [FeatureCurve], &'a [(u32, Sections)]);
 
+/// Relaxes patches in this process.
+pub struct Here<'a> {
+    /// The mesh that places refer to.
+    pub input: &'a TriMesh,
+    /// Its network.
+    pub network: &'a Network,
+    /// The patches of the network.
+    pub patches: &'a [PatchMesh],
+    /// Feature curves and sections; mostly empty.
+    pub drawn: Drawn<'a>,
+    /// How grids are made.
+    pub params: &'a GridParams,
+}
+
 /// The family that a curve from side to side of a patch is of, by the sides that its ends lie nearest to.
 /// * `patch` - exact sub-mesh of `input`
 pub fn family_of(input: &TriMesh, patch: &PatchMesh, points: &[FacePoint]) -> Family {
@@ -76,72 +90,71 @@ pub fn relax_network(
     let mut sizes = sizes.to_vec();
     give_sums(network, drawn, &mut sizes)?;
     let all: Vec<usize> = (0..patches.len()).collect();
-    relax_some(input, network, patches, &sizes, drawn, &all, params, observer)
+    Here { input, network, patches, drawn, params }.relax_some(&all, &sizes, observer)
 }
 
-/// As [`relax_network`] for some of the patches, `which`, rising, with the sums of given sections in `sizes` already.
-pub(crate) fn relax_some(
-    input: &TriMesh,
-    network: &Network,
-    patches: &[PatchMesh],
-    sizes: &[(usize, usize)],
-    (features, sections): Drawn,
-    which: &[usize],
-    params: &GridParams,
-    observer: &dyn Observer,
-) -> Result<Vec<Grid>, FeatureError> {
-    if patches.len() != sizes.len() || patches.len() != network.patches.len() {
-        return Err(GridError::SizeCount { patches: patches.len(), sizes: sizes.len() }.into());
-    }
-    let mut of_patch: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (k, feature) in features.iter().enumerate() {
-        if feature.patch as usize >= patches.len() {
-            return Err(FeatureError::NoSuchPatch { curve: k, patch: feature.patch, patches: patches.len() });
+impl Here<'_> {
+    /// As [`relax_network`] for some of the patches, `which`, rising, with the sums of given sections in `sizes` already.
+    pub(crate) fn relax_some(
+        &self,
+        which: &[usize],
+        sizes: &[(usize, usize)],
+        observer: &dyn Observer,
+    ) -> Result<Vec<Grid>, FeatureError> {
+        let Here { input, network, patches, drawn: (features, sections), params } = *self;
+        if patches.len() != sizes.len() || patches.len() != network.patches.len() {
+            return Err(GridError::SizeCount { patches: patches.len(), sizes: sizes.len() }.into());
         }
-        of_patch.entry(feature.patch as usize).or_default().push(k);
-    }
-    let given = |p: usize| sections.iter().rfind(|s| s.0 as usize == p).map(|s| &s.1);
-    let mut strands: BTreeMap<usize, (Strands, [Vec<usize>; 2])> = BTreeMap::new();
-    for (&p, own) in &of_patch {
-        let curves: Vec<FeatureCurve> = own.iter().map(|&k| features[k].clone()).collect();
-        let found = Strands::new(input, &patches[p], &curves).map_err(|e| named(e, own))?;
-        let means = |list: &[usize]| list.iter().map(|&k| found.mean_share(k)).collect::<Vec<_>>();
-        let none = Sections::default();
-        let sections = given(p).unwrap_or(&none);
-        let cells = [
-            cells_between("u", &sections.u, &means(&found.across), sizes[p].0 - 1)?,
-            cells_between("v", &sections.v, &means(&found.along), sizes[p].1 - 1)?,
-        ];
-        strands.insert(p, (found, cells));
-    }
-    let on_curve = stops_of_curves(network, &strands, sizes)?;
-    let stops: Vec<SideStops> = (network.patches.iter().zip(sizes))
-        .map(|(patch, size)| {
-            std::array::from_fn(|k| {
-                let side = patch.sides[k];
-                let count = if k % 2 == 0 { size.0 } else { size.1 };
-                let own = on_curve.get(&side.curve).cloned().unwrap_or_default();
-                if side.reversed { side::turned(&own, count) } else { own }
+        let mut of_patch: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (k, feature) in features.iter().enumerate() {
+            if feature.patch as usize >= patches.len() {
+                return Err(FeatureError::NoSuchPatch { curve: k, patch: feature.patch, patches: patches.len() });
+            }
+            of_patch.entry(feature.patch as usize).or_default().push(k);
+        }
+        let given = |p: usize| sections.iter().rfind(|s| s.0 as usize == p).map(|s| &s.1);
+        let mut strands: BTreeMap<usize, (Strands, [Vec<usize>; 2])> = BTreeMap::new();
+        for (&p, own) in &of_patch {
+            let curves: Vec<FeatureCurve> = own.iter().map(|&k| features[k].clone()).collect();
+            let found = Strands::new(input, &patches[p], &curves).map_err(|e| named(e, own))?;
+            let means = |list: &[usize]| list.iter().map(|&k| found.mean_share(k)).collect::<Vec<_>>();
+            let none = Sections::default();
+            let sections = given(p).unwrap_or(&none);
+            let cells = [
+                cells_between("u", &sections.u, &means(&found.across), sizes[p].0 - 1)?,
+                cells_between("v", &sections.v, &means(&found.along), sizes[p].1 - 1)?,
+            ];
+            strands.insert(p, (found, cells));
+        }
+        let on_curve = stops_of_curves(network, &strands, sizes)?;
+        let stops: Vec<SideStops> = (network.patches.iter().zip(sizes))
+            .map(|(patch, size)| {
+                std::array::from_fn(|k| {
+                    let side = patch.sides[k];
+                    let count = if k % 2 == 0 { size.0 } else { size.1 };
+                    let own = on_curve.get(&side.curve).cloned().unwrap_or_default();
+                    if side.reversed { side::turned(&own, count) } else { own }
+                })
             })
-        })
-        .collect();
-    // Patches without feature curves together, those with them one by one.
-    let plain: Vec<usize> = which.iter().copied().filter(|p| !strands.contains_key(p)).collect();
-    let pick = |list: &[usize]| -> (Vec<PatchMesh>, Vec<(usize, usize)>, Vec<SideStops>) {
-        let patches = list.iter().map(|&p| patches[p].clone()).collect();
-        (patches, list.iter().map(|&p| sizes[p]).collect(), list.iter().map(|&p| stops[p].clone()).collect())
-    };
-    let (some, some_sizes, some_stops) = pick(&plain);
-    let each = 1.0 / which.len().max(1) as f64;
-    let first = Part::new(observer, 0.0, plain.len() as f64 * each);
-    let made = relax_at(input, &some, &some_sizes, &some_stops, params, &first).map_err(|e| of_plain(e, &plain))?;
-    let mut grids: BTreeMap<usize, Grid> = plain.into_iter().zip(made).collect();
-    for (&p, (found, cells)) in strands.iter().filter(|s| which.contains(s.0)) {
-        let part = Part::new(observer, grids.len() as f64 * each, each);
-        let made = relax_along(input, &patches[p], found, cells, &stops[p], params, &part);
-        grids.insert(p, made.map_err(|e| named(e, &of_patch[&p]))?.grid);
+            .collect();
+        // Patches without feature curves together, those with them one by one.
+        let plain: Vec<usize> = which.iter().copied().filter(|p| !strands.contains_key(p)).collect();
+        let pick = |list: &[usize]| -> (Vec<PatchMesh>, Vec<(usize, usize)>, Vec<SideStops>) {
+            let patches = list.iter().map(|&p| patches[p].clone()).collect();
+            (patches, list.iter().map(|&p| sizes[p]).collect(), list.iter().map(|&p| stops[p].clone()).collect())
+        };
+        let (some, some_sizes, some_stops) = pick(&plain);
+        let each = 1.0 / which.len().max(1) as f64;
+        let first = Part::new(observer, 0.0, plain.len() as f64 * each);
+        let made = relax_at(input, &some, &some_sizes, &some_stops, params, &first).map_err(|e| of_plain(e, &plain))?;
+        let mut grids: BTreeMap<usize, Grid> = plain.into_iter().zip(made).collect();
+        for (&p, (found, cells)) in strands.iter().filter(|s| which.contains(s.0)) {
+            let part = Part::new(observer, grids.len() as f64 * each, each);
+            let made = relax_along(input, &patches[p], found, cells, &stops[p], params, &part);
+            grids.insert(p, made.map_err(|e| named(e, &of_patch[&p]))?.grid);
+        }
+        Ok(grids.into_values().collect())
     }
-    Ok(grids.into_values().collect())
 }
 
 /// An error of some patches with the number of the patch in the network.
