@@ -17,6 +17,11 @@ pub trait Observer: Sync {
     }
 }
 
+/// So many things in words: `1 cell is`, `2 cells are`.
+pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
 /// The observer no longer wanted the result: the one reason of every stage that was stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("cancelled")]

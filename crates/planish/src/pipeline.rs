@@ -263,11 +263,11 @@ fn fit_with(
     clock: &mut Clock,
 ) -> Result<Fitted, PipelineError> {
     let (mesh, repairs) = repair(input, clock)?;
-    let (network, method) = match network {
-        Some(network) => (network, None),
+    let (network, pieces) = match network {
+        Some(network) => (network, Vec::new()),
         None => {
-            let Layout { network, method } = draw(input, tags, &mesh, &params.layout, clock)?;
-            (network, Some(method))
+            let Layout { network, pieces } = draw(input, tags, &mesh, &params.layout, clock)?;
+            (network, pieces)
         }
     };
     let patches = clock.stage("imprint", |o| network::imprint(&mesh, &network, o), |p| [("patches", p.len())])?;
@@ -280,9 +280,7 @@ fn fit_with(
     surfaces(&mut model, params, clock)?;
     let mut measured =
         clock.stage("measure", |o| quality::measure(&model, &patches, &repairs, o), |m| [("seams", m.seams.len())])?;
-    if let Some(method) = &method {
-        quality::method_figures(method, &mut measured.quality, &mut measured.warnings);
-    }
+    quality::method_figures(&pieces, &mut measured.quality, &mut measured.warnings);
     Ok(Fitted {
         model,
         stages: std::mem::take(&mut clock.records),
@@ -359,11 +357,11 @@ pub fn layout(
         let laid = draw(input, tags, &mesh, params, clock)?;
         Ok::<_, PipelineError>((mesh, repairs, laid))
     };
-    let (mesh, repairs, Layout { network, method }) = draft(&mut clock)?;
+    let (mesh, repairs, Layout { network, pieces }) = draft(&mut clock)?;
     let (mut quality, mut warnings) = (Quality::new(), Vec::new());
     quality::mesh_figures(&mesh, &network, &repairs, &mut quality, &mut warnings);
     quality::network_figures(&network, &mut quality);
-    quality::method_figures(&method, &mut quality, &mut warnings);
+    quality::method_figures(&pieces, &mut quality, &mut warnings);
     Ok(Drafted { mesh, network, stages: clock.records, quality, warnings })
 }
 
@@ -565,10 +563,10 @@ fn draw(
         let by = (params.patches as f64 / MOST_LAID as f64).sqrt().ceil() as usize;
         if by > 1 && !params.coarsest {
             let fewer = LayoutParams { patches: params.patches / (by * by), ..params.clone() };
-            let Layout { network, method } = lay(&fewer, &Part::new(o, 0.0, 0.6))?;
+            let Layout { network, pieces } = lay(&fewer, &Part::new(o, 0.0, 0.6))?;
             match grid::divide(mesh, &network, by, &GridParams::default(), &Part::new(o, 0.6, 0.4)) {
                 Ok(network) if layout::count_is_near(network.patches.len(), params.patches) => {
-                    return Ok(Layout { network, method });
+                    return Ok(Layout { network, pieces });
                 }
                 Err(e) if Cancelled::is_cause_of(&e) => return Err(Cancelled.into()),
                 // Where a grid is folded its curves cross.

@@ -52,7 +52,7 @@ const TRUTH_FIGURES: [(&str, &str, Reading); 12] = [
 ];
 
 /// Figures of quality in words: key, meaning, and how the value is read.
-const FIGURES: [(&str, &str, Reading); 34] = [
+const FIGURES: [(&str, &str, Reading); 35] = [
     ("mesh.triangles", "Triangles of the mesh after repair", Reading::Plain),
     ("mesh.watertight", "The mesh is closed", Reading::Plain),
     ("mesh.manifold", "The mesh is manifold", Reading::Plain),
@@ -61,6 +61,7 @@ const FIGURES: [(&str, &str, Reading); 34] = [
     ("patches.irregular_corners", "Corners where not four patches meet", Reading::Plain),
     ("layout.cones", "Cones of the directions it follows", Reading::Plain),
     ("layout.deviation_deg", "Patches off these directions, mean", Reading::Degrees),
+    ("layout.along_form_share", "Area whose patches follow the form", Reading::Fraction),
     ("grid.points", "Points of all grids", Reading::Plain),
     ("grid.folds", "Folded grid cells", Reading::Plain),
     ("grid.spacing_cv", "Unevenness of grid spacing (deviation over mean)", Reading::Fraction),

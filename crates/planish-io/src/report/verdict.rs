@@ -153,7 +153,8 @@ fn reason(report: &Report, key: &str) -> String {
         "seam.folded" => format!("{} smooth seams are folded over", count(value as u64)),
         "grid.folds" => {
             let cells = report.figure("grid.points").unwrap_or(1.0).max(1.0);
-            format!("{} grid cells are folded ({})", count(value as u64), percent(value / cells))
+            let are = if value == 1.0 { "cell is" } else { "cells are" };
+            format!("{} grid {are} folded ({})", count(value as u64), percent(value / cells))
         }
         "scan.confidence" => format!("only {} of the evidence agrees on which side is outside", percent(value)),
         "seam.inner_angle_max_deg" => format!("a smooth seam bends by {}°", number(value)),

@@ -18,6 +18,7 @@ mod even;
 
 use super::chain::SurfaceCurve;
 use super::{CurveError, ScalarField};
+use crate::geom::is_positive;
 use crate::linalg::{Banded, BandedCholesky};
 use crate::mesh::{Adjacency, FacePoint, TriMesh, move_point_on_surface};
 use crate::observe::Observer;
@@ -440,7 +441,7 @@ impl<'m> Snake<'m> {
         let tangent = self.at[b] - self.at[a];
         let normal = self.normal(i).cross(tangent).normalize_or_zero();
         let reach = RIDGE_STEP * tangent.length() / 2.0;
-        if normal == DVec3::ZERO || !(reach > 0.0) {
+        if normal == DVec3::ZERO || !is_positive(reach) {
             return None;
         }
         let slope = |p: &FacePoint| field.gradient(self.mesh, self.adjacency, p).dot(normal);
@@ -645,7 +646,7 @@ impl System {
         let (mut matrix, mut rhs) = (self.matrix.clone(), self.rhs.clone());
         let n = matrix.len();
         let mean = (0..n).map(|i| matrix.get(i, i)).sum::<f64>() / n as f64;
-        if !(mean > 0.0) {
+        if !is_positive(mean) {
             return None;
         }
         for i in 0..n {

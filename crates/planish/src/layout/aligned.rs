@@ -15,17 +15,18 @@ use super::integers::{self, IntegerMap, QuantizeError, Scale};
 use super::map::{self, Charts, Effort};
 use super::proxy::{self, Proxy, Sizing};
 use super::recut::Bench;
-use super::{LayoutParams, SETTLING_PER_SMOOTHING, improve};
+use super::{LayoutParams, Piece, SETTLING_PER_SMOOTHING, TYPICAL_PATCHES, improve};
 use crate::mesh::TriMesh;
 use crate::network::Network;
 use crate::network::field::{self, FieldParams};
-use crate::observe::{Cancelled, Observer};
+use crate::observe::{Cancelled, Observer, counted};
 use glam::DVec3;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-/// Triangles of the proxy: the seamless maps of the measured meshes were made on 5 000 to 6 000 (two fifths of a second).
-const PROXY_TRIANGLES: usize = 6_000;
+/// Triangles of the proxy: the seamless maps of the measured meshes were made on 5 000 to 6 000 (two fifths of a second). A
+/// piece of a mesh gets less, but not as much less as its area is: small ones have a form, too.
+const PROXY_TRIANGLES: f64 = 6_000.0;
 
 /// A proxy that has more times the triangles wanted, for its lines are dense, is not mapped: time and memory of a map grow
 /// faster than its triangles. Chosen; the measured meshes that were tried do not meet it.
@@ -36,9 +37,6 @@ const RADIUS_TO_SIDE: f64 = 0.4;
 
 /// Opposite cones nearer than this, in the same sides, are taken for noise.
 const PAIR_TO_SIDE: f64 = 0.5;
-
-/// Patches of a typical layout, which the scale of directions goes by.
-const TYPICAL_PATCHES: f64 = 100.0;
 
 /// Rounds of making the proxy finer where cones are tight; each halves its edges there.
 const REFINEMENTS: usize = 2;
@@ -146,13 +144,13 @@ pub(super) enum AlignError {
         most: usize,
     },
     /// The map is not one-to-one.
-    #[error("its map stays folded in {faults} places")]
+    #[error("its map stays folded in {}", counted(*faults, "place", "places"))]
     Folded {
         /// Faces and vertices.
         faults: usize,
     },
     /// Triangles of the proxy leave no way to whole numbers, or no vertex for a corner of patches.
-    #[error("its patches have no room in {} places", .places.len())]
+    #[error("its patches have no room in {}", counted(.places.len(), "place", "places"))]
     Cramped {
         /// Where.
         places: Vec<DVec3>,
@@ -263,9 +261,7 @@ pub(super) fn asked(params: &LayoutParams) -> Option<usize> {
 /// # Errors
 /// [`AlignError`] says why there is none.
 pub(super) fn lay(
-    mesh: &TriMesh,
-    sharp: &[bool],
-    corners: &[bool],
+    &Piece { mesh, sharp, corners, share }: &Piece,
     params: &LayoutParams,
     observer: &dyn Observer,
 ) -> Result<Laid, AlignError> {
@@ -276,13 +272,14 @@ pub(super) fn lay(
     let mut best: Option<Laid> = None;
     let mut has_tight = false;
     let mut even = None;
-    let effort = Effort::default();
+    let effort = Effort::new(share);
+    let triangles = (PROXY_TRIANGLES * share.sqrt()) as usize;
     for attempt in &ATTEMPTS {
         // Where no cone is to be moved it would be the same again.
         if attempt.roomy && attempt.curvature > 0.0 && !has_tight {
             continue;
         }
-        let mut sizing = Sizing::even(mesh, PROXY_TRIANGLES);
+        let mut sizing = Sizing::even(mesh, triangles);
         for _ in 0..=FINER_ROUNDS {
             let aligned = match Aligned::on((mesh, sharp), attempt, (&mut sizing, &mut even), &effort, observer) {
                 Ok(Some(aligned)) => aligned,

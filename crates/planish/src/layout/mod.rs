@@ -35,10 +35,10 @@ use crate::layout::partition::{outline, polygon, tips};
 use crate::layout::proxy::refine::Refined;
 use crate::layout::proxy::{coarse, refine};
 use crate::layout::recut::Bench;
-use crate::mesh::{Adjacency, FacePoint, NONE, TriMesh, next};
+use crate::mesh::{Adjacency, FacePoint, FeatureTags, MeshParts, NONE, TriMesh, components, next};
 use crate::network::imprint::{self, Shared};
 use crate::network::{Corner, Curve, Network, Patch, Side};
-use crate::observe::{Cancelled, Observer};
+use crate::observe::{Cancelled, Observer, Part};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
@@ -72,6 +72,9 @@ const FORCED: f64 = 0.85;
 
 /// Rounds of settling for each round of smoothing asked for: a round redraws disjoint unions only.
 const SETTLING_PER_SMOOTHING: usize = 8;
+
+/// Patches of a typical layout: the scale of directions goes by their side, and pieces of less area than one are small.
+const TYPICAL_PATCHES: f64 = 100.0;
 
 /// Patches of a partition where no number is asked for.
 const PARTITION_PATCHES: usize = 120;
@@ -138,7 +141,7 @@ pub struct Known<'a> {
     pub corners: &'a [bool],
 }
 
-/// How a network was laid.
+/// How the patches of a piece of a mesh were laid.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Method {
     /// Along a cross field, by a map of it.
@@ -160,11 +163,24 @@ pub enum Method {
 pub struct Layout {
     /// The network.
     pub network: Network,
-    /// How it was laid.
-    pub method: Method,
+    /// For each piece of the mesh its part of the area and how its patches were laid; small pieces are one together.
+    pub pieces: Vec<(f64, Method)>,
+}
+
+/// Faces of a mesh that are laid out by themselves.
+struct Piece<'a> {
+    mesh: &'a TriMesh,
+    /// For each half-edge whether it lies on a line that is a patch boundary.
+    sharp: &'a [bool],
+    /// For each vertex whether it is to be a corner; may be empty.
+    corners: &'a [bool],
+    /// Part of the area of the whole mesh.
+    share: f64,
 }
 
 /// Lays a conforming network of four-sided patches on `mesh`, an oriented manifold with or without boundary.
+///
+/// Each piece of the mesh gets a network of its own: what is in the way of one is not in that of another.
 ///
 /// Sharp lines and boundaries lie on patch boundaries; every patch is an exact disk ([`crate::network::imprint`]).
 /// # Errors
@@ -177,11 +193,76 @@ pub fn layout(
 ) -> Result<Layout, LayoutError> {
     let Known { sharp: tagged, lines, corners } = known;
     check(mesh)?;
-    let params = &LayoutParams { patches: params.patches.min(most_patches(mesh)), ..params.clone() };
     let adjacency = Adjacency::new(mesh);
     let mut sharp = lines::feature_lines(mesh, &adjacency, tagged, params, observer)?;
     sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
-    let along = aligned::lay(mesh, &sharp, corners, params, observer);
+    let groups = pieces(mesh, &adjacency);
+    if let [_] = groups[..] {
+        let piece = Piece { mesh, sharp: &sharp, corners, share: 1.0 };
+        let (network, method) = lay(&piece, params, observer)?;
+        return Ok(Layout { network, pieces: vec![(1.0, method)] });
+    }
+    let (none, mut start) = (FeatureTags::default(), 0.0);
+    let mut parts = MeshParts::new(mesh, &none);
+    let mut laid = Layout { network: Network::default(), pieces: Vec::with_capacity(groups.len()) };
+    for (faces, share) in &groups {
+        let part = parts.part(faces);
+        let sharp: Vec<bool> = faces.iter().flat_map(|&f| &sharp[3 * f as usize..][..3]).copied().collect();
+        let corners: Vec<bool> = part.vertices.iter().filter_map(|&v| corners.get(v as usize).copied()).collect();
+        let piece = Piece { mesh: &part.mesh, sharp: &sharp, corners: &corners, share: *share };
+        let (network, method) = lay(&piece, params, &Part::new(observer, start, *share))?;
+        append(&mut laid.network, network, faces);
+        laid.pieces.push((*share, method));
+        start += share;
+    }
+    Ok(laid)
+}
+
+/// The pieces of a mesh with their shares of its area, the largest first; those too small for one of [`TYPICAL_PATCHES`] are
+/// the last one together.
+fn pieces(mesh: &TriMesh, adjacency: &Adjacency) -> Vec<(Vec<u32>, f64)> {
+    let (label, count) = components(adjacency);
+    let mut found: Vec<(Vec<u32>, f64)> = vec![Default::default(); count];
+    for (f, &piece) in label.iter().enumerate() {
+        found[piece as usize].0.push(f as u32);
+        found[piece as usize].1 += mesh.area(f);
+    }
+    let whole: f64 = found.iter().map(|(_, area)| area).sum();
+    found.iter_mut().for_each(|(_, area)| *area /= whole);
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let large = found.iter().take_while(|(_, share)| share * TYPICAL_PATCHES >= 1.0).count().max(1);
+    let small = found.split_off(large.min(found.len()));
+    if !small.is_empty() {
+        let mut faces: Vec<u32> = small.iter().flat_map(|(faces, _)| faces).copied().collect();
+        faces.sort_unstable();
+        found.push((faces, small.iter().map(|(_, share)| share).sum()));
+    }
+    found
+}
+
+/// Puts the network of some faces of a mesh beside another.
+fn append(network: &mut Network, mut piece: Network, faces: &[u32]) {
+    let (corners, curves) = (network.corners.len() as u32, network.curves.len() as u32);
+    piece.corners.iter_mut().for_each(|c| c.place.face = faces[c.place.face as usize]);
+    for curve in &mut piece.curves {
+        curve.corners.iter_mut().for_each(|c| *c += corners);
+        curve.points.iter_mut().for_each(|p| p.face = faces[p.face as usize]);
+    }
+    piece.patches.iter_mut().flat_map(|p| &mut p.sides).for_each(|s| s.curve += curves);
+    network.corners.append(&mut piece.corners);
+    network.curves.append(&mut piece.curves);
+    network.patches.append(&mut piece.patches);
+}
+
+/// The network of a piece along its form, or of a partition where that is worth more. A number of patches is asked for of the
+/// whole mesh.
+fn lay(piece: &Piece, params: &LayoutParams, observer: &dyn Observer) -> Result<(Network, Method), LayoutError> {
+    let of_piece = |patches: usize| ((piece.share * patches as f64).round() as usize).max(1);
+    let params = &match params.patches {
+        0 => params.clone(),
+        patches => LayoutParams { patches: of_piece(patches).min(most_patches(piece.mesh)), ..params.clone() },
+    };
+    let along = aligned::lay(piece, params, observer);
     let (along, why) = match along {
         Ok(laid) if params.coarsest || laid.is_final() => return Ok(laid.into()),
         Ok(laid) if laid.worth.is_kept() => {
@@ -197,22 +278,22 @@ pub fn layout(
     let asked = aligned::asked(params);
     let patches = match params.patches {
         _ if params.coarsest => 1,
-        0 => PARTITION_PATCHES,
+        0 => of_piece(PARTITION_PATCHES),
         patches => patches,
     };
     let params = LayoutParams { patches, ..params.clone() };
-    let (network, good_part) = partitioned((mesh, &adjacency), &sharp, corners, &params, observer)?;
+    let (network, good_part) = partitioned(piece, &params, observer)?;
     let worth = Worth::new(network.patches.len(), asked, good_part);
     match along {
         // Where neither is good the form is followed, unless that is worse.
         Some(laid) if !worth.exceeds(laid.worth) => Ok(laid.into()),
-        _ => Ok(Layout { network, method: Method::Partition { why } }),
+        _ => Ok((network, Method::Partition { why })),
     }
 }
 
-impl From<aligned::Laid> for Layout {
-    fn from(aligned::Laid { network, cones, deviation_deg, .. }: aligned::Laid) -> Layout {
-        Layout { network, method: Method::Field { cones, deviation_deg } }
+impl From<aligned::Laid> for (Network, Method) {
+    fn from(aligned::Laid { network, cones, deviation_deg, .. }: aligned::Laid) -> (Network, Method) {
+        (network, Method::Field { cones, deviation_deg })
     }
 }
 
@@ -223,12 +304,11 @@ pub fn most_patches(mesh: &TriMesh) -> usize {
 
 /// The network of a partition, and the part of its patches that a grid covers well.
 fn partitioned(
-    (mesh, adjacency): (&TriMesh, &Adjacency),
-    sharp: &[bool],
-    corners: &[bool],
+    &Piece { mesh, sharp, corners, .. }: &Piece,
     params: &LayoutParams,
     observer: &dyn Observer,
 ) -> Result<(Network, f64), LayoutError> {
+    let adjacency = Adjacency::new(mesh);
     let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
     let side = (area / params.patches.max(1) as f64).sqrt();
     let mut edge = EDGE_TO_SIDE * side;
@@ -462,4 +542,57 @@ fn common_face(adjacency: &Adjacency, triangles: &[[u32; 3]], pair: &[imprint::P
         .into_iter()
         .find(|&f| pair.iter().all(|p| p.on_face(adjacency, triangles, f).is_some()))
         .expect("neighbouring places share a face")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Silent;
+    use crate::network::imprint::imprint;
+    use crate::synthetic::shapes;
+    use glam::DVec3;
+
+    #[test]
+    fn each_piece_of_a_mesh_gets_a_network_of_its_own_and_small_ones_get_one_together() {
+        let mut mesh = TriMesh::default();
+        for (size, at) in [(2.0, 0.0), (1.0, 3.0), (0.1, 5.0), (0.05, 6.0)] {
+            let cube = shapes::cuboid(DVec3::splat(size), 5);
+            let base = mesh.points.len() as u32;
+            mesh.points.extend(cube.points.iter().map(|&p| p + at * DVec3::X));
+            // Not piece by piece.
+            let triangles = cube.triangles.iter().map(|t| t.map(|v| v + base));
+            mesh.triangles = triangles.chain(mesh.triangles.iter().copied()).collect();
+        }
+        let laid = layout(&mesh, Known::default(), &LayoutParams::default(), &Silent).unwrap();
+        let area = 4.0 + 1.0 + 0.01 + 0.0025;
+        for (&(share, ref method), wanted) in laid.pieces.iter().zip([4.0, 1.0, 0.0125]) {
+            assert!((share - wanted / area).abs() < 1e-9);
+            assert!(matches!(method, Method::Field { .. }), "{method:?}");
+        }
+        assert_eq!((laid.pieces.len(), laid.network.patches.len()), (3, 24));
+        let patches = imprint(&mesh, &laid.network, &Silent).expect("disks");
+        let covered: f64 =
+            patches.iter().map(|p| (0..p.mesh.triangles.len()).map(|f| p.mesh.area(f)).sum::<f64>()).sum();
+        assert!((covered - 6.0 * area).abs() < 1e-9, "{covered}");
+    }
+
+    #[test]
+    fn a_piece_that_no_map_follows_leaves_the_others_to_their_form() {
+        // Corners that are given need not be corners of the field.
+        let mesh = shapes::two_spheres(3);
+        let mut corners = vec![false; mesh.points.len()];
+        corners[0] = true;
+        let mut lines = vec![false; 3 * mesh.triangles.len()];
+        let adjacency = Adjacency::new(&mesh);
+        let h = adjacency.outgoing[0];
+        lines[h as usize] = true;
+        lines[adjacency.opposite[h as usize] as usize] = true;
+        let known = Known { sharp: &[], lines: &lines, corners: &corners };
+        let laid = layout(&mesh, known, &LayoutParams::default(), &Silent).unwrap();
+        assert!(
+            matches!(laid.pieces[..], [(_, Method::Partition { .. }), (_, Method::Field { .. })]),
+            "{:?}",
+            laid.pieces
+        );
+    }
 }

@@ -10,7 +10,7 @@ use crate::mend::Repairs;
 use crate::mesh::{self, CompareParams, Comparison, TriMesh};
 use crate::model::Model;
 use crate::network::{CurveKind, Network, PatchMesh};
-use crate::observe::{Cancelled, Observer, Part};
+use crate::observe::{Cancelled, Observer, Part, counted};
 use crate::relief::{self, PatchedMesh};
 use crate::surface::basis::uniform_parameters;
 use crate::surface::{self, BENT_DEG, Deviation, EdgeInSeam, SeamQuality, Surface};
@@ -211,7 +211,10 @@ pub(super) fn mesh_figures(
         warnings.push(Warning::new("mesh_repaired", in_words(repairs), ""));
     }
     if repairs.degenerate_left > 0 {
-        let text = format!("{} triangles without height could not be removed.", repairs.degenerate_left);
+        let text = format!(
+            "{} without height could not be removed.",
+            counted(repairs.degenerate_left, "triangle", "triangles")
+        );
         warnings.push(Warning::new("mesh_degenerate", text, ""));
     }
     if !facts.watertight {
@@ -228,39 +231,60 @@ pub(super) fn mesh_figures(
 
 /// What was repaired, as one sentence.
 fn in_words(repairs: &Repairs) -> String {
+    let without_height = repairs.collapsed_edges + repairs.flipped_edges + repairs.trimmed_faces;
     let done = [
-        (repairs.welded_vertices, "vertices at one place merged"),
-        (repairs.repeated_faces, "triangles with a repeated vertex dropped"),
-        (repairs.duplicate_faces, "duplicate triangles dropped"),
-        (repairs.cut_edges, "edges of more than two triangles cut"),
-        (repairs.one_sided_edges, "edges of one-sided pieces cut"),
-        (repairs.turned_faces, "triangles turned round"),
-        (repairs.turned_components, "pieces turned inside out"),
-        (repairs.split_vertices, "vertices split"),
-        (repairs.collapsed_edges + repairs.flipped_edges + repairs.trimmed_faces, "triangles without height removed"),
-        (repairs.closed_handles, "tiny handles cut and closed"),
-        (repairs.closed_holes, "tiny holes closed"),
-        (repairs.unreferenced_vertices, "unused vertices dropped"),
+        (repairs.welded_vertices, ["vertex", "vertices"], "at one place merged"),
+        (repairs.repeated_faces, ["triangle", "triangles"], "with a repeated vertex dropped"),
+        (repairs.duplicate_faces, ["duplicate triangle", "duplicate triangles"], "dropped"),
+        (repairs.cut_edges, ["edge", "edges"], "of more than two triangles cut"),
+        (repairs.one_sided_edges, ["edge", "edges"], "of one-sided pieces cut"),
+        (repairs.turned_faces, ["triangle", "triangles"], "turned round"),
+        (repairs.turned_components, ["piece", "pieces"], "turned inside out"),
+        (repairs.split_vertices, ["vertex", "vertices"], "split"),
+        (without_height, ["triangle", "triangles"], "without height removed"),
+        (repairs.closed_handles, ["tiny handle", "tiny handles"], "cut and closed"),
+        (repairs.closed_holes, ["tiny hole", "tiny holes"], "closed"),
+        (repairs.unreferenced_vertices, ["unused vertex", "unused vertices"], "dropped"),
     ];
-    let words: Vec<String> = done.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+    let done = done.iter().filter(|(n, ..)| *n > 0);
+    let words: Vec<String> = done.map(|(n, [one, many], what)| format!("{} {what}", counted(*n, one, many))).collect();
     format!("The mesh was repaired: {}.", words.join(", "))
 }
 
-/// How the network was laid, and what to do where it does not follow the form.
-pub(super) fn method_figures(method: &Method, quality: &mut Quality, warnings: &mut Vec<Warning>) {
-    match method {
-        Method::Field { cones, deviation_deg } => {
-            quality.insert("layout.cones".into(), Figure::Count(*cones as u64));
-            quality.insert("layout.deviation_deg".into(), Figure::Number(*deviation_deg));
-        }
-        Method::Partition { why } => {
-            let message = format!(
-                "The network does not follow the form, for {why}; its patches are even instead. More or fewer sharp edges \
-                 (the sharp angle of the layout), or another number of patches, may help."
-            );
-            warnings.push(Warning::new("layout_partition", message, ""));
+/// How the patches of each piece were laid, and what to do where they do not follow its form.
+/// * `pieces` - with their parts of the area; none for a network that was not made here
+pub(super) fn method_figures(pieces: &[(f64, Method)], quality: &mut Quality, warnings: &mut Vec<Warning>) {
+    let (mut cones, mut deviation, mut along) = (0, 0.0, 0.0);
+    let mut reasons = Vec::new();
+    for (share, method) in pieces {
+        match method {
+            Method::Field { cones: own, deviation_deg } => {
+                cones += own;
+                deviation += share * deviation_deg;
+                along += share;
+            }
+            Method::Partition { why } => reasons.push(why),
         }
     }
+    if along > 0.0 {
+        quality.insert("layout.cones".into(), Figure::Count(cones as u64));
+        quality.insert("layout.deviation_deg".into(), Figure::Number(deviation / along));
+        quality.insert("layout.along_form_share".into(), Figure::Number(along.min(1.0)));
+    }
+    // The largest piece comes first.
+    let Some(why) = reasons.first() else { return };
+    let (of, in_largest) = match (reasons.len(), pieces.len()) {
+        (_, 1) => (String::new(), ""),
+        (n, all) => (
+            format!(" of {n} of {all} pieces, {:.1} % of the area,", 100.0 * (1.0 - along)),
+            if n > 1 { " in the largest" } else { "" },
+        ),
+    };
+    let message = format!(
+        "The network{of} does not follow the form, for{in_largest} {why}; its patches are even instead. More or fewer sharp edges \
+         (the sharp angle of the layout), or another number of patches, may help."
+    );
+    warnings.push(Warning::new("layout_partition", message, ""));
 }
 
 pub(super) fn network_figures(network: &Network, quality: &mut Quality) {
@@ -299,7 +323,10 @@ fn grid_figures(
     if folds > 0 {
         let places: Vec<String> =
             grids.iter().enumerate().filter(|(_, g)| g.folds > 0).map(|(p, _)| p.to_string()).collect();
-        let text = format!("{folds} grid cells are folded over. An iso-curve through the middle of the patch helps.");
+        let text = format!(
+            "{} folded over. An iso-curve through the middle of the patch helps.",
+            counted(folds, "grid cell is", "grid cells are")
+        );
         let worst = (0..grids.len()).max_by_key(|&p| (grids[p].folds, std::cmp::Reverse(p))).unwrap_or_default();
         let step = across(&model.grids[worst]);
         warnings.push(Warning::new("grid_folds", text, format!("patches {}", few(&places))).with_step(step));
@@ -348,7 +375,10 @@ fn seam_figures(
     quality.insert("seam.folded".into(), Figure::Count(folded.len() as u64));
     if let Some(at) = folded.first().and_then(|s| inner.get(&s.curve)) {
         let names: Vec<String> = folded.iter().map(|s| s.curve.to_string()).collect();
-        let text = format!("{} smooth seams are folded over: the surfaces beside them turn back.", folded.len());
+        let text = format!(
+            "{} folded over: the surfaces beside turn back.",
+            counted(folded.len(), "smooth seam is", "smooth seams are")
+        );
         warnings.push(Warning::new("seam_folds", text, format!("curves {}", few(&names))).with_step(relax_near(at.1)));
     }
     let rms = if total > 0.0 { (squares / total).sqrt() } else { 0.0 };
@@ -356,9 +386,9 @@ fn seam_figures(
     let bent = smooth.iter().filter(|s| inner_of(s) > BENT_DEG).count();
     if bent > 0 {
         let text = format!(
-            "{bent} of {} smooth seams bend by more than {BENT_DEG} degrees somewhere, {widest:.2} at most; \
+            "{bent} of {} by more than {BENT_DEG} degrees somewhere, {widest:.2} at most; \
              along all smooth seams it is {rms:.2} RMS.",
-            smooth.len()
+            counted(smooth.len(), "smooth seam bends", "smooth seams bend")
         );
         let mut worst: Vec<&&SeamQuality> = smooth.iter().collect();
         worst.sort_by(|a, b| inner_of(b).total_cmp(&inner_of(a)).then(a.curve.cmp(&b.curve)));
@@ -386,8 +416,8 @@ fn edge_figures(
     sorted.sort_by(worst_first);
     let Some(worst) = sorted.first() else { return };
     let text = format!(
-        "{} pieces of seams are not smooth: the grids meet at more than {} degrees, {:.0} at most. They keep that angle.",
-        edges.len(),
+        "{} not smooth: the grids meet at more than {} degrees, {:.0} at most. That angle stays.",
+        counted(edges.len(), "piece of a seam is", "pieces of seams are"),
         surface::EDGE_ANGLE_DEG,
         worst.angle_deg
     );

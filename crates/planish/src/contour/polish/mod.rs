@@ -472,17 +472,17 @@ const TRIANGLES_PER_CHUNK: usize = 1 << 14;
 fn thin(mesh: &TriMesh) -> Vec<u32> {
     use rayon::prelude::*;
     let least = 2.0 * DEGENERATE_AREA * mesh.bounds().diagonal().powi(2);
-    let thin = |t: &[u32; 3]| {
+    let has_area = |t: &[u32; 3]| {
         let [a, b, c] = *t;
         let (a, b, c) = (mesh.points[a as usize], mesh.points[b as usize], mesh.points[c as usize]);
-        !((b - a).cross(c - a).length() / 2.0 > least)
+        (b - a).cross(c - a).length() / 2.0 > least
     };
     let parts: Vec<Vec<u32>> = mesh
         .triangles
         .par_chunks(TRIANGLES_PER_CHUNK)
         .enumerate()
         .map(|(n, part)| {
-            (0..part.len()).filter(|&t| thin(&part[t])).map(|t| (n * TRIANGLES_PER_CHUNK + t) as u32).collect()
+            (0..part.len()).filter(|&t| !has_area(&part[t])).map(|t| (n * TRIANGLES_PER_CHUNK + t) as u32).collect()
         })
         .collect();
     parts.concat()

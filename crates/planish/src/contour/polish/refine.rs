@@ -74,7 +74,8 @@ impl Creases for FieldCreases<'_> {
                 break;
             }
             let q = solve(&[s, t, (guess, plane)], p, Shape::Corner);
-            if !(q.distance(guess) < size) {
+            let is_near = q.distance(guess) < size;
+            if !is_near {
                 break;
             }
             p = q;
@@ -108,7 +109,8 @@ impl Creases for FieldCreases<'_> {
             let near = if shape == Shape::Edge && through.len() == 2 { (through[0] + through[1]) / 2.0 } else { p };
             let near = if found.is_some() { p } else { near };
             let q = solve(&planes, near, shape);
-            if !(q.distance(guess) < size) {
+            let is_near = q.distance(guess) < size;
+            if !is_near {
                 break;
             }
             p = q;
@@ -136,7 +138,8 @@ impl Creases for FieldCreases<'_> {
         }
         let mut p = solve(hits, guess, Shape::Corner);
         for share in HIT_FRACTIONS {
-            if !(p.distance(guess) < reach) {
+            let is_near = p.distance(guess) < reach;
+            if !is_near {
                 return None;
             }
             let planes: Vec<_> = hits.iter().filter_map(|&hit| self.again(p, hit, share, None)).collect();

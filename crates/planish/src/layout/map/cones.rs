@@ -61,7 +61,7 @@ impl Charts {
         }
         let axis = theta.iter().zip(&turned).map(|(theta, &m)| theta + f64::from(m) * FRAC_PI_2).collect();
         let cut = prune(mesh, adjacency, &jump, &index, &tree);
-        Charts { axis, jump, cut, index, sectors, tight, scale, effort: Effort::default() }
+        Charts { axis, jump, cut, index, sectors, tight, scale, effort: Effort::new(1.0) }
     }
 
     /// Vertices where a map has to have a corner of a patch: cones, and places where lines end, meet or turn.

@@ -9,16 +9,24 @@ const MOST_EFFORT: u64 = 400_000_000;
 
 /// Faces whose energy was asked for, over all maps of a layout together: what most of their time goes by, and the same on
 /// any machine.
-#[derive(Clone, Debug, Default)]
-pub(in crate::layout) struct Effort(Arc<AtomicU64>);
+#[derive(Clone, Debug)]
+pub(in crate::layout) struct Effort {
+    spent: Arc<AtomicU64>,
+    most: u64,
+}
 
 impl Effort {
+    /// For a piece with this share of the area of a mesh.
+    pub fn new(share: f64) -> Effort {
+        Effort { spent: Arc::default(), most: (share * MOST_EFFORT as f64) as u64 }
+    }
+
     pub fn add(&self, faces: usize) {
-        self.0.fetch_add(faces as u64, Ordering::Relaxed);
+        self.spent.fetch_add(faces as u64, Ordering::Relaxed);
     }
 
     /// True once the maps of a layout have had their share of work: those that are not there by then are given up.
     pub fn is_spent(&self) -> bool {
-        self.0.load(Ordering::Relaxed) > MOST_EFFORT
+        self.spent.load(Ordering::Relaxed) > self.most
     }
 }

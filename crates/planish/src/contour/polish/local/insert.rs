@@ -90,7 +90,7 @@ impl Local<'_> {
             self.mesh.triangles[t as usize] = [a, b, v];
         }
         let wide = changed.iter().all(|&t| self.mesh.area(t as usize) > self.least);
-        let stray = |t: &u32| normals.iter().all(|n| !(self.mesh.normal(*t as usize).dot(*n) > LEANING_COSINE));
+        let stray = |t: &u32| !normals.iter().any(|n| self.mesh.normal(*t as usize).dot(*n) > LEANING_COSINE);
         let doubtful: Vec<u32> = changed.iter().copied().filter(stray).collect();
         if !(wide && self.leaning(&doubtful) <= leaning && self.is_embedded(&changed)) {
             self.mesh.points.pop();
