@@ -73,7 +73,8 @@ const FORCED: f64 = 0.85;
 /// Rounds of settling for each round of smoothing asked for: a round redraws disjoint unions only.
 const SETTLING_PER_SMOOTHING: usize = 8;
 
-/// Patches of a typical layout: the scale of directions goes by their side, and pieces of less area than one are small.
+/// Patches of a typical layout; default ones of the measured meshes have 33 to 285. The scale of directions goes by their side, and
+/// pieces of less area than one are small.
 const TYPICAL_PATCHES: f64 = 100.0;
 
 /// Patches of a partition where no number is asked for.

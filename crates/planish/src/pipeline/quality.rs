@@ -218,9 +218,8 @@ pub(super) fn mesh_figures(
         warnings.push(Warning::new("mesh_degenerate", text, ""));
     }
     if !facts.watertight {
-        let loops = facts.boundary_loops;
-        let holes = if loops == 1 { "one boundary".into() } else { format!("{loops} boundaries") };
-        let text = format!("The mesh is open: it has {holes}. The surfaces form an open shell, not a solid.");
+        let rims = counted(facts.boundary_loops, "boundary", "boundaries");
+        let text = format!("The mesh is open: it has {rims}. The surfaces form an open shell, not a solid.");
         warnings.push(Warning::new("mesh_open", text, ""));
     }
     if facts.components > 1 {
