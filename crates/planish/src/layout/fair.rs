@@ -4,7 +4,7 @@
 //! nodes it goes by the map of single triangles. So it is smoothed in space: of places `y` at even steps along the arc, drawn
 //! at `x`, those are taken that minimise `sum |y - x|² + lambda sum |D y|²`, with `D` the second difference. The ends stay, and
 //! their `D` is taken against directions that part the sectors around the node evenly. The curve is brought back to the
-//! closest places of the two cells beside the arc, so that arcs do not cross. See `docs/methods/layout.md`, step 8.
+//! closest places of the two cells beside the arc, so that arcs do not cross; an arc whose curve leaves them stays. See `docs/methods/layout.md`, step 8.
 
 use super::complex::{Arc, Complex};
 use super::improve::{LEAST_SETTLING, arc_change};
@@ -13,7 +13,7 @@ use crate::geom::{Bvh, Triangles, polyline};
 use crate::linalg::{Banded, BandedCholesky};
 use crate::mesh::NONE;
 use crate::mesh::disjoint::disjoint;
-use crate::network::imprint::Place;
+use crate::network::imprint::{self, Place};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -215,12 +215,16 @@ fn draw(bench: &Bench, change: &Change, curve: &Samples) -> Option<Vec<Place>> {
     let (disk, uv) = (&union.disk, &union.uv);
     let points: Vec<DVec3> = disk.vertices.iter().map(|&v| embedding.cut.mesh.points[v as usize]).collect();
     let tree = Bvh::new(Triangles { points: &points, triangles: &disk.triangles });
-    let in_map = |&p: &DVec3| -> DVec2 {
+    let in_map = |&p: &DVec3| -> Option<DVec2> {
         let place = tree.closest(p).place;
+        // A curve that leaves both cells would touch what bounds them, and pinch one.
+        if imprint::place_of(&disk.adjacency, &disk.triangles, &place).is_on_boundary(&disk.adjacency) {
+            return None;
+        }
         let corners = disk.triangles[place.face as usize].map(|v| uv[v as usize]);
-        corners.into_iter().zip(place.bary).map(|(corner, weight)| corner * weight).sum()
+        Some(corners.into_iter().zip(place.bary).map(|(corner, weight)| corner * weight).sum())
     };
-    let via: Vec<DVec2> = curve[1..curve.len() - 1].iter().map(in_map).collect();
+    let via: Vec<DVec2> = curve[1..curve.len() - 1].iter().map(in_map).collect::<Option<_>>()?;
     let &(from, to) = change.lines.first()?;
     let ends = [from, to].map(|i| disk.boundary[union.corners[i]]);
     embedding.polyline((bench.mesh, bench.adjacency), (disk, uv), ends, &via)
@@ -228,8 +232,34 @@ fn draw(bench: &Bench, change: &Change, curve: &Samples) -> Option<Vec<Place>> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::map::polycube;
+    use super::super::partition::{Ground, outline};
     use super::*;
+    use crate::mesh::Adjacency;
     use std::f64::consts::PI;
+
+    #[test]
+    fn a_curve_around_the_inner_corner_of_an_l_does_not_touch_it() {
+        let fine = 8;
+        let mesh = polycube::flat(&[[0, 0], [1, 0], [0, 1]], fine).mesh;
+        let adjacency = Adjacency::new(&mesh);
+        // A strip one square wide runs along the inner walls.
+        let inner = f64::from(fine);
+        let is_strip = |p: DVec3| p.x > inner - 1.0 && p.y > inner - 1.0;
+        let middle = |f: usize| mesh.corners(f).into_iter().sum::<DVec3>() / 3.0;
+        let label: Vec<u32> = (0..mesh.triangles.len()).map(|f| u32::from(is_strip(middle(f)))).collect();
+        let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+        let is_corner = |p: &DVec3| corners.contains(&[p.x / inner, p.y / inner]);
+        let corner: Vec<bool> = mesh.points.iter().map(is_corner).collect();
+        let lines = vec![false; adjacency.opposite.len()];
+        let complex = outline::outline(&Ground::new(&mesh, &adjacency, &lines), &label, 2, &corner);
+        let mut bench = Bench::new(&mesh, &adjacency, complex).expect("two cells");
+        fair(&mut bench);
+        let smooth = bench.complex.live_arcs().map(|a| bench.complex.arc(2 * a)).find(|arc| arc.kind.is_smooth());
+        let chain = &smooth.expect("the curve").chain;
+        let touches = chain[1..chain.len() - 1].iter().any(|place| place.is_on_boundary(&adjacency));
+        assert!(!touches, "{chain:?}");
+    }
 
     fn sampled_from(place: impl Fn(f64) -> DVec3) -> Samples {
         (0..=CURVE_STEPS).map(|k| place(k as f64 / CURVE_STEPS as f64)).collect()

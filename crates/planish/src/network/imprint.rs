@@ -135,6 +135,15 @@ pub(crate) fn canonical(adjacency: &Adjacency, h: u32, t: f64) -> Place {
 }
 
 impl Place {
+    /// True on a boundary edge of the mesh or at the end of one.
+    pub fn is_on_boundary(&self, adjacency: &Adjacency) -> bool {
+        match *self {
+            Place::Vertex(v) => adjacency.is_boundary_vertex(v),
+            Place::Edge(h, _) => adjacency.opposite[h as usize] == NONE,
+            Place::Face(_) => false,
+        }
+    }
+
     /// World position.
     pub fn position(&self, mesh: &TriMesh) -> DVec3 {
         match *self {
