@@ -231,11 +231,15 @@ fn regress_a_wedge_of_15_degrees_has_12_patches_whose_grids_and_seams_are_not_fo
 }
 
 #[test]
-fn meshes_without_faces_or_with_three_faces_on_an_edge_are_refused() {
+fn meshes_without_faces_with_three_faces_on_an_edge_or_of_loose_triangles_are_refused() {
     assert_eq!(layout(&TriMesh::default(), Known::default(), &params(10), &Silent), Err(LayoutError::Empty));
     let points = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, -DVec3::Y];
     let mesh = TriMesh::new(points, vec![[0, 1, 2], [1, 0, 3], [0, 1, 4]]);
     assert_eq!(layout(&mesh, Known::default(), &params(10), &Silent), Err(LayoutError::NotManifold { edges: 1 }));
+    let points = (0..9).map(|k| DVec3::new(f64::from(k / 3) + 0.4 * f64::from(k % 3), f64::from(k % 3 / 2), 0.0));
+    let mesh = TriMesh::new(points.collect(), vec![[0, 1, 2], [3, 4, 5], [6, 7, 8]]);
+    let loose = Err(LayoutError::Loose { pieces: 3, triangles: 3 });
+    assert_eq!(layout(&mesh, Known::default(), &params(10), &Silent), loose);
 }
 
 /// A unit square of two triangles as one patch, with `extra` curves.

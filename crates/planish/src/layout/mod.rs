@@ -119,6 +119,17 @@ pub enum LayoutError {
         /// Number of such edges.
         edges: usize,
     },
+    /// There are more pieces than [`most_patches`].
+    #[error(
+        "the mesh has {pieces} pieces of {triangles} triangles together, too few for a patch on each - hint: loose triangles are no \
+         surface, see `planish info`"
+    )]
+    Loose {
+        /// Number of pieces.
+        pieces: usize,
+        /// Triangles of the mesh.
+        triangles: usize,
+    },
     /// The faces do not allow a network, even when split.
     #[error("no four-sided network was found on {faces} faces - hint: look for degenerate faces with `planish info`")]
     Stuck {
@@ -185,7 +196,8 @@ struct Piece<'a> {
 ///
 /// Sharp lines and boundaries lie on patch boundaries; every patch is an exact disk ([`crate::network::imprint`]).
 /// # Errors
-/// `NotManifold` for a mesh that needs repair, `Stuck` if its faces are degenerate beyond use; `Cancelled`.
+/// `NotManifold` for a mesh that needs repair, `Loose` for single triangles, `Stuck` if its faces are degenerate beyond use;
+/// `Cancelled`.
 pub fn layout(
     mesh: &TriMesh,
     known: Known,
@@ -195,9 +207,13 @@ pub fn layout(
     let Known { sharp: tagged, lines, corners } = known;
     check(mesh)?;
     let adjacency = Adjacency::new(mesh);
+    let (piece_of, pieces) = components(&adjacency);
+    if pieces > most_patches(mesh) {
+        return Err(LayoutError::Loose { pieces, triangles: mesh.triangles.len() });
+    }
     let mut sharp = lines::feature_lines(mesh, &adjacency, tagged, params, observer)?;
     sharp.iter_mut().zip(lines).for_each(|(s, &line)| *s |= line);
-    let groups = pieces(mesh, &adjacency);
+    let groups = grouped(mesh, &piece_of, pieces);
     if let [_] = groups[..] {
         let piece = Piece { mesh, sharp: &sharp, corners, share: 1.0 };
         let (network, method) = lay(&piece, params, observer)?;
@@ -221,10 +237,10 @@ pub fn layout(
 
 /// The pieces of a mesh with their shares of its area, the largest first; those too small for one of [`TYPICAL_PATCHES`] are
 /// the last one together.
-fn pieces(mesh: &TriMesh, adjacency: &Adjacency) -> Vec<(Vec<u32>, f64)> {
-    let (label, count) = components(adjacency);
-    let mut found: Vec<(Vec<u32>, f64)> = vec![Default::default(); count];
-    for (f, &piece) in label.iter().enumerate() {
+/// * `piece_of` - for each face its piece
+fn grouped(mesh: &TriMesh, piece_of: &[u32], pieces: usize) -> Vec<(Vec<u32>, f64)> {
+    let mut found: Vec<(Vec<u32>, f64)> = vec![Default::default(); pieces];
+    for (f, &piece) in piece_of.iter().enumerate() {
         found[piece as usize].0.push(f as u32);
         found[piece as usize].1 += mesh.area(f);
     }

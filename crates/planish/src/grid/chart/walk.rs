@@ -7,9 +7,6 @@ use super::locate::{Spot, orientation};
 use crate::mesh::{NONE, next, previous};
 use glam::{DVec2, DVec3};
 
-/// Triangles that one walk may cross; beyond, it ends where it is.
-const WALK_LIMIT: usize = 20_000;
-
 impl Chart {
     /// Place of a spot in the square.
     pub fn uv_of(&self, spot: Spot) -> DVec2 {
@@ -62,7 +59,7 @@ impl Chart {
                 out = h;
             }
         }
-        for _ in 0..WALK_LIMIT {
+        for _ in 0..self.triangles.len() {
             if out == NONE {
                 return;
             }
@@ -84,13 +81,14 @@ impl Chart {
     }
 
     /// Moves from `from` straight over the surface by `step`, a vector near the tangent plane: laid into the
-    /// triangle with its length kept and unfolded over every edge (MovePointOnSurface of [K98]). Ends at the boundary.
+    /// triangle with its length kept and unfolded over every edge (MovePointOnSurface of [K98]). Ends at the boundary, and after as many
+    /// triangles as the chart has: it goes around a spike then.
     pub fn advance(&self, from: Spot, step: DVec3) -> Spot {
         let mut spot = from;
         let mut left = step.length();
         let mut direction = step;
         let mut entered = 3;
-        for _ in 0..WALK_LIMIT {
+        for _ in 0..self.triangles.len() {
             let corners = self.triangles[spot.triangle as usize].map(|v| self.points[v as usize]);
             let [a, b, c] = corners;
             let normal = (b - a).cross(c - a);

@@ -29,9 +29,21 @@ const SCALES: usize = 40;
 const SCALE_STEP: f64 = std::f64::consts::SQRT_2;
 /// Passes over all edges with one length of change.
 const SWEEPS: u64 = 12;
-/// Limit of the cost of a walk while walks are plenty: this part of what its first change gains, and some steps on top.
-/// Longer ones come last: they are few.
-const NEAR: (f64, f64) = (3.0, 20.0 * STEP);
+/// How far walks are looked for.
+#[derive(Clone, Copy)]
+struct Reach {
+    /// Limit of the cost of a walk: so many times what its first change gains, and `on_top`.
+    gains: f64,
+    on_top: f64,
+    /// States that all searches together may settle.
+    states: usize,
+}
+
+/// While walks are plenty: longer ones come last, they are few.
+const NEAR: Reach = Reach { gains: 3.0, on_top: 20.0 * STEP, states: usize::MAX };
+/// Walks of any length that turn nothing over. A search may settle all states, so their work grows with the square of the
+/// triangles; it is bounded to some seconds, sixteen times what 200 triangles need.
+const FAR: Reach = Reach { gains: 0.0, on_top: OVERTURNED, states: 1 << 24 };
 /// What counts as an improvement, against the sum of all.
 const GAIN: f64 = 1e-9;
 /// Seed of the order in which edges are tried.
@@ -71,6 +83,8 @@ pub(super) struct Whole {
     wish: Vec<DVec2>,
     /// Mean square length of the edges of the map.
     mean: f64,
+    /// States that searches have settled.
+    settled: usize,
 }
 
 /// Where a search began and what ends it.
@@ -93,7 +107,7 @@ impl Whole {
         let mut scales = vec![scale; pieces.iter().max().map_or(0, |&p| p as usize + 1)];
         let mean = flat.edge.iter().map(|e| e.length_squared()).sum::<f64>() / flat.edge.len().max(1) as f64;
         let weight = flat.edge.iter().map(|&e| weight(e, mean)).collect();
-        let mut whole = Whole { flat, q: Vec::new(), weight, wish: Vec::new(), mean };
+        let mut whole = Whole { flat, q: Vec::new(), weight, wish: Vec::new(), mean, settled: 0 };
         for _ in 0..SCALES {
             observer.check()?;
             let at = |h: usize| whole.flat.edge[h] * scales[pieces[h / 3] as usize];
@@ -240,7 +254,7 @@ impl Whole {
 
     /// The cheapest walk from one of some states to the goal, as changes of half-edges.
     /// * `size` - length of the change
-    fn search(&self, sources: &[State], size: i64, goal: Goal, limit: f64) -> Option<Vec<(u32, I64Vec2)>> {
+    fn search(&mut self, sources: &[State], size: i64, goal: Goal, limit: f64) -> Option<Vec<(u32, I64Vec2)>> {
         let mut search = Search::over(Dense::new(4 * self.q.len()));
         for &state in sources {
             search.reach(state, 0.0, NONE);
@@ -248,6 +262,7 @@ impl Whole {
         // Cost of the best end so far, the state before it and the half-edge changed last.
         let mut best = (limit, NONE, NONE);
         while let Some((state, distance)) = search.settle() {
+            self.settled += 1;
             if distance >= best.0 {
                 break;
             }
@@ -271,7 +286,7 @@ impl Whole {
                 };
                 if ends && total < best.0 {
                     best = (total, state, h);
-                } else if !ends && reached != NONE {
+                } else if !ends && reached != NONE && total < best.0 {
                     search.reach(reached, total, state);
                 }
             }
@@ -326,22 +341,30 @@ impl Whole {
     /// # Errors
     /// [`Cancelled`] by the observer.
     pub fn descend_far(&mut self, observer: &dyn Observer) -> Result<(), Cancelled> {
-        self.sweeps(1, (0.0, OVERTURNED), observer)
+        self.sweeps(1, FAR, observer)
     }
 
     /// Tries all edges with one length of change until nothing is gained.
-    /// * `far` - limit of the cost of a walk: part of what its first change gains, and what comes on top
-    fn sweeps(&mut self, size: i64, far: (f64, f64), observer: &dyn Observer) -> Result<(), Cancelled> {
+    fn sweeps(&mut self, size: i64, reach: Reach, observer: &dyn Observer) -> Result<(), Cancelled> {
+        let most = self.settled.saturating_add(reach.states);
         for number in 0..SWEEPS {
-            if !self.sweep(size, far, number, observer)? {
+            if !self.sweep(size, reach, (number, most), observer)? {
                 break;
             }
         }
         Ok(())
     }
 
-    /// Tries each edge once; true if something was gained.
-    fn sweep(&mut self, size: i64, far: (f64, f64), number: u64, observer: &dyn Observer) -> Result<bool, Cancelled> {
+    /// Tries each edge once; true if something was gained and there is more to try.
+    /// * `number` - of the sweep
+    /// * `most` - where the count of settled states ends it
+    fn sweep(
+        &mut self,
+        size: i64,
+        reach: Reach,
+        (number, most): (u64, usize),
+        observer: &dyn Observer,
+    ) -> Result<bool, Cancelled> {
         let opposite = &self.flat.opposite;
         let mut order: Vec<u32> = (0..opposite.len() as u32).filter(|&h| opposite[h as usize] > h).collect();
         order.sort_by_key(|&h| random::bits(SEED + number, u64::from(h)));
@@ -349,8 +372,11 @@ impl Whole {
         let mut gained = false;
         for h in order {
             observer.check()?;
+            if self.settled > most {
+                return Ok(false);
+            }
             for direction in 0..4 {
-                while self.improve(h, direction, size, far, least) {
+                while self.improve(h, direction, size, reach, least) {
                     gained = true;
                 }
             }
@@ -359,14 +385,14 @@ impl Whole {
     }
 
     /// Applies the cheapest walk that begins with a change of a half-edge, if that is a gain.
-    fn improve(&mut self, h: u32, direction: u32, size: i64, far: (f64, f64), least: f64) -> bool {
+    fn improve(&mut self, h: u32, direction: u32, size: i64, reach: Reach, least: f64) -> bool {
         let change = unit(direction) * size;
         let now = self.q[h as usize];
         let gain = self.cost(h, now) - self.cost(h, now + change);
         if !self.is_free(h, direction) || !is_positive(gain) {
             return false;
         }
-        let limit = far.0 * gain + far.1;
+        let limit = reach.gains * gain + reach.on_top;
         let o = self.flat.opposite[h as usize];
         let walk = if o == NONE {
             let walk = self.search(&[4 * h + direction], size, Goal::Rim, limit);
