@@ -238,27 +238,28 @@ mod tests {
     use crate::mesh::Adjacency;
     use std::f64::consts::PI;
 
-    #[test]
-    fn a_curve_around_the_inner_corner_of_an_l_does_not_touch_it() {
+    /// What is drawn of the fair curve of a strip along the inner walls of an L, so many squares of an eighth wide.
+    fn drawn_around_an_inner_corner(width: i32) -> Option<Vec<Place>> {
         let fine = 8;
         let mesh = polycube::flat(&[[0, 0], [1, 0], [0, 1]], fine).mesh;
         let adjacency = Adjacency::new(&mesh);
-        // A strip one square wide runs along the inner walls.
-        let inner = f64::from(fine);
-        let is_strip = |p: DVec3| p.x > inner - 1.0 && p.y > inner - 1.0;
+        let inner = 1.0 - f64::from(width) / f64::from(fine);
         let middle = |f: usize| mesh.corners(f).into_iter().sum::<DVec3>() / 3.0;
-        let label: Vec<u32> = (0..mesh.triangles.len()).map(|f| u32::from(is_strip(middle(f)))).collect();
-        let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
-        let is_corner = |p: &DVec3| corners.contains(&[p.x / inner, p.y / inner]);
-        let corner: Vec<bool> = mesh.points.iter().map(is_corner).collect();
+        let is_strip = |f: usize| middle(f).truncate().cmpgt(DVec2::splat(inner)).all();
+        let label: Vec<u32> = (0..mesh.triangles.len()).map(|f| u32::from(is_strip(f))).collect();
         let lines = vec![false; adjacency.opposite.len()];
+        let corner = vec![false; mesh.points.len()];
         let complex = outline::outline(&Ground::new(&mesh, &adjacency, &lines), &label, 2, &corner);
-        let mut bench = Bench::new(&mesh, &adjacency, complex).expect("two cells");
-        fair(&mut bench);
-        let smooth = bench.complex.live_arcs().map(|a| bench.complex.arc(2 * a)).find(|arc| arc.kind.is_smooth());
-        let chain = &smooth.expect("the curve").chain;
-        let touches = chain[1..chain.len() - 1].iter().any(|place| place.is_on_boundary(&adjacency));
-        assert!(!touches, "{chain:?}");
+        let bench = Bench::new(&mesh, &adjacency, complex).expect("two cells");
+        let arc = bench.complex.live_arcs().find(|&a| bench.complex.arc(2 * a).kind.is_smooth()).expect("the curve");
+        let change = arc_change(&bench.complex, arc).expect("two cells beside it");
+        draw(&bench, &change, curves(&bench)[arc as usize].as_ref().expect("a fair curve"))
+    }
+
+    #[test]
+    fn a_fair_curve_is_drawn_where_it_stays_within_its_cells_and_not_where_it_cuts_an_inner_corner() {
+        assert!(drawn_around_an_inner_corner(6).is_some());
+        assert_eq!(drawn_around_an_inner_corner(1), None);
     }
 
     fn sampled_from(place: impl Fn(f64) -> DVec3) -> Samples {

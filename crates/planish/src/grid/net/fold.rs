@@ -12,7 +12,7 @@ use super::{Net, cell_corners, turns_over};
 use crate::grid::Fault;
 use crate::grid::chart::locate::Spot;
 use crate::observe::Observer;
-use glam::DVec3;
+use glam::{DMat2, DVec2, DVec3};
 
 /// Cells to each side over which the normal is averaged.
 const NORMAL_CELLS: usize = 2;
@@ -25,14 +25,15 @@ const HANDFUL: usize = 8;
 const OPENING_ROUNDS: usize = 8;
 const RINGS: usize = 2;
 const OPENING_SWEEPS: usize = 24;
-/// Moves that are tried, in cells; if all points moved by less than the last but one, they rest.
-const TRIED_MOVES: [f64; 6] = [0.5, 0.25, 0.12, 0.06, 0.03, 0.01];
+/// Parts of a step that are tried, its greatest length in cells, and the length below which points rest.
+const TRIED_PARTS: [f64; 5] = [1.0, 0.5, 0.25, 0.12, 0.06];
+const GREATEST_STEP: f64 = 0.5;
 const STILL: f64 = 0.03;
 /// Least area, in cells, that a corner is taken to have, and the part of the worst folded one's that it has besides.
 const LEAST_AREA: f64 = 1e-3;
 const FOLDED_SHARE: f64 = 0.2;
-/// Step of a finite difference, in cells.
-const DIFFERENCE: f64 = 1e-4;
+/// Least curvature of the energy that a step counts on, against the greatest.
+const LEAST_CURVATURE: f64 = 1e-3;
 
 /// Grid points with the normal of the surface at each.
 pub struct Sheet<'a> {
@@ -122,7 +123,7 @@ pub fn open_folds(net: &mut Net, strictly: bool, observer: &dyn Observer) -> Res
         let region = Region::new(net, &folded, RINGS + round);
         for _ in 0..OPENING_SWEEPS {
             observer.check()?;
-            if region.sweep(net, strictly) < STILL {
+            if region.sweep(net, strictly) < STILL || region.is_open(net) {
                 break;
             }
         }
@@ -182,56 +183,87 @@ impl Region {
     /// Sum of the squares of both edges of corner `k` of cell `c`, and twice its area, in units of the
     /// wanted; nothing at a corner of the patch.
     fn corner(&self, net: &Net, c: usize, k: usize) -> Option<(f64, f64)> {
+        let (e, f, [a, b]) = self.edges(net, c, k)?;
+        Some((e.length_squared() / (a * a) + f.length_squared() / (b * b), e.cross(f).dot(self.normals[c]) / (a * b)))
+    }
+
+    /// Both edges of a corner and how long they are to be; nothing at a corner of the patch.
+    fn edges(&self, net: &Net, c: usize, k: usize) -> Option<(DVec3, DVec3, [f64; 2])> {
         let q = cell_corners(net.cols, c);
         if ends(net.cols, net.rows).contains(&q[k]) {
             return None;
         }
         let at = |n: usize| net.points[q[n % 4]];
-        let (e, f) = (at(k + 1) - at(k), at(k + 3) - at(k));
-        let [a, b] = [self.size[k % 2], self.size[(k + 1) % 2]];
-        Some((e.length_squared() / (a * a) + f.length_squared() / (b * b), e.cross(f).dot(self.normals[c]) / (a * b)))
+        Some((at(k + 1) - at(k), at(k + 3) - at(k), [self.size[k % 2], self.size[(k + 1) % 2]]))
+    }
+
+    /// The corners that the place of inner point `k` decides: cell, corner, and how many corners on from there the point is.
+    fn corners(cols: usize, k: usize) -> impl Iterator<Item = (usize, usize, usize)> {
+        // Corner of each of the cells at `k`; the one across does not see it.
+        let own = cells_around(cols, k).into_iter().zip([2, 3, 1, 0]);
+        own.flat_map(|(c, own)| [0, 1, 3].map(|on| (c, (own + 4 - on) % 4, on)))
     }
 
     /// Energy of the corners that the place of inner point `k` decides.
     fn energy(&self, net: &Net, k: usize) -> f64 {
-        let mut sum = 0.0;
-        for (n, c) in cells_around(net.cols, k).into_iter().enumerate() {
-            // Corner of the cell at `k`; the one across does not see it.
-            let own = [2, 3, 1, 0][n];
-            for corner in (0..4).filter(|&x| x != (own + 2) % 4) {
-                if let Some((squares, area)) = self.corner(net, c, corner) {
-                    sum += squares / (area + (area * area + self.least * self.least).sqrt());
-                }
-            }
-        }
-        sum
+        let of = |(c, corner, _)| {
+            let (squares, area) = self.corner(net, c, corner)?;
+            Some(squares / (area + area.hypot(self.least)))
+        };
+        Self::corners(net.cols, k).filter_map(of).sum()
     }
 
-    /// Moves every node once; returns the longest move, in cells.
+    /// Gradient and Hessian of that energy by moves of the point along two unit vectors. The squares are quadratic in its
+    /// place, and the area of a corner is affine.
+    fn slopes(&self, net: &Net, k: usize, along: [DVec3; 2]) -> (DVec2, DMat2) {
+        let (mut gradient, mut hessian) = (DVec2::ZERO, DMat2::ZERO);
+        let outer = |x: DVec2, y: DVec2| DMat2::from_cols(x * y.x, x * y.y);
+        for (c, corner, on) in Self::corners(net.cols, k) {
+            let Some((e, f, [a, b])) = self.edges(net, c, corner) else { continue };
+            let normal = self.normals[c] / (a * b);
+            let (e_part, f_part) = (2.0 / (a * a), 2.0 / (b * b));
+            let (by_squares, bend, by_area) = match on {
+                0 => (-e * e_part - f * f_part, e_part + f_part, (e - f).cross(normal)),
+                1 => (e * e_part, e_part, f.cross(normal)),
+                _ => (f * f_part, f_part, normal.cross(e)),
+            };
+            let flat = |v: DVec3| DVec2::new(v.dot(along[0]), v.dot(along[1]));
+            let (by_squares, by_area) = (flat(by_squares), flat(by_area));
+            let squares = (e.length_squared() * e_part + f.length_squared() * f_part) / 2.0;
+            let area = e.cross(f).dot(normal);
+            let root = area.hypot(self.least);
+            // g = area + root, its first derivative and its second, both over g.
+            let g = area + root;
+            let first = by_area / root;
+            let second = outer(by_area, by_area) * (self.least * self.least / (root * root * root * g));
+            gradient += (by_squares - first * squares) / g;
+            let mixed = outer(by_squares, first) + outer(first, by_squares);
+            let own = outer(first, first) * 2.0 - second;
+            hessian += (DMat2::from_diagonal(DVec2::splat(bend)) - mixed + own * squares) * (1.0 / g);
+        }
+        (gradient, hessian)
+    }
+
+    /// True if no corner of a cell around a node is turned over.
+    fn is_open(&self, net: &Net) -> bool {
+        let is_over = |(c, corner, _)| self.corner(net, c, corner).is_some_and(|(_, area)| area <= 0.0);
+        !self.nodes.iter().any(|&k| Self::corners(net.cols, k).any(is_over))
+    }
+
+    /// Moves every node once, by a step of Newton or a part of it; returns the longest move, in cells.
     fn sweep(&self, net: &mut Net, strictly: bool) -> f64 {
         let length = (self.size[0] * self.size[1]).sqrt();
         let mut longest = 0.0f64;
         for &k in &self.nodes {
             let before = self.energy(net, k);
-            let start = net.points[k];
-            let normal = net.chart.normal(net.spots[k]);
-            let (s, t) = normal.any_orthonormal_pair();
-            let slope = |net: &mut Net, direction: DVec3| {
-                let mut at = |h: f64| {
-                    net.points[k] = start + direction * (h * length);
-                    self.energy(net, k)
-                };
-                let slope = (at(DIFFERENCE) - at(-DIFFERENCE)) / (2.0 * DIFFERENCE);
-                net.points[k] = start;
-                slope
-            };
-            let gradient = s * slope(net, s) + t * slope(net, t);
-            let downhill = -gradient.normalize_or_zero() * length;
             let spot = net.spots[k];
-            for step in TRIED_MOVES {
-                place(net, k, net.chart.advance(spot, downhill * step));
+            let (s, t) = net.chart.normal(spot).any_orthonormal_pair();
+            let (gradient, hessian) = self.slopes(net, k, [s, t]);
+            let step = downhill(gradient, hessian).clamp_length_max(GREATEST_STEP * length);
+            for part in TRIED_PARTS {
+                place(net, k, net.chart.advance(spot, (s * step.x + t * step.y) * part));
                 if self.energy(net, k) < before && !(strictly && turns_around(net, k)) {
-                    longest = longest.max(step);
+                    longest = longest.max(part * step.length() / length);
                     break;
                 }
                 place(net, k, spot);
@@ -239,6 +271,17 @@ impl Region {
         }
         longest
     }
+}
+
+/// The step of Newton towards lower energy, where it bends upwards and where it does not: by the amounts of the eigenvalues.
+fn downhill(gradient: DVec2, hessian: DMat2) -> DVec2 {
+    let [a, b, c] = [hessian.x_axis.x, hessian.x_axis.y, hessian.y_axis.y];
+    let (mean, spread) = ((a + c) / 2.0, ((a - c) / 2.0).hypot(b));
+    let first = DVec2::from_angle((2.0 * b).atan2(a - c) / 2.0);
+    let values = [mean + spread, mean - spread].map(f64::abs);
+    let least = LEAST_CURVATURE * values[0].max(values[1]);
+    let step = |v: DVec2, value: f64| v * -v.dot(gradient) / value.max(least).max(f64::MIN_POSITIVE);
+    step(first, values[0]) + step(first.perp(), values[1])
 }
 
 /// Least sine of the corners of the four cells around inner point `k`.
@@ -259,4 +302,47 @@ pub fn place(net: &mut Net, k: usize, spot: Spot) -> Spot {
 /// True if one of the four cells around inner point `k` is not convex in the square.
 pub fn turns_around(net: &Net, k: usize) -> bool {
     cells_around(net.cols, k).into_iter().any(|c| turns_over(&net.uv, net.cols, c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::chart::tests::chart;
+
+    /// A net of 7 x 7 points over a bent sheet, and the region around its middle, whose point lies beyond a neighbour.
+    fn folded<'a>(chart: &'a crate::grid::chart::Chart) -> Net<'a> {
+        let mut net = Net::regular(chart, 7, 7);
+        let from = net.spots[24];
+        place(&mut net, 24, chart.locate(DVec2::new(0.74, 0.55), from.triangle));
+        net
+    }
+
+    #[test]
+    fn slopes_of_the_energy_are_its_differences_within_1e_6_and_a_pulled_point_comes_back() {
+        let chart = chart(|s, t| DVec3::new(s, t, 0.2 * s * t));
+        let mut net = folded(&chart);
+        let cells = folded_cells(&net);
+        assert!(!cells.is_empty());
+        let region = Region::new(&net, &cells, RINGS);
+        for k in [16, 24, 25] {
+            let (s, t) = net.chart.normal(net.spots[k]).any_orthonormal_pair();
+            let start = net.points[k];
+            let (gradient, hessian) = region.slopes(&net, k, [s, t]);
+            let step = 1e-5;
+            let mut slopes_at = |move_by: DVec3| {
+                net.points[k] = start + move_by;
+                let found = (region.energy(&net, k), region.slopes(&net, k, [s, t]).0);
+                net.points[k] = start;
+                found
+            };
+            for (i, axis) in [s, t].into_iter().enumerate() {
+                let [(less, before), (more, after)] = [-step, step].map(|h| slopes_at(axis * h));
+                let scale = hessian.x_axis.length().max(1.0);
+                assert!((gradient[i] - (more - less) / (2.0 * step)).abs() < 1e-6 * scale, "gradient {k}");
+                assert!((hessian.col(i) - (after - before) / (2.0 * step)).length() < 1e-6 * scale, "Hessian {k}");
+            }
+        }
+        assert!(open_folds(&mut net, false, &crate::Silent).expect("not cancelled"));
+        assert!(folded_cells(&net).is_empty());
+    }
 }
