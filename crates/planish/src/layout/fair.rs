@@ -238,9 +238,9 @@ mod tests {
     use crate::mesh::Adjacency;
     use std::f64::consts::PI;
 
-    /// What is drawn of the fair curve of a strip along the inner walls of an L, so many squares of an eighth wide.
+    /// What is drawn of the fair curve of a strip along the inner walls of an L, so many squares of 1/32 wide.
     fn drawn_around_an_inner_corner(width: i32) -> Option<Vec<Place>> {
-        let fine = 8;
+        let fine = 32;
         let mesh = polycube::flat(&[[0, 0], [1, 0], [0, 1]], fine).mesh;
         let adjacency = Adjacency::new(&mesh);
         let inner = 1.0 - f64::from(width) / f64::from(fine);
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn a_fair_curve_is_drawn_where_it_stays_within_its_cells_and_not_where_it_cuts_an_inner_corner() {
-        assert!(drawn_around_an_inner_corner(6).is_some());
+        assert!(drawn_around_an_inner_corner(16).is_some());
         assert_eq!(drawn_around_an_inner_corner(1), None);
     }
 
