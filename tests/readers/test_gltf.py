@@ -32,7 +32,7 @@ def faults(path):
 
 @pytest.fixture(scope="module")
 def written(demo, tmp_path_factory):
-    """A GLB of each command that writes one."""
+    """A GLB of each kind: the preview, surfaces, a mesh, a mesh with attributes."""
     folder = tmp_path_factory.mktemp("glb")
     planish("export", demo / "model.planish", "-o", folder / "surfaces.glb", "-q")
     planish("smooth", demo / "mesh.ply", "-o", folder / "mesh.glb", "-q")

@@ -181,7 +181,7 @@ fn is_asked(name: &str) -> bool {
 
 /// Shapes that took gigabytes in the layout before its working meshes and systems had bounds.
 const BOUNDED: [&str; 2] = ["strip-1e6", "shuffled"];
-/// Shapes of triangles that do not hold on to each other, whose grids took more than a minute before they were refused.
+/// Shapes of loose triangles: each had a patch of its own before they were refused.
 const LOOSE: [&str; 3] = ["soup", "crowd", "loose"];
 
 #[test]

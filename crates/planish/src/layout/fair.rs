@@ -4,7 +4,8 @@
 //! nodes it goes by the map of single triangles. So it is smoothed in space: of places `y` at even steps along the arc, drawn
 //! at `x`, those are taken that minimise `sum |y - x|² + lambda sum |D y|²`, with `D` the second difference. The ends stay, and
 //! their `D` is taken against directions that part the sectors around the node evenly. The curve is brought back to the
-//! closest places of the two cells beside the arc, so that arcs do not cross; an arc whose curve leaves them stays. See `docs/methods/layout.md`, step 8.
+//! closest places of the two cells beside the arc, so that arcs do not cross; an arc whose curve leaves them
+//! stays. See `docs/methods/layout.md`, step 8.
 
 use super::complex::{Arc, Complex};
 use super::improve::{LEAST_SETTLING, arc_change};

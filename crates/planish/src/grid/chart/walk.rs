@@ -81,8 +81,8 @@ impl Chart {
     }
 
     /// Moves from `from` straight over the surface by `step`, a vector near the tangent plane: laid into the
-    /// triangle with its length kept and unfolded over every edge (MovePointOnSurface of [K98]). Ends at the boundary, and after as many
-    /// triangles as the chart has: it goes around a spike then.
+    /// triangle with its length kept and unfolded over every edge (MovePointOnSurface of [K98]). Ends at
+    /// the boundary, and after as many triangles as the chart has: it goes around a spike then.
     pub fn advance(&self, from: Spot, step: DVec3) -> Spot {
         let mut spot = from;
         let mut left = step.length();

@@ -8,6 +8,7 @@
 //! Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov, *Foldover-free maps in 50 lines of code*, 2021, is the energy.
 //! See `docs/methods/grids.md`, step 7.
 
+use super::settle::LARGEST_MOVE;
 use super::{Net, cell_corners, turns_over};
 use crate::grid::Fault;
 use crate::grid::chart::locate::Spot;
@@ -25,14 +26,14 @@ const HANDFUL: usize = 8;
 const OPENING_ROUNDS: usize = 8;
 const RINGS: usize = 2;
 const OPENING_SWEEPS: usize = 24;
-/// Parts of a step that are tried, its greatest length in cells, and the length below which points rest.
+/// Parts of a step that are tried, and the length in cells below which points rest.
 const TRIED_PARTS: [f64; 5] = [1.0, 0.5, 0.25, 0.12, 0.06];
-const GREATEST_STEP: f64 = 0.5;
 const STILL: f64 = 0.03;
 /// Least area, in cells, that a corner is taken to have, and the part of the worst folded one's that it has besides.
 const LEAST_AREA: f64 = 1e-3;
 const FOLDED_SHARE: f64 = 0.2;
-/// Least curvature of the energy that a step counts on, against the greatest.
+/// Least curvature of the energy that a step counts on, against the greatest; chosen: steps along flat
+/// directions stay finite.
 const LEAST_CURVATURE: f64 = 1e-3;
 
 /// Grid points with the normal of the surface at each.
@@ -259,7 +260,7 @@ impl Region {
             let spot = net.spots[k];
             let (s, t) = net.chart.normal(spot).any_orthonormal_pair();
             let (gradient, hessian) = self.slopes(net, k, [s, t]);
-            let step = downhill(gradient, hessian).clamp_length_max(GREATEST_STEP * length);
+            let step = downhill(gradient, hessian).clamp_length_max(LARGEST_MOVE * length);
             for part in TRIED_PARTS {
                 place(net, k, net.chart.advance(spot, (s * step.x + t * step.y) * part));
                 if self.energy(net, k) < before && !(strictly && turns_around(net, k)) {
@@ -307,10 +308,11 @@ pub fn turns_around(net: &Net, k: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::chart::Chart;
     use crate::grid::chart::tests::chart;
 
-    /// A net of 7 x 7 points over a bent sheet, and the region around its middle, whose point lies beyond a neighbour.
-    fn folded<'a>(chart: &'a crate::grid::chart::Chart) -> Net<'a> {
+    /// A net of 7 x 7 points whose middle one lies beyond its neighbour.
+    fn folded(chart: &Chart) -> Net<'_> {
         let mut net = Net::regular(chart, 7, 7);
         let from = net.spots[24];
         place(&mut net, 24, chart.locate(DVec2::new(0.74, 0.55), from.triangle));

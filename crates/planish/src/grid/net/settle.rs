@@ -25,7 +25,7 @@ const MEANT_CELLS: f64 = 32.0;
 /// Least damping of the moves, in cells.
 const DAMPING: f64 = 0.003;
 /// Largest move of a round, in cells.
-const LARGEST_MOVE: f64 = 0.5;
+pub const LARGEST_MOVE: f64 = 0.5;
 /// Steps of conjugate gradients in a round, for a net that is far from rest.
 pub const CG_STEPS: usize = 24;
 /// Solves of a round, and the factor by which the damping grows from one to the next if the energy rises (as of
