@@ -110,8 +110,9 @@ pub(super) fn seamless(
     if straight.is_injective() {
         return Ok(Some(straight));
     }
-    let (Some(laplacian), Some(stretched)) = (maps.laplacian(), maps.follow(&charts.scale)) else { return Ok(None) };
-    let starts = [stretched, straight.free];
+    let Some(laplacian) = maps.laplacian() else { return Ok(None) };
+    // Where a boundary is ragged the stretches may be beyond all numbers.
+    let starts: Vec<Vec<f64>> = maps.follow(&charts.scale).into_iter().chain([straight.free]).collect();
     untangled((mesh, adjacency), &maps, &laplacian, charts, &starts, observer).map(Some)
 }
 

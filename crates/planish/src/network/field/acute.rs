@@ -9,17 +9,17 @@
 
 use super::edge_weight;
 use super::sectors::{Sector, corner_angle, sectors};
-use super::widths::widths;
+use super::widths::{Widths, widths};
 use crate::mesh::{Adjacency, NONE, TriMesh, next, previous};
 use crate::observe::{Cancelled, Observer};
 use planish_sparse::SparseCholesky;
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
+use std::f64::consts::{FRAC_PI_4, TAU};
 
 /// A sector this much below a right angle is acute: what is left of a right angle on noise needs no opening, radians.
 const ACUTE_MARGIN: f64 = 0.05;
 
-/// Teeth of a border that turn back within this are no corners, in mean edges: a tooth is two edges long.
-const RAGGED: f64 = 1.5;
+/// Turns that follow each other within this are one corner, in mean edges: a tooth is two edges long.
+const ONE_CORNER: f64 = 1.5;
 
 /// Weight of what the extra turns around a vertex sum to, against the turns themselves.
 const CURL_WEIGHT: f64 = 0.05;
@@ -29,29 +29,29 @@ const DEMAND: f64 = 1e8;
 
 /// For each half-edge the extra turn on crossing it from its face, radians; opposite half-edges have opposite turns.
 /// * `radius` - what the surface turns by within less than this is spread over as much
+/// * `teeth` - reach of the corners of a ragged boundary
 pub(super) fn openings(
     mesh: &TriMesh,
     adjacency: &Adjacency,
     lines: &[bool],
     radius: f64,
+    teeth: f64,
     observer: &dyn Observer,
 ) -> Result<Vec<f64>, Cancelled> {
     let sectors = sectors(mesh, adjacency, lines);
+    let narrow = ONE_CORNER * mesh.mean_edge();
+    let Widths { width, excess, ironed } =
+        widths(mesh, &sectors, |v| adjacency.is_boundary_vertex(v), narrow, narrow.max(teeth));
+    let is_opened = |(&width, &excess): (&i32, &f64)| {
+        width == 1 && excess < -ACUTE_MARGIN || excess.abs() > FRAC_PI_4 - ACUTE_MARGIN
+    };
+    let demands: Vec<f64> =
+        width.iter().zip(&excess).map(|sector| if is_opened(sector) { *sector.1 } else { 0.0 }).collect();
     let mut on_lines = vec![false; mesh.points.len()];
     sectors.iter().for_each(|s| on_lines[s.vertex as usize] = true);
     let mut form = Form::new(mesh, adjacency, lines, &sectors, on_lines);
     let spread = spread(mesh, adjacency, &form.on_lines, radius, observer)?;
-    let spread = form.solve(&vec![0.0; sectors.len()], &spread, 1.0, observer)?;
-    let widths = widths(mesh, &sectors, |v| adjacency.is_boundary_vertex(v), RAGGED * mesh.mean_edge());
-    let demands: Vec<f64> = sectors
-        .iter()
-        .zip(widths)
-        .map(|(sector, width)| {
-            let turn = sector.angle - f64::from(width) * FRAC_PI_2;
-            let acute = width == 1 && turn < -ACUTE_MARGIN;
-            if acute || turn.abs() > FRAC_PI_4 - ACUTE_MARGIN { turn } else { 0.0 }
-        })
-        .collect();
+    let spread = form.solve(&ironed, &spread, 1.0, observer)?;
     if demands.iter().all(|d| *d == 0.0) {
         return Ok(spread);
     }

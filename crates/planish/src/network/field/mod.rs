@@ -10,8 +10,10 @@
 //! diffusion and normalising; `docs/methods/layout.md`, step 2.
 
 mod acute;
+mod chains;
 pub(crate) mod cones;
 mod curvature;
+mod rims;
 pub(crate) mod sectors;
 mod widths;
 
@@ -61,7 +63,8 @@ pub struct FieldParams {
     pub smoothing: f64,
     /// Radius within which principal directions are averaged, world units; at least two mean edges are taken.
     pub radius: f64,
-    /// Opposite cones nearer to each other than this are taken for noise where the field can do without, world units.
+    /// Opposite cones nearer to each other than this are taken for noise where the field can do without, and what a ragged
+    /// boundary turns by is averaged within it before its corners are told; world units.
     pub pair_distance: f64,
 }
 
@@ -95,7 +98,7 @@ pub fn field(
 ) -> Result<CrossField, Cancelled> {
     let angle = edge_angles(mesh);
     let radius = params.radius.max(LEAST_RADIUS * mesh.mean_edge());
-    let opening = acute::openings(mesh, adjacency, lines, radius, observer)?;
+    let opening = acute::openings(mesh, adjacency, lines, radius, params.pair_distance, observer)?;
     let transport: Vec<f64> = (0..angle.len())
         .map(|h| match adjacency.opposite[h] {
             NONE => 0.0,

@@ -1,87 +1,47 @@
 //! How many quarter turns a sector between two lines is to have.
 //!
-//! The next whole number, but one at least. Only where a boundary passes through it goes by what the boundary turns within
-//! a radius: the border of a scan is ragged, and its teeth are no corners. So it does at the knots of a line, where corners
-//! follow each other within the radius.
+//! The next whole number, but one at least. Only at the knots of a line, where corners follow each other within a reach, it
+//! goes by what the line turns within it; and on the boundary ([`super::rims`]).
 
+use super::chains::Chains;
+use super::rims::{CORNER_TURN, rims};
 use super::sectors::Sector;
-use std::collections::HashMap;
+use crate::mesh::TriMesh;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::mesh::{TriMesh, previous};
-
-/// A boundary that turns by less than this within the radius has no corner: half of a quarter turn, and what noise may
-/// add, radians.
-const CORNER_TURN: f64 = PI / 4.0 + 0.05;
-
-/// The sectors as chains: which follows which on the same side of a line.
-struct Chains<'a> {
-    mesh: &'a TriMesh,
-    sectors: &'a [Sector],
-    /// Whether nothing but one line or the boundary passes through at the vertex of each sector.
-    passes: Vec<bool>,
-    /// The next sector and the one before.
-    ways: [Vec<Option<usize>>; 2],
+/// What the sectors are to be.
+pub(super) struct Widths {
+    /// Quarter turns of each.
+    pub width: Vec<i32>,
+    /// How much wider each is than those, radians; a corner of the boundary with what turns beside it.
+    pub excess: Vec<f64>,
+    /// What the field is to turn by besides in each, radians: a closed form.
+    pub ironed: Vec<f64>,
 }
 
-impl<'a> Chains<'a> {
-    fn new(mesh: &'a TriMesh, sectors: &'a [Sector], is_boundary: impl Fn(u32) -> bool) -> Chains<'a> {
-        let mut count = vec![0u8; mesh.points.len()];
-        sectors.iter().for_each(|s| count[s.vertex as usize] = count[s.vertex as usize].saturating_add(1));
-        let passes = |s: &Sector| count[s.vertex as usize] == if is_boundary(s.vertex) { 1 } else { 2 };
-        let ends: HashMap<u32, usize> =
-            sectors.iter().enumerate().map(|(i, s)| (previous(s.spokes[s.spokes.len() - 1]), i)).collect();
-        let next: Vec<Option<usize>> = sectors.iter().map(|s| ends.get(&s.spokes[0]).copied()).collect();
-        let mut before = vec![None; sectors.len()];
-        for (i, n) in next.iter().enumerate() {
-            if let Some(n) = n {
-                before[*n] = Some(i);
-            }
-        }
-        Chains { mesh, sectors, passes: sectors.iter().map(passes).collect(), ways: [next, before] }
-    }
-
-    /// The sectors within `radius` of one along its boundary or line on both sides, itself first, up to where lines meet.
-    /// * `goes_on` - where the radius begins anew
-    fn near(&self, start: usize, radius: f64, goes_on: impl Fn(usize) -> bool) -> Vec<usize> {
-        let mut near = vec![start];
-        let at = |i: usize| self.mesh.points[self.sectors[i].vertex as usize];
-        for way in &self.ways {
-            let (mut i, mut length) = (start, 0.0);
-            while let Some(n) = way[i] {
-                length += at(i).distance(at(n));
-                if length > radius || !self.passes[n] || n == start || near.contains(&n) {
-                    break;
-                }
-                near.push(n);
-                if goes_on(n) {
-                    length = 0.0;
-                }
-                i = n;
-            }
-        }
-        near
-    }
-}
-
-/// The width of each sector in quarter turns.
-pub(super) fn widths(mesh: &TriMesh, sectors: &[Sector], is_boundary: impl Fn(u32) -> bool, radius: f64) -> Vec<i32> {
+/// The widths of the sectors.
+/// * `narrow` - reach of what is one corner
+/// * `wide` - reach of what is one corner of a ragged boundary
+pub(super) fn widths(
+    mesh: &TriMesh,
+    sectors: &[Sector],
+    is_boundary: impl Fn(u32) -> bool,
+    narrow: f64,
+    wide: f64,
+) -> Widths {
     let chains = Chains::new(mesh, sectors, &is_boundary);
     let mut width: Vec<i32> = sectors.iter().map(|s| ((s.angle / FRAC_PI_2).round() as i32).max(1)).collect();
-    let mut turn: Vec<f64> = sectors.iter().map(|s| PI - s.angle).collect();
-    let (mut border, mut bent): (Vec<usize>, Vec<usize>) =
+    let turn: Vec<f64> = sectors.iter().map(|s| PI - s.angle).collect();
+    let (border, mut bent): (Vec<usize>, Vec<usize>) =
         (0..sectors.len()).filter(|&i| chains.passes[i]).partition(|&i| is_boundary(sectors[i].vertex));
     bent.retain(|&i| width[i] != 2);
     // The sharpest places first: each is a corner for all that turns around it.
-    let sort = |places: &mut Vec<usize>, turn: &[f64]| {
-        places.sort_by(|&a, &b| turn[b].abs().total_cmp(&turn[a].abs()).then(a.cmp(&b)));
-    };
+    bent.sort_by(|&a, &b| turn[b].abs().total_cmp(&turn[a].abs()).then(a.cmp(&b)));
     let whole = |sum: f64| if sum.abs() > CORNER_TURN { (2 - (sum / FRAC_PI_2).round() as i32).max(1) } else { 2 };
-    sort(&mut bent, &turn);
     let mut is_bent = vec![false; sectors.len()];
     bent.iter().for_each(|&i| is_bent[i] = true);
     for i in bent {
-        let near = chains.near(i, radius, |n| is_bent[n]);
+        let near = chains.near(i, narrow, |n| is_bent[n]);
         let sum: f64 = near.iter().map(|&n| turn[n]).sum();
         let knot: Vec<usize> = near.into_iter().filter(|&n| is_bent[n]).collect();
         // What turns by more is a form of its own.
@@ -90,18 +50,14 @@ pub(super) fn widths(mesh: &TriMesh, sectors: &[Sector], is_boundary: impl Fn(u3
             width[i] = whole(sum);
         }
     }
-    border.iter().for_each(|&i| width[i] = 2);
-    sort(&mut border, &turn);
-    for i in border {
-        let near = chains.near(i, radius, |_| false);
-        let sum: f64 = near.iter().map(|&n| turn[n]).sum();
-        let sharpest = near.iter().all(|&n| turn[n].abs() <= turn[i].abs());
-        if sharpest && sum.abs() > CORNER_TURN {
-            width[i] = whole(sum);
-            near.iter().for_each(|&n| turn[n] = 0.0);
+    let mut excess: Vec<f64> = sectors.iter().zip(&width).map(|(s, &w)| s.angle - f64::from(w) * FRAC_PI_2).collect();
+    let rims = rims(&chains, &border, narrow, wide);
+    for (i, rim) in rims.width.into_iter().enumerate() {
+        if let Some(rim) = rim {
+            (width[i], excess[i]) = (rim, rims.excess[i]);
         }
     }
-    width
+    Widths { width, excess, ironed: rims.ironed }
 }
 
 #[cfg(test)]
@@ -127,7 +83,7 @@ mod tests {
             (0..3 * mesh.triangles.len() as u32).map(|h| line.windows(2).any(|w| joins(h, w))).collect();
         assert_eq!(lines.iter().filter(|l| **l).count(), 2 * (line.len() - 1));
         let sectors = sectors(&mesh, &adjacency, &lines);
-        let width = widths(&mesh, &sectors, |v| adjacency.is_boundary_vertex(v), 2.5);
+        let width = widths(&mesh, &sectors, |v| adjacency.is_boundary_vertex(v), 2.5, 2.5).width;
         let ends = [line[0], line[line.len() - 1]].map(place);
         let inside = |v: u32| !adjacency.is_boundary_vertex(v) && !ends.contains(&at(v));
         let mut bends: Vec<i32> =
