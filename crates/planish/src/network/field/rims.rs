@@ -35,7 +35,7 @@ pub(super) struct Rims {
 /// The boundary's corners and teeth.
 /// * `border` - the sectors of the boundary that nothing else passes through
 /// * `narrow` - reach of a boundary that is even, and distance of corners
-/// * `wide` - reach of one that is ragged: noise is less than what it turns by at half of its vertices
+/// * `wide` - reach of one that is ragged: at half of its vertices it turns by more than noise beyond an even turn
 pub(super) fn rims(chains: &Chains, border: &[usize], narrow: f64, wide: f64) -> Rims {
     let count = chains.sectors.len();
     let mut rims = Rims { width: vec![None; count], excess: vec![0.0; count], ironed: vec![0.0; count] };
@@ -45,35 +45,58 @@ pub(super) fn rims(chains: &Chains, border: &[usize], narrow: f64, wide: f64) ->
         let mut run = Run::new(chains, &at, narrow);
         let mut rough: Vec<f64> = run.teeth(&turn).iter().map(|t| t.abs()).collect();
         rough.sort_unstable_by(f64::total_cmp);
-        if rough[rough.len() / 2] > NOISE {
+        let is_ragged = rough[rough.len() / 2] > NOISE;
+        if is_ragged {
             run = Run::new(chains, &at, wide);
         }
-        let is_ragged = run.reach > narrow;
-        let mut corners = run.corners(&turn, &faces);
+        let corners = run.corners(&turn, &faces);
         let left = |k: usize| turn[k] - f64::from(corners[k]) * FRAC_PI_2;
         let is_opened = |k: usize| !is_ragged && corners[k] != 0;
         let spread: Vec<f64> = (0..at.len()).map(|k| if is_opened(k) { 0.0 } else { left(k) }).collect();
         for (k, tooth) in run.teeth(&spread).into_iter().enumerate() {
+            rims.width[at[k]] = Some(2 - corners[k]);
             rims.excess[at[k]] = if is_opened(k) { -left(k) } else { 0.0 };
             rims.ironed[at[k]] = -tooth;
         }
-        for [from, to] in run.joined(&mut corners, &turn, &faces, narrow) {
-            let quarter = if corners[to] > 0 { FRAC_PI_2 } else { -FRAC_PI_2 };
-            rims.ironed[at[from]] -= quarter;
-            rims.ironed[at[to]] += quarter;
-            rims.excess[at[to]] -= quarter.max(0.0);
-        }
-        at.iter().zip(corners).for_each(|(&i, corner)| rims.width[i] = Some(2 - corner));
+        let mut sharpest: Vec<usize> = (0..at.len()).filter(|&k| corners[k] != 0).collect();
+        sharpest.sort_by(|&a, &b| turn[b].abs().total_cmp(&turn[a].abs()).then(a.cmp(&b)));
+        sharpest.into_iter().for_each(|k| rims.join(chains, at[k], narrow));
     }
     rims
 }
 
+impl Rims {
+    /// The quarter turns of the corner at a sector; 0 where there is none.
+    fn corner(&self, i: usize) -> i32 {
+        2 - self.width[i].unwrap_or(2)
+    }
+
+    /// Takes into a corner those within `apart` that turn the same way, for a map has no room between them: outward ones
+    /// make it acute, inward ones have as many quarter turns there as its faces have room for.
+    fn join(&mut self, chains: &Chains, to: usize, apart: f64) {
+        for from in chains.near(to, apart, |_| false) {
+            let (own, other) = (self.corner(to), self.corner(from));
+            let is_full = own < 0 && own + other < 2 - chains.sectors[to].spokes.len() as i32;
+            if from == to || own * other <= 0 || is_full {
+                continue;
+            }
+            let moved = f64::from(other) * FRAC_PI_2;
+            self.ironed[from] -= moved;
+            self.ironed[to] += moved;
+            self.width[from] = Some(2);
+            if own > 0 {
+                self.excess[to] -= moved;
+            } else {
+                self.width[to] = Some(2 - own - other);
+            }
+        }
+    }
+}
+
 /// Vertices that follow each other along the boundary.
 struct Run {
-    reach: f64,
-    is_closed: bool,
-    /// Length from each to the next one.
-    gap: Vec<f64>,
+    /// Weight of each for the next one; the last has none for the first where the boundary does not go around.
+    fade: Vec<f64>,
     /// Length that each stands for.
     length: Vec<f64>,
 }
@@ -81,10 +104,10 @@ struct Run {
 impl Run {
     fn new(chains: &Chains, at: &[usize], reach: f64) -> Run {
         let n = at.len();
+        let is_closed = n > 2 && chains.ways[0][at[n - 1]] == Some(at[0]);
+        let fade = |k: usize| (-chains.distance(at[k], at[(k + 1) % n]) / reach).exp();
         Run {
-            reach,
-            is_closed: n > 2 && chains.ways[0][at[n - 1]] == Some(at[0]),
-            gap: (0..n).map(|k| chains.distance(at[k], at[(k + 1) % n])).collect(),
+            fade: (0..n).map(|k| if k + 1 < n || is_closed { fade(k) } else { 0.0 }).collect(),
             length: at.iter().map(|&i| chains.length(i)).collect(),
         }
     }
@@ -92,23 +115,14 @@ impl Run {
     /// For each vertex the sum of the values of all, by the weights `exp(-|s| / reach)`; around a closed boundary again and
     /// again, and 1 for the vertex itself.
     fn sums(&self, values: &[f64]) -> Vec<f64> {
-        let n = values.len();
-        let fade: Vec<f64> = self.gap.iter().map(|gap| (-gap / self.reach).exp()).collect();
+        let (n, fade) = (values.len(), &self.fade);
         // What once around leaves of a value.
-        let left = if self.is_closed { fade.iter().product::<f64>().min(NEARLY_ALL) } else { 0.0 };
-        let ahead = self.carried((0..n).map(|k| (values[k], fade[k])), left);
-        let mut behind = self.carried((0..n).rev().map(|k| (values[k], fade[(k + n - 1) % n])), left);
+        let left = fade.iter().product::<f64>().min(NEARLY_ALL);
+        let ahead = carried((0..n).map(|k| (values[k], fade[k])), left);
+        let mut behind = carried((0..n).rev().map(|k| (values[k], fade[(k + n - 1) % n])), left);
         behind.reverse();
         let own = (1.0 + left) / (1.0 - left);
         (0..n).map(|k| (values[k] + ahead[k] + behind[k]) / own).collect()
-    }
-
-    /// What comes to each vertex of those before it, each with its value and what is left of it at the next one.
-    fn carried(&self, run: impl Iterator<Item = (f64, f64)> + Clone, left: f64) -> Vec<f64> {
-        let next = |carried: f64, (value, fade)| (carried + value) * fade;
-        let once = run.clone().fold(0.0, next);
-        let start = if self.is_closed { once / (1.0 - left) } else { 0.0 };
-        run.scan(start, |carried, at| Some(std::mem::replace(carried, next(*carried, at)))).collect()
     }
 
     /// Quarter turns of the corners.
@@ -128,45 +142,6 @@ impl Run {
         }
     }
 
-    /// Joins corners nearer than `apart` that turn the same way, for a map has no room between them: outward ones to one
-    /// that is acute, inward ones to one of more quarter turns, if it has the faces. Returns which went where.
-    fn joined(&self, corners: &mut [i32], turn: &[f64], faces: &[i32], apart: f64) -> Vec<[usize; 2]> {
-        let mut joined = Vec::new();
-        let mut order: Vec<usize> = (0..turn.len()).filter(|&k| corners[k] != 0).collect();
-        order.sort_by(|&a, &b| turn[b].abs().total_cmp(&turn[a].abs()).then(a.cmp(&b)));
-        for to in order {
-            for from in self.nearer(to, apart) {
-                let is_alike = corners[from] * corners[to] > 0;
-                let has_room = corners[to] > 0 || corners[to] + corners[from] >= 2 - faces[to];
-                if is_alike && has_room {
-                    joined.extend((0..corners[from].abs()).map(|_| [from, to]));
-                    corners[to] += corners[from].min(0);
-                    corners[from] = 0;
-                }
-            }
-        }
-        joined
-    }
-
-    /// The others nearer than `apart`.
-    fn nearer(&self, k: usize, apart: f64) -> Vec<usize> {
-        let n = self.gap.len();
-        let mut nearer = Vec::new();
-        let (mut i, mut far) = (k, self.gap[k]);
-        while far < apart && (self.is_closed || i + 1 < n) && (i + 1) % n != k {
-            i = (i + 1) % n;
-            nearer.push(i);
-            far += self.gap[i];
-        }
-        let (mut i, mut far) = (k, self.gap[(k + n - 1) % n]);
-        while far < apart && (self.is_closed || i > 0) && (i + n - 1) % n != k {
-            i = (i + n - 1) % n;
-            nearer.push(i);
-            far += self.gap[(i + n - 1) % n];
-        }
-        nearer
-    }
-
     /// By how much more than evenly each vertex turns. They sum to nothing.
     fn teeth(&self, turn: &[f64]) -> Vec<f64> {
         let whole = self.sums(&self.length);
@@ -176,6 +151,14 @@ impl Run {
     }
 }
 
+/// What comes to each vertex of those before it, each with its value and its weight for the next one.
+/// * `left` - what once around leaves of a value
+fn carried(run: impl Iterator<Item = (f64, f64)> + Clone, left: f64) -> Vec<f64> {
+    let next = |carried: f64, (value, fade)| (carried + value) * fade;
+    let start = run.clone().fold(0.0, next) / (1.0 - left);
+    run.scan(start, |carried, at| Some(std::mem::replace(carried, next(*carried, at)))).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::sectors::{Sector, sectors};
@@ -183,6 +166,7 @@ mod tests {
     use crate::mesh::{Adjacency, TriMesh};
     use crate::synthetic::shapes;
 
+    /// Reaches, in squares of the sheet.
     const NARROW: f64 = 1.5;
     const WIDE: f64 = 8.0;
 
