@@ -6,7 +6,7 @@ pub mod relief;
 pub mod stages;
 pub mod steps;
 
-pub use groups::{Common, FromArgs, HoleArgs, Policy, ScanArgs, ToArgs};
+pub use groups::{Common, FromArgs, HoleArgs, Policy, ScanArgs, SeamArgs, ToArgs};
 pub use stages::AllStages;
 pub use steps::{Step, Steps};
 
@@ -258,6 +258,8 @@ pub struct Run {
     /// Network to use instead of an automatic one
     #[arg(long, value_name = "NETWORK.json")]
     pub network: Option<PathBuf>,
+    #[command(flatten)]
+    pub seams: SeamArgs,
     /// Axis of the input that points up, for pictures and GLB
     #[arg(long, value_name = "AXIS", default_value = "y")]
     pub up: UpWord,
@@ -472,6 +474,8 @@ pub struct Fit {
     /// Network on the mesh [default: an automatic one]
     #[arg(long, value_name = "NETWORK.json")]
     pub network: Option<PathBuf>,
+    #[command(flatten)]
+    pub seams: SeamArgs,
     /// The model; `-` is standard output
     #[arg(short, long, value_name = "MODEL.planish")]
     pub output: PathBuf,

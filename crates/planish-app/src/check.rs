@@ -18,6 +18,7 @@ pub fn check(command: &Command) -> Result<(), Failure> {
         Command::Run(a) => {
             a.stages.params(None)?;
             a.stages.check_curves_known(a.network.is_some())?;
+            a.seams.check(a.network.is_some())?;
             a.points.params(None)?;
             columns(&a.scan)?;
             a.meshing.params().map(drop)
@@ -37,7 +38,9 @@ pub fn check(command: &Command) -> Result<(), Failure> {
         Command::Layout(a) => a.layout.params(None).map(drop),
         Command::Fit(a) => {
             a.stages.params(None)?;
-            a.stages.check_curves_known(a.network.is_some() || files::is_model(&a.input))
+            let known = a.network.is_some() || files::is_model(&a.input);
+            a.stages.check_curves_known(known)?;
+            a.seams.check(known)
         }
         Command::Edit(a) => a.stages.params(None).map(drop),
         Command::Relief(a) => match &a.command {

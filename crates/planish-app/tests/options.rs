@@ -30,6 +30,9 @@ fn options_that_cannot_be_are_told_in_one_line_of_status_2_within_a_second() {
         ("run box.ply -o out --memory 0", "a number above 0"),
         ("run box.ply -o out --threads 0", "--threads"),
         ("fit box.ply -o m.planish --per-curve 4,4", "give it with --network"),
+        ("run box.ply -o out --smooth-curves 3", "give it with --network"),
+        ("fit box.ply -o m.planish --network n.json --smooth-curves 3,4 --sharp-curves 4", "leave it out of one"),
+        ("fit box.ply -o m.planish --network n.json --sharp-curves 1,two", "--sharp-curves"),
         ("fit box.ply -o m.planish --cells-per-span nan", "a number from"),
         ("layout box.ply -o n.json --sharp-angle-deg 181", "from 1 to 180"),
         ("decimate box.ply -o d.ply --ratio 0", "above 0 and up to 1"),
@@ -68,6 +71,34 @@ fn counts_for_each_curve_are_held_against_the_network_before_the_fit() {
     assert!(told.contains("--per-curve: has 3 numbers for the 12 curves") && !told.contains("surfaces"), "{told}");
     let output = fit(&["5"; 12].join(","));
     assert_eq!(status(&output), 0, "{}", stderr(&output));
+}
+
+#[test]
+fn seams_of_single_curves_become_smooth_and_sharp_again_and_the_model_keeps_that() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_box(&path.join("box.ply"), 6);
+    let run = |args: &str| planish(&args.split_whitespace().collect::<Vec<_>>(), path);
+    let done = |args: &str| {
+        let output = run(args);
+        assert_eq!(status(&output), 0, "{args}: {}", stderr(&output));
+    };
+    let kinds = |model: &str| -> Vec<String> {
+        done(&format!("export {model} -o kinds.json --force"));
+        let network: serde_json::Value = serde_json::from_slice(&fs::read(path.join("kinds.json")).unwrap()).unwrap();
+        let curves = network["curves"].as_array().unwrap();
+        curves.iter().map(|curve| curve["kind"].as_str().unwrap().to_owned()).collect()
+    };
+    done("layout box.ply -q -o n.json --patches 6");
+    done("fit box.ply --network n.json --smooth-curves 3,5 -q -o round.planish");
+    let round = kinds("round.planish");
+    assert!((0..12).all(|c| round[c] == if c == 3 || c == 5 { "rounded" } else { "feature" }), "{round:?}");
+    done("fit round.planish --sharp-curves 5 -q -o again.planish");
+    let again = kinds("again.planish");
+    assert!((0..12).all(|c| again[c] == if c == 3 { "rounded" } else { "feature" }), "{again:?}");
+    let none = run("fit round.planish --sharp-curves 12 -q -o m.planish");
+    assert_eq!(status(&none), 2);
+    assert!(error_line(&none).contains("has curve 12, and the network has 12 curves"), "{}", stderr(&none));
 }
 
 #[test]

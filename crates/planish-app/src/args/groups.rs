@@ -3,6 +3,7 @@
 use crate::failure::Failure;
 use clap::{Args, ValueEnum};
 use planish::model::Units;
+use planish::network::{CurveKind, Network, Seam};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -102,6 +103,63 @@ pub struct ToArgs {
     /// What goes to standard output, where the output is `-`: the extension that its file would have
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
+}
+
+/// What single seams are to be.
+#[derive(Args, Clone, Debug, Default)]
+pub struct SeamArgs {
+    /// Curves whose seams are to be smooth, whatever the mesh has there: an edge under one is rounded
+    #[arg(long, value_name = "CURVE,...", value_delimiter = ',')]
+    smooth_curves: Vec<u32>,
+    /// Curves whose seams are to be sharp: both patches keep their own angle there
+    #[arg(long, value_name = "CURVE,...", value_delimiter = ',')]
+    sharp_curves: Vec<u32>,
+}
+
+impl SeamArgs {
+    fn asked(&self) -> impl Iterator<Item = (&'static str, Seam, u32)> + '_ {
+        let smooth = self.smooth_curves.iter().map(|&curve| ("--smooth-curves", Seam::Smooth, curve));
+        smooth.chain(self.sharp_curves.iter().map(|&curve| ("--sharp-curves", Seam::Sharp, curve)))
+    }
+
+    /// Checks the numbers of curves against each other.
+    /// # Errors
+    /// If there are some and nobody knows the curves (`known` is false), or one is to be smooth and sharp.
+    pub fn check(&self, known: bool) -> Result<(), Failure> {
+        let Some((flag, ..)) = self.asked().next() else { return Ok(()) };
+        if !known {
+            let what = "needs a network: nobody knows the curves of an automatic one beforehand";
+            return Err(Failure::usage(flag, what).hint("make one with `planish layout` and give it with --network"));
+        }
+        match self.smooth_curves.iter().find(|curve| self.sharp_curves.contains(curve)) {
+            Some(curve) => {
+                let what = format!("has curve {curve}, which --sharp-curves has, too");
+                Err(Failure::usage("--smooth-curves", what).hint("leave it out of one of them"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Makes the seams of a network what they are to be.
+    /// # Errors
+    /// If it has no such curve, or one on the boundary.
+    pub fn apply(&self, network: &mut Network) -> Result<(), Failure> {
+        let curves = network.curves.len();
+        for (flag, seam, curve) in self.asked() {
+            match network.curves.get_mut(curve as usize) {
+                None => {
+                    let what = format!("has curve {curve}, and the network has {curves} curves, from 0 on");
+                    return Err(Failure::usage(flag, what).hint("report.json has the numbers"));
+                }
+                Some(found) if found.kind == CurveKind::Boundary => {
+                    let what = format!("has curve {curve}, which follows the boundary of the mesh and has no seam");
+                    return Err(Failure::usage(flag, what).hint("leave it out"));
+                }
+                Some(found) => found.kind = seam.into(),
+            }
+        }
+        Ok(())
+    }
 }
 
 /// How a scan is read.

@@ -41,8 +41,11 @@ pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
 fn anew(session: &Session, args: &Fit) -> Result<(Report, Model, Option<Reach>), Failure> {
     let (placed, read) = session.step("read", || Placed::read(&args.input))?;
     let units = session.units_of(&args.input);
-    let network = files::optional_network(args.network.as_deref(), &placed.mesh)?;
-    network.as_ref().map_or(Ok(()), |network| args.stages.check_curves(network))?;
+    let mut network = files::optional_network(args.network.as_deref(), &placed.mesh)?;
+    if let Some(network) = &mut network {
+        args.stages.check_curves(network)?;
+        args.seams.apply(network)?;
+    }
     let job = Job {
         command: "fit",
         path: &args.input,
@@ -79,6 +82,7 @@ fn refit(session: &Session, args: &Fit) -> Result<(Report, Model, Option<Reach>)
     let scale = Scale { diagonal: model.mesh.bounds().diagonal(), units: model.units };
     let params = args.stages.params_over(stored, gridded, session.common.seed, scale)?;
     args.stages.check_curves(&model.network)?;
+    args.seams.apply(&mut model.network)?;
     if !gridded {
         finished(&args.input, &model)?;
     }

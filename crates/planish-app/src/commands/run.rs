@@ -46,8 +46,11 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
         return Err(Failure::usage(flag, "is for scans, and the input is none").hint("leave it out"));
     }
     let (placed, read) = session.step("read", || Placed::read(input))?;
-    let network = files::optional_network(args.network.as_deref(), &placed.mesh)?;
-    network.as_ref().map_or(Ok(()), |network| args.stages.check_curves(network))?;
+    let mut network = files::optional_network(args.network.as_deref(), &placed.mesh)?;
+    if let Some(network) = &mut network {
+        args.stages.check_curves(network)?;
+        args.seams.apply(network)?;
+    }
     let from = From { input: placed.input(network), shift: placed.shift, warning: placed.warning(units.symbol()) };
     produce(session, job, from, staged, vec![read])
 }

@@ -12,6 +12,10 @@ use std::io::{BufReader, Cursor, Read, Seek, SeekFrom, Write};
 /// Bytes of the first point of a compressed chunk, which is not compressed: the shortest format has 20.
 const CHUNK: u64 = 20;
 
+/// Bytes of records that are unpacked at a time: those of [`PIECE`] points in the longest standard format. A header may tell of
+/// longer ones.
+const PIECE_BYTES: usize = 67 * PIECE;
+
 /// Refuses compressed points whose table names more chunks than the file has room for: the library that reads them takes memory
 /// for as many as it is told.
 fn check_chunks(file: &mut (impl Read + Seek), size: u64) -> Result<(), ReadError> {
@@ -68,19 +72,17 @@ pub(super) fn pieces(mut file: BufReader<File>, classes: &[u8], take: &mut Take)
         let mut reader = Reader::new(file).map_err(foreign)?;
         let count = reader.header().number_of_points();
         // Uncompressed records are all there; a compressed point takes more than a hundredth of a byte.
-        let record = if reader.header().point_format().is_compressed {
-            0.01
-        } else {
-            reader.header().point_format().len() as f64
-        };
+        let length = usize::from(reader.header().point_format().len());
+        let record = if reader.header().point_format().is_compressed { 0.01 } else { length as f64 };
         if count as f64 * record > size as f64 {
             let (what, needed) = (format!("{count} points"), (count as f64 * record) as u64);
             return Err(ReadError::Truncated { what, needed, left: size, place: Place::Byte(0) });
         }
+        let piece_points = PIECE.min(PIECE_BYTES / length.max(1)) as u64;
         let (mut done, mut taken) = (0, 0);
         let mut has_color = false;
         while done < count {
-            let wanted = (PIECE as u64).min(count - done);
+            let wanted = piece_points.min(count - done);
             let data = reader.read_points(wanted).map_err(foreign)?;
             let mut piece = Cloud::default();
             let (mut intensity, mut class, mut color) = (Vec::new(), Vec::new(), Vec::new());

@@ -25,7 +25,7 @@ mod work;
 
 pub use apply::{apply, preview};
 pub use change::{
-    AddCorner, Clear, Continuity, DeleteCorner, DeleteCurves, DragCorner, DragCurve, Join, Mirror, Relax, Seam, Spline,
+    AddCorner, Clear, Continuity, DeleteCorner, DeleteCurves, DragCorner, DragCurve, Join, Mirror, Relax, Spline,
     SplitCurve, SplitRegion, Symmetry, handles, mirror_network,
 };
 pub use draw::{Boundaries, Carry, Complete, Cut, Extend, FeatureLines, Paint, Project, carry_network};

@@ -13,6 +13,7 @@ pub use imprint::{ImprintError, imprint};
 pub use reimprint::{changed_patches, reimprint, reimprint_over};
 
 use crate::mesh::{FacePoint, TriMesh};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A conforming network of four-sided patches.
@@ -51,6 +52,25 @@ impl CurveKind {
     /// True if the patches on both sides are to have one tangent plane along the curve.
     pub fn is_smooth(self) -> bool {
         matches!(self, CurveKind::Smooth | CurveKind::Rounded)
+    }
+}
+
+/// How two patches are to meet along their curve, whatever the mesh has there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Seam {
+    /// With one tangent plane, as nearly as the patches can; an edge under the curve is rounded.
+    Smooth,
+    /// At the angle that each patch has by itself: C0.
+    Sharp,
+}
+
+impl From<Seam> for CurveKind {
+    fn from(seam: Seam) -> CurveKind {
+        match seam {
+            Seam::Smooth => CurveKind::Rounded,
+            Seam::Sharp => CurveKind::Feature,
+        }
     }
 }
 

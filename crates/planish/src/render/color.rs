@@ -2,10 +2,17 @@
 //!
 //! Evenness is that of Oklab (Ottosson, *A perceptual color space for image processing*, 2020).
 
+use std::sync::LazyLock;
+
 /// sRGB byte to linear light.
 pub(super) fn linear(byte: u8) -> f32 {
-    let x = byte as f32 / 255.0;
-    if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+    static TABLE: LazyLock<[f32; 256]> = LazyLock::new(|| {
+        std::array::from_fn(|byte| {
+            let x = byte as f32 / 255.0;
+            if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+        })
+    });
+    TABLE[byte as usize]
 }
 
 /// Linear light to sRGB byte.

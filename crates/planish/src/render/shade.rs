@@ -20,38 +20,46 @@ pub(super) fn shade(mesh: &TriMesh, look: &Look, frame: &Frame, seen: &Seen) -> 
     let open = if look.hollows > 0.0 { openness(mesh, frame, seen) } else { Vec::new() };
     let color_at = if let Paint::Signed { .. } = look.paint { signed_color } else { field_color };
     let table: Vec<Vec3> = (0..=TABLE).map(|k| light(color_at(k as f64 / TABLE as f64))).collect();
-    (0..seen.face.len())
-        .into_par_iter()
-        .map(|i| {
-            let face = seen.face[i];
-            if face == NOTHING {
-                return None;
+    let shaded = |i: usize| {
+        let face = seen.face[i];
+        let (x, y) = (i % frame.width, i / frame.width);
+        let ray = frame.ray(x as f64 + 0.5, y as f64 + 0.5);
+        let corners = mesh.corners(face as usize);
+        let bary = weights(corners, frame.camera.eye, ray);
+        let [l, m, n] = normals.of(face);
+        let mut normal = (l * bary[0] + m * bary[1] + n * bary[2]).normalize_or(-frame.camera.forward);
+        let geometric = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let back = geometric.dot(ray) > 0.0;
+        if back {
+            normal = -normal;
+        }
+        let open = if open.is_empty() { 1.0 } else { open[(y / FINE) * (frame.width / FINE) + x / FINE] };
+        let open = 1.0 - look.hollows as f32 * (1.0 - open);
+        let lit = studio(frame, normal, ray.normalize(), open);
+        let mut base = base_color(mesh, look.paint, &table, face as usize, bary);
+        if let Paint::Zebra { stripes } = look.paint {
+            base = zebra(frame, normal, ray.normalize(), stripes);
+        }
+        if back {
+            // The inside of open surfaces: darker and cooler.
+            base *= Vec3::new(0.55, 0.62, 0.72);
+        }
+        base * lit.0 + Vec3::splat(lit.1)
+    };
+    // Light hardly changes between samples of one triangle in one pixel; stripes do.
+    let is_even = !matches!(look.paint, Paint::Zebra { .. });
+    let mut samples = vec![None; seen.face.len()];
+    samples.par_chunks_mut(FINE * frame.width).enumerate().for_each(|(row, samples)| {
+        let faces = &seen.face[row * FINE * frame.width..];
+        for column in (0..frame.width).step_by(FINE) {
+            let pixel: [usize; FINE * FINE] = std::array::from_fn(|s| s / FINE * frame.width + column + s % FINE);
+            for (s, &i) in pixel.iter().enumerate().filter(|&(_, &i)| faces[i] != NOTHING) {
+                let same = pixel[..s].iter().find(|&&j| is_even && faces[j] == faces[i]);
+                samples[i] = same.map_or_else(|| Some(shaded(row * FINE * frame.width + i)), |&j| samples[j]);
             }
-            let (x, y) = (i % frame.width, i / frame.width);
-            let ray = frame.ray(x as f64 + 0.5, y as f64 + 0.5);
-            let corners = mesh.corners(face as usize);
-            let bary = weights(corners, frame.camera.eye, ray);
-            let [l, m, n] = normals.of(face);
-            let mut normal = (l * bary[0] + m * bary[1] + n * bary[2]).normalize_or(-frame.camera.forward);
-            let geometric = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-            let back = geometric.dot(ray) > 0.0;
-            if back {
-                normal = -normal;
-            }
-            let open = if open.is_empty() { 1.0 } else { open[(y / FINE) * (frame.width / FINE) + x / FINE] };
-            let open = 1.0 - look.hollows as f32 * (1.0 - open);
-            let lit = studio(frame, normal, ray.normalize(), open);
-            let mut base = base_color(mesh, look.paint, &table, face as usize, bary);
-            if let Paint::Zebra { stripes } = look.paint {
-                base = zebra(frame, normal, ray.normalize(), stripes);
-            }
-            if back {
-                // The inside of open surfaces: darker and cooler.
-                base *= Vec3::new(0.55, 0.62, 0.72);
-            }
-            Some(base * lit.0 + Vec3::splat(lit.1))
-        })
-        .collect()
+        }
+    });
+    samples
 }
 
 fn light(color: [u8; 3]) -> Vec3 {
@@ -194,40 +202,53 @@ const HOLLOW_REACH: f64 = 0.06;
 fn openness(mesh: &TriMesh, frame: &Frame, seen: &Seen) -> Vec<f32> {
     let (width, height) = (frame.width / FINE, frame.height / FINE);
     let reach = HOLLOW_REACH * mesh.bounds().diagonal();
-    let place = |x: usize, y: usize| -> Option<(DVec3, u32)> {
-        let i = y * FINE * frame.width + x * FINE;
-        let ray = frame.ray((x * FINE) as f64 + 0.5, (y * FINE) as f64 + 0.5);
-        (seen.face[i] != NOTHING).then(|| (frame.camera.eye + ray * seen.depth[i] as f64, seen.face[i]))
+    let sample = |i: usize| (i / width * FINE, i % width * FINE);
+    // Not a number where nothing is seen: such a place takes no light.
+    let places: Vec<DVec3> = (0..width * height)
+        .into_par_iter()
+        .map(|i| {
+            let (y, x) = sample(i);
+            let at = y * frame.width + x;
+            let ray = frame.ray(x as f64 + 0.5, y as f64 + 0.5);
+            if seen.face[at] == NOTHING { DVec3::NAN } else { frame.camera.eye + ray * seen.depth[at] as f64 }
+        })
+        .collect();
+    // A spiral, turned differently at each pixel of a 4 x 4 tile; the blur below evens it out.
+    let spiral = |tile: usize| {
+        let turn = random::unit(1, tile as u64) * std::f64::consts::TAU;
+        std::array::from_fn(|k| (turn + 2.399_963 * k as f64).sin_cos())
     };
+    let spirals: [[(f64, f64); LOOKS]; 16] = std::array::from_fn(spiral);
     let raw: Vec<f32> = (0..width * height)
         .into_par_iter()
         .map(|i| {
             let (x, y) = (i % width, i / width);
-            let Some((p, face)) = place(x, y) else { return 1.0 };
+            let p = places[i];
+            if p.is_nan() {
+                return 1.0;
+            }
+            let (row, column) = sample(i);
+            let face = seen.face[row * frame.width + column];
             let mut n = mesh.normal(face as usize);
             if n.dot(p - frame.camera.eye) > 0.0 {
                 n = -n;
             }
             let depth = (p - frame.camera.eye).dot(frame.camera.forward);
             let pixels = reach / (depth * frame.step * FINE as f64);
-            // A spiral, turned differently at each pixel of a 4 x 4 tile; the blur below evens it out.
-            let turn = random::unit(1, (x % 4 + 4 * (y % 4)) as u64) * std::f64::consts::TAU;
             let mut taken = 0.0;
-            for k in 0..LOOKS {
+            for (k, (sin, cos)) in spirals[x % 4 + 4 * (y % 4)].iter().enumerate() {
                 let r = pixels * ((k as f64 + 0.5) / LOOKS as f64);
-                let (sin, cos) = (turn + 2.399_963 * k as f64).sin_cos();
                 let (u, v) = (x as f64 + r * cos, y as f64 + r * sin);
                 if u < 0.0 || v < 0.0 || u >= width as f64 || v >= height as f64 {
                     continue;
                 }
-                if let Some((q, _)) = place(u as usize, v as usize) {
-                    let away = q - p;
+                let away = places[v as usize * width + u as usize] - p;
+                let above = away.dot(n);
+                if above > 0.0 {
                     let far = away.length();
-                    if far > 0.0 {
-                        // A small tilt is the curvature of the facet's surroundings, not a wall.
-                        let rise = (away.dot(n) / far - 0.1).max(0.0);
-                        taken += rise * (1.0 - (far / (1.5 * reach)).min(1.0));
-                    }
+                    // A small tilt is the curvature of the facet's surroundings, not a wall.
+                    let rise = (above / far - 0.1).max(0.0);
+                    taken += rise * (1.0 - (far / (1.5 * reach)).min(1.0));
                 }
             }
             (1.0 - 2.2 * taken / LOOKS as f64).clamp(0.0, 1.0) as f32
@@ -240,6 +261,9 @@ fn openness(mesh: &TriMesh, frame: &Frame, seen: &Seen) -> Vec<f32> {
             let (x, y) = (i % width, i / width);
             let depth = |x: usize, y: usize| seen.depth[y * FINE * frame.width + x * FINE];
             let own = depth(x, y);
+            if own.is_infinite() {
+                return 1.0;
+            }
             let (mut sum, mut count) = (0.0, 0.0);
             for v in y.saturating_sub(2)..(y + 2).min(height) {
                 for u in x.saturating_sub(2)..(x + 2).min(width) {
@@ -249,7 +273,7 @@ fn openness(mesh: &TriMesh, frame: &Frame, seen: &Seen) -> Vec<f32> {
                     }
                 }
             }
-            if count > 0.0 { sum / count } else { raw[i] }
+            sum / count
         })
         .collect()
 }

@@ -3,7 +3,7 @@
 use crate::edit::check;
 use crate::edit::work::Work;
 use crate::edit::{ApplyError, Command, Name};
-use crate::network::CurveKind;
+use crate::network::{CurveKind, Seam};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -18,16 +18,6 @@ pub struct Continuity {
     pub seam: Seam,
 }
 
-/// How two patches meet along their curve.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Seam {
-    /// With one tangent plane, as nearly as the patches can.
-    Smooth,
-    /// At the angle that each patch has by itself: C0.
-    Sharp,
-}
-
 impl Command for Continuity {
     fn check(&self) -> Result<(), ApplyError> {
         self.curves.iter().try_for_each(check::name)
@@ -40,10 +30,7 @@ impl Command for Continuity {
             if *kind == CurveKind::Boundary {
                 return Err(ApplyError::NoSeam { curve });
             }
-            *kind = match self.seam {
-                Seam::Smooth => CurveKind::Rounded,
-                Seam::Sharp => CurveKind::Feature,
-            };
+            *kind = self.seam.into();
         }
         Ok(())
     }

@@ -17,7 +17,7 @@ mod symmetry;
 
 pub use add_corner::AddCorner;
 pub use clear::Clear;
-pub use continuity::{Continuity, Seam};
+pub use continuity::Continuity;
 pub use delete_corner::DeleteCorner;
 pub use delete_curves::DeleteCurves;
 pub use drag_corner::DragCorner;
