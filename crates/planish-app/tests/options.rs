@@ -56,6 +56,17 @@ fn options_that_cannot_be_are_told_in_one_line_of_status_2_within_a_second() {
 }
 
 #[test]
+fn a_network_for_a_scan_is_refused_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let points: String = (0..400).map(|k| format!("{} {} {}\n", k % 20, k / 20, (k % 7) as f64 / 10.0)).collect();
+    fs::write(folder.path().join("scan.xyz"), points).unwrap();
+    let output = planish(&["run", "scan.xyz", "--network", "n.json", "-o", "out"], folder.path());
+    assert_eq!(status(&output), 2, "{}", stderr(&output));
+    assert!(error_line(&output).contains("the input is a scan"), "{}", stderr(&output));
+    assert_eq!(names(folder.path()), ["scan.xyz"]);
+}
+
+#[test]
 fn counts_for_each_curve_are_held_against_the_network_before_the_fit() {
     let folder = tempfile::tempdir().unwrap();
     write_box(&folder.path().join("box.ply"), 6);

@@ -38,6 +38,10 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
         truth: None,
     };
     if planish_io::is_scan(input) {
+        if args.network.is_some() {
+            return Err(Failure::usage("--network", "lies on a mesh, and the input is a scan")
+                .hint("use `planish mesh` first, and give its mesh"));
+        }
         let ((scan, far_off), read) = session.step("read", || files::scan_body(input, &args.scan))?;
         return produce(session, job, From { warning: far_off, ..From::scan(&scan) }, staged, vec![read]);
     }
