@@ -729,7 +729,7 @@ export type Scalar = ("luminance" | {
   values: number[];
 });
 
-/** How two patches meet along their curve. */
+/** How two patches are to meet along their curve, whatever the mesh has there. */
 export type Seam = ("smooth" | "sharp");
 
 /** A seam between two patches. */
