@@ -105,6 +105,12 @@ pub struct ToArgs {
     pub to: Option<String>,
 }
 
+/// That an option names curves, and there is no network to have them.
+pub fn unknown_curves(flag: &str) -> Failure {
+    Failure::usage(flag, "needs a network: nobody knows the curves of an automatic one beforehand")
+        .hint("make one with `planish layout` and give it with --network")
+}
+
 /// What single seams are to be.
 #[derive(Args, Clone, Debug, Default)]
 pub struct SeamArgs {
@@ -128,8 +134,7 @@ impl SeamArgs {
     pub fn check(&self, known: bool) -> Result<(), Failure> {
         let Some((flag, ..)) = self.asked().next() else { return Ok(()) };
         if !known {
-            let what = "needs a network: nobody knows the curves of an automatic one beforehand";
-            return Err(Failure::usage(flag, what).hint("make one with `planish layout` and give it with --network"));
+            return Err(unknown_curves(flag));
         }
         match self.smooth_curves.iter().find(|curve| self.sharp_curves.contains(curve)) {
             Some(curve) => {

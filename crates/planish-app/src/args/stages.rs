@@ -1,5 +1,6 @@
 //! Options of the stages after the mesh, and where each parameter struct has its place in the help.
 
+use super::groups::unknown_curves;
 use crate::failure::Failure;
 use crate::options::{StageOptions, StageParams, check_stored};
 use crate::tolerance::{Scale, Tolerance};
@@ -112,8 +113,7 @@ impl AllStages {
         if known || self.per_curve().is_none() {
             return Ok(());
         }
-        let what = "needs a network: nobody knows the curves of an automatic one beforehand";
-        Err(Failure::usage("--per-curve", what).hint("make one with `planish layout` and give it with --network"))
+        Err(unknown_curves("--per-curve"))
     }
 
     /// Refuses a list of counts for each curve that is not as long as the network has curves.

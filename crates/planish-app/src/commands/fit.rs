@@ -1,7 +1,7 @@
 //! `planish fit`: mesh and network to a model; or the surfaces of a model, and its grids where it has none.
 
 use super::missed::{self, Reach};
-use super::run::{From, Job, Made, fitted, seam_rows, summary, verdict};
+use super::run::{From, Job, Made, fitted, own_network, seam_rows, summary, verdict};
 use super::{Session, commit_report, pipeline_failure};
 use crate::args::{AllStages, Fit};
 use crate::failure::{Failure, Status};
@@ -41,11 +41,7 @@ pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
 fn anew(session: &Session, args: &Fit) -> Result<(Report, Model, Option<Reach>), Failure> {
     let (placed, read) = session.step("read", || Placed::read(&args.input))?;
     let units = session.units_of(&args.input);
-    let mut network = files::optional_network(args.network.as_deref(), &placed.mesh)?;
-    if let Some(network) = &mut network {
-        args.stages.check_curves(network)?;
-        args.seams.apply(network)?;
-    }
+    let network = own_network(args.network.as_deref(), &placed.mesh, &args.stages, &args.seams)?;
     let job = Job {
         command: "fit",
         path: &args.input,

@@ -2,7 +2,7 @@
 
 use super::missed::{self, Reach};
 use super::{Session, commit_report, pipeline_failure, write_failure, write_relief, write_text};
-use crate::args::Run;
+use crate::args::{AllStages, Run, SeamArgs};
 use crate::failure::{Failure, Status};
 use crate::files;
 use crate::pictures;
@@ -13,6 +13,7 @@ use crate::tolerance::Tolerance;
 use planish::DVec3;
 use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{HistoryEntry, Model, Units};
+use planish::network::Network;
 use planish::pipeline::{self, Figure, Fitted, Input, RunParams, ScanParams, Scanned, StageRecord};
 use planish_io::report::{self, Report, SeamRow, count, distance, number, percent};
 use planish_io::{StepInput, Up, WriteError, WriteOptions};
@@ -50,13 +51,24 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
         return Err(Failure::usage(flag, "is for scans, and the input is none").hint("leave it out"));
     }
     let (placed, read) = session.step("read", || Placed::read(input))?;
-    let mut network = files::optional_network(args.network.as_deref(), &placed.mesh)?;
-    if let Some(network) = &mut network {
-        args.stages.check_curves(network)?;
-        args.seams.apply(network)?;
-    }
+    let network = own_network(args.network.as_deref(), &placed.mesh, &args.stages, &args.seams)?;
     let from = From { input: placed.input(network), shift: placed.shift, warning: placed.warning(units.symbol()) };
     produce(session, job, from, staged, vec![read])
+}
+
+/// The user's own network on a mesh, if one is given: its curves checked, its seams as they are to be.
+pub fn own_network(
+    path: Option<&Path>,
+    mesh: &TriMesh,
+    stages: &AllStages,
+    seams: &SeamArgs,
+) -> Result<Option<Network>, Failure> {
+    let mut network = files::optional_network(path, mesh)?;
+    if let Some(network) = &mut network {
+        stages.check_curves(network)?;
+        seams.apply(network)?;
+    }
+    Ok(network)
 }
 
 /// What a model is made of.

@@ -12,8 +12,8 @@ use std::io::{BufReader, Cursor, Read, Seek, SeekFrom, Write};
 /// Bytes of the first point of a compressed chunk, which is not compressed: the shortest format has 20.
 const CHUNK: u64 = 20;
 
-/// Bytes of records that are unpacked at a time: those of [`PIECE`] points in the longest standard format. A header may tell of
-/// longer ones.
+/// Bytes of records that are unpacked at a time: those of [`PIECE`] points in the longest standard format, which has 67. A
+/// header may tell of longer ones.
 const PIECE_BYTES: usize = 67 * PIECE;
 
 /// Refuses compressed points whose table names more chunks than the file has room for: the library that reads them takes memory
