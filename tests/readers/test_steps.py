@@ -70,10 +70,11 @@ def test_a_project_alone_is_fitted_anew_with_the_control_points_asked_for(demo, 
         assert "layout" not in names and "grids" not in names and "surfaces" in names
         assert one["input"]["units"] == "cm" and one["quality"]["grid.points"] == report["quality"]["grid.points"]
         assert one["quality"]["relief.rounding_max_rel"] < 1e-9
-    # A second for a hundred patches; the less of two, as other work may run beside.
-    refits = [fine, fit(tmp_path, "m.planish", "--control", "12,12", "-o", "twice.planish")]
-    names = {"surfaces", "seams", "relief"}
-    assert min(sum(s["seconds"] for s in one["stages"] if s["name"] in names) for one in refits) < patches / 100
+    # A fit anew is little against the run that made the network and its grids, on this same machine.
+    def seconds(one, *names):
+        return sum(s["seconds"] for s in one["stages"] if s["name"] in names)
+
+    assert seconds(fine, "surfaces", "seams", "relief") < seconds(report, "layout", "grids") / 5
     # Without options: with the parameters it was made with, so nothing changes.
     again = fit(tmp_path, "m.planish", "-o", "again.planish")
     same_surfaces(report, again)
