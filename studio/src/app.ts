@@ -5,7 +5,7 @@ import * as store from './model/store';
 import type { Answer, Body } from './protocol/client';
 import { Client, Refused } from './protocol/client';
 import type { Geometry } from './protocol/frames';
-import type { CurveName, Edit, Format, Layer, Resolution, Sample, Why } from './protocol/types';
+import type { CurveName, Edit, Format, Layer, ReliefEdit, Resolution, Sample, Why } from './protocol/types';
 import { Carry } from './tools/carry';
 import { AddCorner, Erase, erase, Measure, Select, Split } from './tools/clicks';
 import { Cut } from './tools/cut';
@@ -13,6 +13,7 @@ import { Handles } from './tools/handles';
 import { Hold } from './tools/hold';
 import { Lasso } from './tools/lasso';
 import { Pull } from './tools/pull';
+import { Sculpt } from './tools/sculpt';
 import { Stroke } from './tools/stroke';
 import type { Bench, Tool } from './tools/tool';
 import { blend } from './view/blend';
@@ -79,6 +80,7 @@ export class App implements Bench {
       handles: new Handles(this),
       corner: new AddCorner(this),
       split: new Split(this),
+      sculpt: new Sculpt(this),
       erase: new Erase(this),
       measure: new Measure(this),
       lasso: new Lasso(this),
@@ -97,7 +99,8 @@ export class App implements Bench {
     this.view.setMarks(NOTHING, NOTHING);
     store.toolHint.value = '';
     store.tool.value = tool;
-    store.tab.value = 'edit';
+    store.tab.value = tool === 'sculpt' ? 'relief' : 'edit';
+    if (tool === 'sculpt') store.showShape('displaced');
   }
 
   world(place: Vector3): [number, number, number] {
@@ -170,8 +173,13 @@ export class App implements Bench {
     this.view.setLine('preview', new Float32Array(list));
   }
 
-  undo = () => this.edit({ edit: 'undo', count: 1 });
-  redo = () => this.edit({ edit: 'redo', count: 1 });
+  /** Takes the last step back: with the brush in hand the last edit of the relief. */
+  undo = () => (store.tool.value === 'sculpt' ? this.unsculpt() : this.back(1));
+  redo = () => (store.tool.value === 'sculpt' ? this.resculpt() : this.forth(1));
+
+  sculpt = (edit: ReliefEdit) => this.ask({ type: 'sculpt', edit });
+  unsculpt = () => this.ask({ type: 'unsculpt', count: 1 });
+  resculpt = () => this.ask({ type: 'resculpt', count: 1 });
   async handles(curve: CurveName, control: number): Promise<Vector3[]> {
     const answer = await this.ask({ type: 'handles', curve, control });
     return answer?.type === 'handles' ? answer.points.map((p) => this.local(p)) : [];
@@ -179,7 +187,8 @@ export class App implements Bench {
 
   lasso = (view: number[], line: [number, number][]) =>
     this.ask({ type: 'lasso', view: view as Lasso16, line, outside: store.lassoOutside.value });
-  takeIn = (all: boolean) => this.ask({ type: 'take_in', all });
+  back = (count: number) => this.edit({ edit: 'undo', count });
+  forth = (count: number) => this.edit({ edit: 'redo', count });
   clean = () => this.ask({ type: 'clean' });
   closeHole = (hole: number) => this.ask({ type: 'close_hole', hole });
   branch = (branch: number) => this.ask({ type: 'branch', branch });

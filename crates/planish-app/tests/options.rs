@@ -130,17 +130,26 @@ fn a_missed_tolerance_and_a_missed_number_of_patches_name_the_limit_and_the_opti
         }
     }
     fs::write(folder.path().join("wave.obj"), text).unwrap();
+    // One patch: the whole sheet between its four corners.
+    let corners = [[1, 0], [1, 1], [0, 1]].map(|[x, y]| {
+        let z = wave(n * x) * wave(n * y) * 20.0;
+        format!("[[step]]\nedit = \"add_corner\"\nat = [{x}, {y}, {z}]\n")
+    });
+    let script = format!("[[step]]\nedit = \"boundaries\"\n{}", corners.concat());
+    fs::write(folder.path().join("one.toml"), script).unwrap();
+    let drawn = planish(&["edit", "wave.obj", "one.toml", "-o", "one.planish", "--no-fit"], folder.path());
+    assert_eq!(status(&drawn), 0, "{}", stderr(&drawn));
     let fit = |tolerance: &str, more: &[&str]| {
-        let args = ["fit", "wave.obj", "-o", "m.planish", "--sharp-angle-deg", "170", "--tolerance", tolerance];
+        let args = ["fit", "one.planish", "-o", "m.planish", "--force", "--tolerance", tolerance];
         planish(&[&args, more].concat(), folder.path())
     };
-    let output = fit("1e-7", &["--patches", "4"]);
+    let output = fit("1e-7", &[]);
     assert_eq!(status(&output), 1, "{}", stderr(&output));
     assert!(stderr(&output).contains("--cells-per-span 4: lower that, or raise --density"), "{}", stderr(&output));
     assert!(stdout(&output).contains("missed: "), "{}", stdout(&output));
     // One share of the diagonal and the lengths that it is (the box is 1 x 1 x 0.1): the same bytes.
     let bytes = |tolerance: &str| {
-        let output = fit(tolerance, &["--patches", "4", "-q"]);
+        let output = fit(tolerance, &["-q"]);
         assert!(status(&output) < 2, "{}", stderr(&output));
         fs::read(folder.path().join("m.planish")).unwrap().len()
     };

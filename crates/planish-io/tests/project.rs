@@ -39,6 +39,7 @@ fn model(n: usize) -> Model {
         network,
         units: Units::In,
         params: "{\"layout\":{\"patches\":16}}".into(),
+        studio: "{\"origin\":1}".into(),
         history: vec![entry("layout"), entry("fit"), entry("move_corner")],
         ..Model::default()
     }

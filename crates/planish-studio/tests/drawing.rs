@@ -54,7 +54,7 @@ fn points_are_looked_at_left_out_and_taken_in_and_make_a_mesh_of_a_given_cell() 
         assert_eq!(page.state["project"]["center"], json!(center), "what is shown stays where it is");
         assert_eq!(page.state["cleaned"], Value::Null);
         assert_eq!(page.ask(lasso.clone()).await["type"], "refused");
-        page.ask(json!({ "type": "take_in" })).await;
+        page.edit(json!({ "edit": "undo" })).await;
         page.state_with(|s| s["left_out"] == 0).await;
         assert_eq!(page.ask(lasso).await["type"], "done");
         assert_eq!(page.ask(json!({ "type": "mesh", "voxel": -1.0 })).await["type"], "refused");
@@ -89,6 +89,7 @@ fn a_pipe_is_closed_at_one_end_and_stays_open_at_the_other() {
     run(async {
         let mut page = server.connect().await;
         page.state_with(|s| s["holes"].as_array().is_some_and(|h| h.len() == 2)).await;
+        let open = page.state["project"]["triangles"].clone();
         let around = page.state["holes"][0]["around"].as_f64().unwrap();
         assert!((around - std::f64::consts::TAU).abs() < 0.1, "{around}");
         assert_eq!(page.ask(json!({ "type": "close_hole", "hole": 0 })).await["type"], "done");
@@ -98,6 +99,196 @@ fn a_pipe_is_closed_at_one_end_and_stays_open_at_the_other() {
         page.state_with(|s| counts(s)[0] > 0).await;
         let refused = page.ask(json!({ "type": "close_hole", "hole": 0 })).await;
         assert!(refused["why"]["message"].as_str().unwrap().contains("curves are drawn"), "{refused}");
+        // Back to the pipe with both ends open, and on again.
+        let corners = counts(&page.state)[0];
+        page.edit(json!({ "edit": "undo", "count": 2 })).await;
+        page.state_with(|s| names(&s["undone"]) == ["boundaries", "close_hole"]).await;
+        assert_eq!((names(&page.state["done"]), &page.state["project"]["triangles"]), (vec![], &open));
+        assert_eq!(page.state["holes"].as_array().map(Vec::len), Some(2));
+        page.edit(json!({ "edit": "redo", "count": 2 })).await;
+        page.state_with(|s| counts(s)[0] == corners).await;
+        assert_eq!(names(&page.state["done"]), ["close_hole", "boundaries"]);
+    });
+    server.end();
+}
+
+/// Names of steps of the history.
+fn names(steps: &Value) -> Vec<&str> {
+    steps.as_array().into_iter().flatten().map(|s| s["edit"].as_str().unwrap()).collect()
+}
+
+/// A copy of a folder as it is on the disk: what a kill leaves.
+fn copied(folder: &std::path::Path) -> tempfile::TempDir {
+    let copy = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap).filter(|e| e.path().is_file()) {
+        std::fs::copy(entry.path(), copy.path().join(entry.file_name())).unwrap();
+    }
+    copy
+}
+
+#[test]
+fn steps_to_a_mesh_are_taken_back_and_made_again_after_an_end_and_after_a_kill() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = points(folder.path());
+    let file = |folder: &std::path::Path, name: &str| folder.join(name).exists();
+    let server = Server::start(folder.path(), Some(scan.clone()));
+    let lasso = |center: &Value| {
+        let at = |x: f64, y: f64| {
+            json!([(x - center[0].as_f64().unwrap()) / 10.0, (y - center[1].as_f64().unwrap()) / 10.0])
+        };
+        let line = json!([at(2.0, -0.5), at(4.0, -0.5), at(4.0, 2.0), at(2.0, 2.0)]);
+        json!({ "type": "lasso", "view": view(10.0), "line": line })
+    };
+    // Points left out, and no mesh yet: a kill and an end both leave them out.
+    let mut killed = None;
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["layers"]["points"].is_string()).await;
+        let request = lasso(&page.state["project"]["center"]);
+        assert_eq!(page.ask(request).await["told"], "20 points left out.");
+        killed = Some(copied(folder.path()));
+    });
+    server.end();
+    let killed = killed.unwrap();
+    let server = Server::start(killed.path(), Some(killed.path().join("ball.xyz")));
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["left_out"] == 20).await;
+        page.edit(json!({ "edit": "undo" })).await;
+        page.state_with(|s| names(&s["undone"]) == ["leave_out"]).await;
+        assert_eq!(page.state["left_out"], 0);
+    });
+    server.end();
+    // A mesh and an edit on it; then the project holds the steps.
+    let server = Server::start(folder.path(), Some(scan.clone()));
+    let mut triangles = Value::Null;
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["left_out"] == 20).await;
+        page.ask(json!({ "type": "mesh", "close": true, "voxel": 0.24 })).await;
+        page.state_with(|s| s["layers"]["mesh"].is_string()).await;
+        triangles = page.state["project"]["triangles"].clone();
+        assert_eq!(page.edit(json!({ "edit": "add_corner", "at": [0.0, 0.0, 1.0] })).await["type"], "done");
+    });
+    server.end();
+    assert!(file(folder.path(), "ball.planish") && !file(folder.path(), "ball.planish-steps"));
+    // All of it taken back, which reads the scan again; a kill; and made again.
+    let server = Server::start(folder.path(), Some(folder.path().join("ball.planish")));
+    let mut killed = None;
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| names(&s["done"]) == ["leave_out", "mesh", "add_corner"]).await;
+        let far = page.ask(json!({ "type": "mesh" })).await;
+        assert!(far["why"]["hint"].as_str().unwrap().contains("take them back"), "{far}");
+        page.edit(json!({ "edit": "undo", "count": 3 })).await;
+        page.state_with(|s| names(&s["undone"]) == ["add_corner", "mesh", "leave_out"]).await;
+        assert_eq!((&page.state["left_out"], page.state["layers"]["points"].is_string()), (&json!(0), true));
+        page.edit(json!({ "edit": "redo" })).await;
+        page.state_with(|s| names(&s["done"]) == ["leave_out"]).await;
+        assert_eq!(page.state["left_out"], 20);
+        killed = Some(copied(folder.path()));
+    });
+    server.end();
+    let killed = killed.unwrap();
+    let server = Server::start(killed.path(), Some(killed.path().join("ball.planish")));
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["left_out"] == 20).await;
+        assert_eq!(names(&page.state["undone"]), ["add_corner", "mesh"]);
+        page.edit(json!({ "edit": "redo", "count": 2 })).await;
+        page.state_with(|s| names(&s["done"]) == ["leave_out", "mesh", "add_corner"]).await;
+        assert_eq!(page.state["project"]["triangles"], triangles);
+        assert_eq!(page.state["corners"].as_array().map(Vec::len), Some(1));
+        // A step of its own ends what could be made again.
+        page.edit(json!({ "edit": "undo", "count": 2 })).await;
+        page.state_with(|s| names(&s["undone"]).len() == 2).await;
+        page.ask(json!({ "type": "mesh", "close": true, "voxel": 0.3 })).await;
+        page.state_with(|s| names(&s["done"]) == ["leave_out", "mesh"]).await;
+        assert_eq!(names(&page.state["undone"]), [""; 0]);
+        // The scan is needed for what is before its mesh, and told where it is missing.
+        std::fs::remove_file(killed.path().join("ball.xyz")).unwrap();
+    });
+    server.end();
+    let server = Server::start(killed.path(), Some(killed.path().join("ball.planish")));
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["layers"]["mesh"].is_string()).await;
+        let refused = page.edit(json!({ "edit": "undo" })).await;
+        assert!(refused["why"]["message"].as_str().unwrap().starts_with("ball.xyz: "), "{refused}");
+        assert!(page.state["layers"]["mesh"].is_string());
+    });
+    server.end();
+}
+
+#[test]
+fn strokes_on_the_relief_stay_on_new_surfaces_go_back_and_come_again_after_a_kill() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), Some(sphere(folder.path(), 4)));
+    /// The largest displacement of all patches.
+    async fn most(page: &mut Page) -> f64 {
+        let mut most = 0f64;
+        for patch in 0..page.state["patches"].as_array().unwrap().len() {
+            let map = page.ask(json!({ "type": "map", "patch": patch })).await;
+            most = most.max(map["most"].as_f64().unwrap());
+        }
+        most
+    }
+    let stroke = |radius: f64| {
+        let edit = json!({ "edit": "stroke", "path": [[0, 0, 1], [0.1, 0, 0.99]], "radius": radius, "height": 0.05 });
+        json!({ "type": "sculpt", "edit": edit })
+    };
+    let mut killed = None;
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["layers"]["mesh"].is_string()).await;
+        let refused = page.ask(stroke(0.3)).await;
+        assert!(refused["why"]["message"].as_str().unwrap().contains("no relief yet"), "{refused}");
+        page.ask(json!({ "type": "setting", "resolution": { "control": [8, 8] }, "live": false })).await;
+        assert_eq!(page.edit(json!({ "edit": "complete", "patches": 6 })).await["type"], "done");
+        assert_eq!(page.ask(json!({ "type": "fit" })).await["type"], "done");
+        page.state_with(|s| s["stages"][4]["is"] == "fresh").await;
+        let bare = most(&mut page).await;
+        assert!(bare < 0.01, "{bare}");
+        assert_eq!(page.ask(stroke(0.3)).await["type"], "done");
+        page.state_with(|s| s["relief_done"] == json!(["stroke"])).await;
+        let raised = most(&mut page).await;
+        assert!((raised - 0.05).abs() < bare + 1e-3, "{raised}");
+        killed = Some(copied(folder.path()));
+        // What cannot be meant leaves the list as it was.
+        let refused = page.ask(stroke(0.0)).await;
+        assert!(refused["why"]["message"].as_str().unwrap().contains("radius above 0"), "{refused}");
+        page.state_with(|s| s["relief_done"] == json!(["stroke"])).await;
+        // Taken back and made again.
+        assert_eq!(page.ask(json!({ "type": "unsculpt", "count": 1 })).await["type"], "done");
+        page.state_with(|s| s["relief_undone"] == json!(["stroke"])).await;
+        assert!(most(&mut page).await < 0.01);
+        assert_eq!(page.ask(json!({ "type": "unsculpt", "count": 1 })).await["type"], "refused");
+        assert_eq!(page.ask(json!({ "type": "resculpt", "count": 1 })).await["type"], "done");
+        page.state_with(|s| s["relief_undone"] == json!([])).await;
+        assert_eq!(most(&mut page).await, raised);
+        // New surfaces get it again.
+        assert_eq!(page.edit(json!({ "edit": "relax" })).await["type"], "done");
+        assert_eq!(page.ask(json!({ "type": "fit" })).await["type"], "done");
+        page.state_with(|s| s["stages"][4]["is"] == "fresh").await;
+        let again = most(&mut page).await;
+        assert!((again - 0.05).abs() < 0.01, "{again}");
+        assert_eq!(page.state["relief_done"], json!(["stroke"]));
+    });
+    server.end();
+    let killed = killed.unwrap();
+    let file = std::fs::read_dir(killed.path()).unwrap().map(|e| e.unwrap().path());
+    let file = file.into_iter().find(|p| p.extension().is_some_and(|e| e == "planish")).unwrap();
+    let server = Server::start(killed.path(), Some(file));
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["relief_done"] == json!(["stroke"])).await;
+        // Surfaces that were not in the file yet are fitted when somebody asks for them.
+        if page.state["stages"][4]["is"] != "fresh" {
+            page.ask(json!({ "type": "setting", "resolution": { "control": [8, 8] }, "live": true })).await;
+        }
+        page.state_with(|s| s["stages"][4]["is"] == "fresh" && s["jobs"] == json!([])).await;
+        let raised = most(&mut page).await;
+        assert!((raised - 0.05).abs() < 0.01, "{raised}");
     });
     server.end();
 }

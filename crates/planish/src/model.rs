@@ -35,6 +35,8 @@ pub struct Model {
     pub shift: DVec3,
     /// Parameters of the stages that made the model, as one JSON object (empty: unknown).
     pub params: String,
+    /// What the studio keeps besides, as one JSON object (empty: nothing): steps by hand to the mesh, edits of the relief.
+    pub studio: String,
     /// The commands that led here, oldest first.
     pub history: Vec<HistoryEntry>,
     /// What is drawn besides the network.

@@ -226,6 +226,13 @@ fn scale_threshold_erase_blur_and_sharpen_do_what_they_say() {
     assert_eq!(after(r#"{"edit":"threshold","height":0.1}"#), low);
     let erased = after(r#"{"edit":"erase","region":{"at":[1,1,0],"radius":0.4}}"#);
     assert!(erased.iter().zip(&was).all(|(e, w)| if *w > 0.1 { *e == 0.0 } else { *e <= *w }));
+    // Along a path: all of the tube, and nothing beyond its radius.
+    let along = |p: DVec3| (p.x - p.x.clamp(0.5, 1.5)).hypot(p.y - 1.0);
+    let away: Vec<f64> = heights(&work, along).iter().flat_map(|r| &r.vectors).map(|d| d.z).collect();
+    let tube = after(r#"{"edit":"erase","region":{"path":[[0.5,1,0],[1.5,1,0]],"radius":0.2}}"#);
+    for ((t, w), away) in tube.iter().zip(&was).zip(&away) {
+        assert_eq!(*t, if *away <= 0.2 { 0.0 } else { *w }, "{away}");
+    }
     let outside = after(r#"{"edit":"erase","region":{"at":[1,1,0],"radius":0.4,"outside":true}}"#);
     assert!(outside.iter().zip(&was).all(|(o, w)| *w < 0.1 || o == w));
     let one = after(r#"{"edit":"erase","region":{"patches":[3]}}"#);
@@ -411,6 +418,8 @@ fn edits_that_cannot_be_meant_tell_why() {
         (r#"{"edit":"stroke","path":[[0,0,0]],"radius":0,"height":1}"#, "radius above 0"),
         (r#"{"edit":"erase","region":{"patches":[1]}}"#, "no patch 1 among 1"),
         (r#"{"edit":"erase","region":{"at":[0,0,0]}}"#, "needs a radius"),
+        (r#"{"edit":"erase","region":{"path":[[0,0,0]]}}"#, "needs a radius"),
+        (r#"{"edit":"erase","region":{"path":[[0,0,0]],"at":[0,0,0],"radius":1}}"#, "one of path and at"),
         (r#"{"edit":"erase","region":{"image":"a.png"}}"#, "needs at, up and width"),
         (r#"{"edit":"erase","region":{"width":1}}"#, "name the image"),
         (r#"{"edit":"erase","region":{"image":"a.png","at":[0,0,0],"up":[0,0,1],"width":1}}"#, "along the normal"),

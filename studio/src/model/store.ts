@@ -30,6 +30,8 @@ export const EMPTY: State = {
   branches: [],
   longest: null,
   peer: null,
+  relief_done: [],
+  relief_undone: [],
 };
 
 export type ToolId =
@@ -42,11 +44,13 @@ export type ToolId =
   | 'handles'
   | 'corner'
   | 'split'
+  | 'sculpt'
   | 'erase'
   | 'measure'
   | 'lasso'
   | 'carry';
 export type PaintMode = 'straight' | 'geodesic' | 'magnetic';
+export type BrushMode = 'raise' | 'engrave' | 'smooth' | 'erase';
 export type Shading = 'clay' | 'patches' | 'deviation' | 'curvature' | 'zebra';
 export type Picked = { kind: 'corner' | 'curve' | 'patch' | 'feature'; index: number };
 export type Shape = 'mesh' | 'surfaces' | 'displaced' | 'points' | 'peer';
@@ -78,6 +82,12 @@ export const pointColor = signal<PointColor>('height');
 export const holds = signal<Holds | null>(null);
 /** How stiff the brush makes a stretch, against what is around it. */
 export const stiffness = signal(10);
+/** The brush of the relief; its radius and its height are shares of the diagonal. */
+export const brush = signal<{ mode: BrushMode; size: number; height: number }>({
+  mode: 'raise',
+  size: 0.04,
+  height: 0.005,
+});
 /** Control vertices of the tool with handles. */
 export const handleCount = signal(8);
 /** Pairs of places, on the other project and on this one. */
@@ -159,6 +169,8 @@ export function canUse(id: ToolId, { layers, patches, curves, files, peer }: Sta
       return Boolean(layers.points) && !layers.mesh;
     case 'feature':
       return patches.length > 0;
+    case 'sculpt':
+      return Boolean(layers.displaced);
     case 'hold':
     case 'handles':
       return curves.length > 0;

@@ -51,6 +51,12 @@ export const TOOLS: { id: ToolId; key: string; name: string; hint: string }[] = 
     name: 'Feature curve',
     hint: 'Click from one side of a patch across to another: the grid of the patch follows the curve. Enter ends it.',
   },
+  {
+    id: 'sculpt',
+    key: 'R',
+    name: 'Brush of the relief',
+    hint: 'Drag over the part: the relief rises, sinks, gets smooth or goes. [ and ] make the brush smaller and larger.',
+  },
   { id: 'erase', key: 'X', name: 'Delete', hint: 'Click a curve to delete it, or a corner to join its two curves.' },
   { id: 'measure', key: 'M', name: 'Measure', hint: 'Click two places: their distance is shown.' },
   {
@@ -67,8 +73,11 @@ export const TOOLS: { id: ToolId; key: string; name: string; hint: string }[] = 
   },
 ];
 
-/** Names of edits in the history. */
+/** Names of steps to the mesh and of edits in the history. */
 export const EDITS: Record<string, string> = {
+  leave_out: 'Points left out',
+  mesh: 'Mesh made',
+  close_hole: 'Hole closed',
   paint: 'Curve painted',
   extend: 'Curve led on',
   cut: 'Cut by a plane',
@@ -190,7 +199,6 @@ export const TEXT = {
   close: 'Close',
   top: {
     unsaved: (why: string) => `Not saved: ${why}`,
-    later: 'Saved once there is a mesh',
     saved: 'Saved',
     saving: 'Saving ...',
     undo: 'Undo',
@@ -408,6 +416,18 @@ export const TEXT = {
     note: 'What is longer than the wavelength belongs to the form, what is shorter to the detail. The surfaces stay as they are.',
     below: 'below',
     above: 'above',
+    brush: 'Brush',
+    take: 'Take the brush',
+    mode: 'The brush',
+    raise: 'Raises',
+    engrave: 'Engraves',
+    smooth: 'Smooths',
+    erase: 'Erases',
+    radius: 'Radius',
+    height: 'Height',
+    edits: (n: number) => `${some(n, 'edit')} of the relief. New surfaces get them again.`,
+    back: 'Take the last back',
+    again: 'Make it again',
   },
   look: {
     shape: 'Shape',
@@ -440,7 +460,7 @@ export const TEXT = {
   },
   history: {
     title: 'History',
-    empty: 'Every edit is kept here, across restarts.',
+    empty: 'Every step is kept here, across restarts.',
     began: 'As it began',
     curves: (n: number) => some(n, 'curve'),
     script: 'Save as a script',

@@ -13,11 +13,9 @@ export function TopBar({ app }: { app: App }) {
     ? ''
     : project.unsaved
       ? TEXT.top.unsaved(project.unsaved)
-      : project.triangles === 0
-        ? TEXT.top.later
-        : project.saved
-          ? TEXT.top.saved
-          : TEXT.top.saving;
+      : project.saved
+        ? TEXT.top.saved
+        : TEXT.top.saving;
   return (
     <header class="top">
       <div class="brand">

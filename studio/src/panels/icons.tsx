@@ -16,6 +16,7 @@ const PATHS: Record<
   carry: 'M2 6h6v8H2zM12 6h6v8h-6M7 10h6M11 8l2 2-2 2',
   corner: 'M3 15C7 15 7 5 17 5M10 10m-2.500 0a2.500 2.500 0 1 0 5 0 2.500 2.500 0 1 0-5 0',
   split: 'M10 2l7 5-2.500 9h-9L3 7zM10 10V16M10 10L3 7M10 10l7-3',
+  sculpt: 'M2 15c3 0 4-2 5-5s3-5 5-1 2 6 6 6M14 2l3 3-4 4-3-3z',
   erase: 'M4 6h12M8 6V4h4v2M6 6l1 11h6l1-11M9 9v5M11 9v5',
   measure: 'M2 13L13 2l5 5L7 18zM6 9l2 2M9 6l2 2M12 3l2 2',
   undo: 'M7 4L3 8l4 4M3 8h8a5 5 0 0 1 0 10H8',

@@ -163,8 +163,6 @@ export function HistoryPanel({ app }: { app: App }) {
   const { done, undone, branches } = store.state.value;
   const told = TEXT.history;
   const name = (edit: string) => EDITS[edit] ?? edit;
-  const back = (count: number) => void app.edit({ edit: 'undo', count });
-  const forth = (count: number) => void app.edit({ edit: 'redo', count });
   return (
     <>
       <Section title={told.title}>
@@ -172,7 +170,7 @@ export function HistoryPanel({ app }: { app: App }) {
         <ol class="history">
           {done.length > 0 && (
             <li>
-              <button type="button" onClick={() => back(done.length)}>
+              <button type="button" onClick={() => void app.back(done.length)}>
                 {told.began}
               </button>
             </li>
@@ -182,22 +180,22 @@ export function HistoryPanel({ app }: { app: App }) {
               <button
                 type="button"
                 aria-current={k === done.length - 1 ? 'step' : undefined}
-                onClick={() => k < done.length - 1 && back(done.length - 1 - k)}
+                onClick={() => k < done.length - 1 && void app.back(done.length - 1 - k)}
               >
                 {name(step.edit)}
-                <span class="number faint">{told.curves(step.counts[1])}</span>
+                {step.counts && <span class="number faint">{told.curves(step.counts[1])}</span>}
               </button>
             </li>
           ))}
           {[...undone].reverse().map((step, k) => (
             <li key={`u${k}`} class="undone">
-              <button type="button" onClick={() => forth(k + 1)}>
+              <button type="button" onClick={() => void app.forth(k + 1)}>
                 {name(step.edit)}
               </button>
             </li>
           ))}
         </ol>
-        {done.length > 0 && (
+        {done.some((step) => step.counts) && (
           <button type="button" onClick={() => void app.script()}>
             {told.script}
           </button>

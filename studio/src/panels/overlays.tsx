@@ -148,7 +148,7 @@ export function commands(app: App): Command[] {
   if (store.hidden.value.size > 0 || store.isolated.value !== null) add(words.showAll, () => app.showAll());
   add(words.fitView, () => app.home(), 'Home');
   add(words.picture, () => app.picture());
-  if (state.done.length > 0) add(words.script, () => app.script());
+  if (state.done.some((step) => step.counts)) add(words.script, () => app.script());
   add(
     words.keys,
     () => {

@@ -55,8 +55,10 @@ export function ReliefPanel({ app }: { app: App }) {
   }
   const now = map.value;
   const scale = now ? usualMost(now.heights) : 1;
+  const isInHand = store.tool.value === 'sculpt';
   return (
     <>
+      {isInHand && <Brush app={app} />}
       <Section title={words.title}>
         <label class="field">
           {words.patch}
@@ -103,8 +105,81 @@ export function ReliefPanel({ app }: { app: App }) {
           }}
         />
       </Section>
+      {!isInHand && <Brush app={app} />}
       <Waves app={app} />
     </>
+  );
+}
+
+/** Radii and heights of the brush from the slider, of the diagonal: steps of a quarter more. */
+const sizeAt = (step: number) => 0.04 * 1.25 ** step;
+const heightAt = (step: number) => 0.005 * 1.25 ** step;
+
+function Brush({ app }: { app: App }) {
+  const { project, relief_done: done, relief_undone: undone } = store.state.value;
+  const { mode, size, height } = store.brush.value;
+  const words = TEXT.relief;
+  const diagonal = project?.diagonal ?? 1;
+  const units = project?.units ?? '';
+  const step = (value: number, usual: number) => Math.round(Math.log(value / usual) / Math.log(1.25));
+  const isInHand = store.tool.value === 'sculpt';
+  return (
+    <Section title={words.brush}>
+      {!isInHand && (
+        <button type="button" onClick={() => app.choose('sculpt')}>
+          {words.take}
+        </button>
+      )}
+      {isInHand && (
+        <>
+          <Choice
+            label={words.mode}
+            value={mode}
+            options={(['raise', 'engrave', 'smooth', 'erase'] as const).map((m) => [m, words[m]] as const)}
+            onPick={(m) => {
+              store.brush.value = { ...store.brush.value, mode: m };
+            }}
+          />
+          <Slider
+            label={words.radius}
+            value={step(size, sizeAt(0))}
+            min={-10}
+            max={8}
+            step={1}
+            show={() => length(size * diagonal, units)}
+            onInput={(k) => {
+              store.brush.value = { ...store.brush.value, size: sizeAt(k) };
+            }}
+          />
+          {(mode === 'raise' || mode === 'engrave') && (
+            <Slider
+              label={words.height}
+              value={step(height, heightAt(0))}
+              min={-12}
+              max={10}
+              step={1}
+              show={() => length(height * diagonal, units)}
+              onInput={(k) => {
+                store.brush.value = { ...store.brush.value, height: heightAt(k) };
+              }}
+            />
+          )}
+        </>
+      )}
+      {done.length + undone.length > 0 && (
+        <>
+          <p class="faint">{words.edits(done.length)}</p>
+          <div class="row">
+            <button type="button" disabled={done.length === 0} onClick={() => void app.unsculpt()}>
+              {words.back}
+            </button>
+            <button type="button" disabled={undone.length === 0} onClick={() => void app.resculpt()}>
+              {words.again}
+            </button>
+          </div>
+        </>
+      )}
+    </Section>
   );
 }
 

@@ -59,10 +59,10 @@ export function PointsSection({ app }: { app: App }) {
         <>
           <p class="faint">{words.leftOut(count(left_out))}</p>
           <div class="row">
-            <button type="button" onClick={() => void app.takeIn(false)}>
+            <button type="button" onClick={() => void app.undo()}>
               {words.back}
             </button>
-            <button type="button" onClick={() => void app.takeIn(true)}>
+            <button type="button" onClick={() => void app.back(store.state.value.done.length)}>
               {words.all}
             </button>
           </div>

@@ -389,6 +389,10 @@ export type Message = ({
   peer?: (Peer | null);
   /** The project; absent on the start page. */
   project?: (Project | null);
+  /** Edits of the relief, oldest first, by their names in a script. */
+  relief_done: string[];
+  /** Those that can be made again, the next one last. */
+  relief_undone: string[];
   /** How fine surfaces are. */
   resolution: Resolution;
   /** Rises with every change of the drawing. */
@@ -514,6 +518,16 @@ export type Peer = {
   file: string;
 };
 
+/** A place: in space, or on a patch. */
+export type Place = ([number, number, number] | {
+  /** The patch. */
+  patch: number;
+  /** From 0 to 1. */
+  u: number;
+  /** From 0 to 1. */
+  v: number;
+});
+
 /** A plane through `point` with unit normal `normal`. */
 export type Plane = {
   /** Unit normal. */
@@ -559,6 +573,133 @@ export type Pull = {
   /** Weight against the forces of the curve. */
   weight?: number;
 };
+
+/** A part of the surface: what all of its keys name together. */
+export type Region = {
+  /** Middle of a ball, and of the image. */
+  at?: (Place | null);
+  /** How far above and below its middle the image reaches, units of the model [default: half the width]. */
+  depth?: number | null;
+  /** Width of the soft border inside it, units of the model. */
+  feather?: number;
+  /** File of an image beside the script, laid on the surface as that of a stamp: white, times alpha, is in the region, black is not, and grey is in it by its share. */
+  image?: string | null;
+  /** All that is not in it. */
+  outside?: boolean;
+  /** Only these patches; all if none are named. */
+  patches?: number[];
+  /** Places that a tube runs along in the place of the ball, joined by straight lines in space. The other side of a thin wall is not in it. */
+  path?: Place[];
+  /** Radius of the ball or the tube, units of the model; 0 beside an image for no ball. */
+  radius?: number;
+  /** Direction that is up in the image, as it appears seen along the normal. */
+  up?: [number, number, number] | null;
+  /** Width of the image on the surface, units of the model. */
+  width?: number | null;
+};
+
+/** An edit. */
+export type ReliefEdit = ({
+  edit: "scale";
+  /** What the layer is multiplied by, on top of what it was. */
+  factor: number;
+  /** Name of the layer; all of them if it is left out. */
+  layer?: string | null;
+  /** Only here: makes a layer of the difference. */
+  region?: (Region | null);
+} | {
+  edit: "split";
+  /** The wavelengths at which it is parted, units of the model. */
+  wavelengths: number[];
+} | {
+  edit: "blur";
+  /** Standard deviation, units of the model. */
+  radius: number;
+  /** Only here. */
+  region?: Region;
+} | {
+  /** How much of it is added: 1 doubles what is finer than the radius. */
+  amount: number;
+  edit: "sharpen";
+  /** Standard deviation of the blur whose difference is added, units of the model. */
+  radius: number;
+  /** Only here. */
+  region?: Region;
+} | {
+  edit: "threshold";
+  /** Displacements shorter than this are taken away, units of the model. */
+  height: number;
+  /** Only here. */
+  region?: Region;
+} | {
+  edit: "stroke";
+  /** Height in the middle, units of the model; below 0 it engraves. */
+  height: number;
+  /** The places, joined by straight lines in space. */
+  path: Place[];
+  /** Radius, units of the model. */
+  radius: number;
+  /** Only here. */
+  region?: Region;
+  /** Share of the radius over which it fades: 1 is soft, 0 has an upright border. */
+  softness?: number;
+} | {
+  /** Its middle. */
+  at: Place;
+  /** How far above and below the middle it reaches, units of the model [default: half the width]. */
+  depth?: number | null;
+  edit: "stamp";
+  /** Height of white, units of the model; below 0 it engraves. */
+  height: number;
+  /** File of the image, beside the script. */
+  image: string;
+  /** Only here. */
+  region?: Region;
+  /** What is there gives way to the stamp where its alpha is 1; else it is added. */
+  replace?: boolean;
+  /** Direction that is up in the image, as it appears seen along the normal. */
+  up: [number, number, number];
+  /** Width on the surface, units of the model. */
+  width: number;
+} | {
+  edit: "erase";
+  /** Only here. */
+  region?: Region;
+} | {
+  edit: "tile";
+  /** The patch that is repeated. */
+  from: number;
+  /** Only here. */
+  region?: Region;
+  /** Repeats along `u` and along `v`, every second one mirrored. */
+  times?: [number, number];
+  /** The patches that get it instead of their own. */
+  to: number[];
+} | {
+  /** Side of the blocks that are joined, units of the model: about twice what recurs in the pattern [default: a third of the shorter side of the patch]. */
+  block?: number | null;
+  edit: "synthesise";
+  /** The patch whose relief is the pattern. */
+  from: number;
+  /** Only here. */
+  region?: Region;
+  /** Another number gives another choice of blocks. */
+  seed?: number;
+  /** The patches that get more of it instead of their own. */
+  to: number[];
+} | {
+  edit: "limit";
+  /** Share of the focal radius that a displacement may reach. */
+  share?: number;
+} | {
+  edit: "resample";
+  /** Texels along each side of each patch. */
+  texels: number;
+} | {
+  edit: "remove";
+  /** Name of the layer. */
+  layer: string;
+});
 
 /** What the page asks for. Every request is answered once, by `done`, `refused`, or what it asks for. */
 export type Request = ({
@@ -610,6 +751,24 @@ export type Request = ({
   longest?: number | null;
   type: "relief";
 } | {
+  /** The edit. */
+  edit: ReliefEdit;
+  /** Number of the request. */
+  id: number;
+  type: "sculpt";
+} | {
+  /** How many. */
+  count: number;
+  /** Number of the request. */
+  id: number;
+  type: "unsculpt";
+} | {
+  /** How many. */
+  count: number;
+  /** Number of the request. */
+  id: number;
+  type: "resculpt";
+} | {
   /** Number of the request. */
   id: number;
   type: "clean";
@@ -623,12 +782,6 @@ export type Request = ({
   type: "lasso";
   /** From the places that geometry is sent in to clip space, column by column. */
   view: number[];
-} | {
-  /** True for all. */
-  all?: boolean;
-  /** Number of the request. */
-  id: number;
-  type: "take_in";
 } | {
   /** Its number. */
   hole: number;
@@ -817,6 +970,10 @@ export type State = {
   peer?: (Peer | null);
   /** The project; absent on the start page. */
   project?: (Project | null);
+  /** Edits of the relief, oldest first, by their names in a script. */
+  relief_done: string[];
+  /** Those that can be made again, the next one last. */
+  relief_undone: string[];
   /** How fine surfaces are. */
   resolution: Resolution;
   /** Rises with every change of the drawing. */
@@ -833,10 +990,10 @@ export type State = {
   warnings: string[];
 };
 
-/** An edit of the history. */
+/** A step of the history: one to the mesh, or an edit. */
 export type Step = {
-  /** Corners, curves and patches after it. */
-  counts: [number, number, number];
+  /** Corners, curves and patches after it; absent for a step to the mesh. */
+  counts?: [number, number, number] | null;
   /** Its name in a script. */
   edit: string;
 };

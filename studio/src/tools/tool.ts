@@ -1,7 +1,7 @@
 // What a tool is: picks in, edits out. The view shows what it would do before it is done.
 import type { Vector3 } from 'three';
 import type { Client } from '../protocol/client';
-import type { CurveName, Edit } from '../protocol/types';
+import type { CurveName, Edit, ReliefEdit } from '../protocol/types';
 import type { Found } from '../view/seek';
 import type { View } from '../view/view';
 
@@ -25,6 +25,8 @@ export interface Bench {
   edit(edit: Edit): Promise<boolean>;
   /** Control vertices of a curve, relative to the middle; none if it has none, which the user is told. */
   handles(curve: CurveName, control: number): Promise<Vector3[]>;
+  /** Makes an edit of the relief. */
+  sculpt(edit: ReliefEdit): Promise<unknown>;
   /** Leaves points out that are seen within a line. */
   lasso(view: number[], line: [number, number][]): Promise<unknown>;
   /** Shows what an edit would do; only the last one counts. */

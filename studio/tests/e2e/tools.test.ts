@@ -235,6 +235,39 @@ describe.skipIf(!chromiumPath)('tools', () => {
     await studio.close();
   });
 
+  it('raise the relief with the brush, smooth it, and take both back', async () => {
+    const studio = await four();
+    const { page } = studio;
+    await studio.until((s) => s.layers.displaced !== undefined && s.jobs.length === 0);
+    await studio.idle();
+    await page.keyboard.press('r');
+    await page.getByRole('radio', { name: 'Raises' }).waitFor();
+    await studio.idle();
+    const box = (await page.locator('canvas').first().boundingBox())!;
+    const middle = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
+    const stroke = async () => {
+      await page.mouse.move(middle.x - 60, middle.y);
+      await page.mouse.down();
+      await page.mouse.move(middle.x + 60, middle.y + 20, { steps: 12 });
+      await studio.shot('brush');
+      await page.mouse.up();
+    };
+    await stroke();
+    await studio.until((s) => s.relief_done.join() === 'stroke' && s.jobs.length === 0);
+    await studio.shown();
+    await page.getByRole('radio', { name: 'Smooths' }).click();
+    await stroke();
+    await studio.until((s) => s.relief_done.join() === 'stroke,blur' && s.jobs.length === 0);
+    await studio.idle();
+    await studio.shot('sculpted');
+    await page.keyboard.press('Control+z');
+    await studio.until((s) => s.relief_done.join() === 'stroke' && s.relief_undone.join() === 'blur');
+    await page.getByRole('button', { name: 'Take the last back' }).click();
+    await studio.until((s) => s.relief_done.length === 0 && s.jobs.length === 0);
+    await studio.idle();
+    await studio.close();
+  });
+
   it('go another way in the history and come back', async () => {
     const studio = await four();
     const { page } = studio;
@@ -302,10 +335,20 @@ describe.skipIf(!chromiumPath)('tools', () => {
     expect(less.project!.points + less.left_out).toBe(6000);
     await page.getByRole('button', { name: 'Take all in again' }).click();
     await studio.until((s) => s.left_out === 0);
+    await page.keyboard.press('Control+Shift+z');
+    await studio.until((s) => s.left_out === less.left_out);
+    await page.keyboard.press('Control+z');
+    await studio.until((s) => s.left_out === 0);
     await page.getByRole('spinbutton', { name: /Edge of a cell/ }).fill('1.2');
     await page.getByRole('button', { name: 'Close holes' }).click();
     const meshed = await studio.until((s) => s.layers.mesh !== undefined);
     expect(meshed.project!.triangles).toBeGreaterThan(500);
+    await studio.idle();
+    await page.getByRole('tab', { name: 'History' }).click();
+    await page.getByRole('button', { name: 'Mesh made' }).waitFor();
+    await studio.shot('history');
+    await page.getByRole('button', { name: 'Undo' }).click();
+    await studio.until((s) => s.layers.mesh === undefined && s.layers.points !== undefined);
     await studio.idle();
     await studio.close();
   });

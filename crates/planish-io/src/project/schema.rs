@@ -69,6 +69,9 @@ pub(super) fn write(transaction: &Transaction, model: &Model) -> Result<(), Proj
     ] {
         transaction.execute("INSERT INTO meta VALUES (?1, ?2)", params![key, value])?;
     }
+    if !model.studio.is_empty() {
+        transaction.execute("INSERT INTO meta VALUES ('studio', ?1)", params![model.studio])?;
+    }
     let mesh = &model.mesh;
     let points = arrays.add(Array::points(&mesh.points));
     let triangles = arrays.add(Array::U32(mesh.triangles.iter().flatten().copied().collect()));
@@ -147,16 +150,18 @@ pub(super) fn read(connection: &Connection, version: u32, bytes: u64) -> Result<
     };
     let units = meta("units")?;
     let units: Units = units.parse().map_err(|_| damaged(format!("unknown unit \"{units}\""), "meta", 0))?;
-    // Files of older versions have none.
-    let shift = match meta("shift") {
-        Ok(json) => serde_json::from_str::<[f64; 3]>(&json).map_err(|e| damaged(e.to_string(), "meta", 0))?.into(),
-        Err(ProjectError::Database(rusqlite::Error::QueryReturnedNoRows)) => planish::DVec3::ZERO,
-        Err(e) => return Err(e),
+    let any = |key: &str| match meta(key) {
+        Err(ProjectError::Database(rusqlite::Error::QueryReturnedNoRows)) => Ok(None),
+        found => found.map(Some),
     };
+    // Files of older versions have none.
+    let shift = any("shift")?.map(|json| serde_json::from_str::<[f64; 3]>(&json)).transpose();
+    let shift = shift.map_err(|e| damaged(e.to_string(), "meta", 0))?.unwrap_or_default().into();
+    let studio = any("studio")?.unwrap_or_default();
     let mesh = read_mesh(connection, &mut arrays)?;
     let faces = mesh.triangles.len();
     let network = read_network(connection, &mut arrays, faces)?;
-    let mut model = Model { mesh, network, units, shift, params: meta("params")?, ..Default::default() };
+    let mut model = Model { mesh, network, units, shift, params: meta("params")?, studio, ..Default::default() };
     for (p, rows, cols, [points, f, w, ..]) in sized(connection, "SELECT * FROM grid ORDER BY patch", 3)? {
         let points = arrays.points(points, Some(rows * cols))?;
         let places = places(&mut arrays, f, w, faces)?;

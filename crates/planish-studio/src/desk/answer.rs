@@ -3,10 +3,9 @@
 use super::beside::{Peer, other};
 use super::content::{self, Content};
 use super::jobs::Outcome;
+use super::keep::lasso::Lasso;
 use super::project::{NO_PROJECT, Project};
-use super::scan::Lasso;
 use super::{Table, export};
-use crate::protocol::state::StageName;
 use crate::protocol::{Message, Request, Why};
 use crate::web::hub::Client;
 use planish::field::Spacing;
@@ -20,7 +19,11 @@ impl<'env> Table<'_, '_, 'env> {
     pub(super) fn answer(&mut self, client: &Client, request: Request) -> Option<Content> {
         let id = request.id();
         match request {
-            Request::Edit { edit, .. } => self.edit(client, id, edit),
+            Request::Edit { edit, .. } => {
+                if !self.walk(client, id, &edit) {
+                    self.edit(client, id, edit);
+                }
+            }
             Request::Try { edit, .. } => self.try_out(client, id, edit),
             Request::Fit { coarse, .. } => {
                 self.desk.coarse = coarse;
@@ -35,9 +38,13 @@ impl<'env> Table<'_, '_, 'env> {
             Request::Handles { curve, control, .. } => self.handles(client, id, &curve, control),
             Request::Map { patch, .. } => self.map(client, id, patch),
             Request::Relief { longest, .. } => self.relief(client, id, longest),
+            Request::Sculpt { edit, .. } => self.sculpt(client, id, edit),
+            Request::Unsculpt { count, .. } => self.unsculpt(client, id, count),
+            Request::Resculpt { count, .. } => self.resculpt(client, id, count),
             Request::Clean { .. } => self.clean(client, id),
-            Request::Lasso { view, line, outside, .. } => self.lasso(client, id, &Lasso { view, line, outside }),
-            Request::TakeIn { all, .. } => self.take_in(client, id, all),
+            Request::Lasso { view, line, outside, .. } => {
+                self.lasso(client, id, Lasso { middle: [0.0; 3], view, line, outside });
+            }
             Request::CloseHole { hole, .. } => self.close_hole(client, id, hole),
             Request::Peer { file, .. } => self.peer(client, id, file),
             Request::Branch { branch, .. } => self.branch(client, id, branch),
@@ -146,7 +153,10 @@ impl<'env> Table<'_, '_, 'env> {
             (Answer::Refused(why), None) => self.desk.hub.tell_all(&Message::Refused { id: 0, why }),
             (Answer::Done(_), None) | (Answer::Given, _) => {}
         }
-        self.tell_state();
+        // What comes onto the desk tells its own.
+        if next.is_none() {
+            self.tell_state();
+        }
         next
     }
 
@@ -154,10 +164,7 @@ impl<'env> Table<'_, '_, 'env> {
         let done = || Answer::Done(String::new());
         match outcome {
             Outcome::Opened(Ok(project)) => (Answer::Done(project.notice.clone()), Some(Content::Project(project))),
-            Outcome::Meshed(Ok(made)) => {
-                let (mesh, params) = *made;
-                (done(), self.meshed(mesh, params))
-            }
+            Outcome::Prepared(result) => self.prepared(result),
             Outcome::Cleaned(Ok(known)) => {
                 self.desk.layers.new_points();
                 if let Some(project) = &mut *self.project {
@@ -169,6 +176,9 @@ impl<'env> Table<'_, '_, 'env> {
                 self.parted(revision, shown);
                 (done(), None)
             }
+            Outcome::Sculpted(revision, result) => {
+                (self.sculpted(revision, result).map_or_else(Answer::Refused, |()| done()), None)
+            }
             Outcome::Looked(Ok(peer)) => {
                 self.desk.layers.new_peer();
                 if let Some(project) = &mut *self.project {
@@ -177,10 +187,6 @@ impl<'env> Table<'_, '_, 'env> {
                 (done(), None)
             }
             Outcome::Cleaned(Err(why)) | Outcome::Parted(Err(why)) | Outcome::Looked(Err(why)) => {
-                (Answer::Refused(Why::of(why)), None)
-            }
-            Outcome::Meshed(Err(why)) => {
-                self.desk.failed = Some((StageName::Mesh, why.clone()));
                 (Answer::Refused(Why::of(why)), None)
             }
             Outcome::Edited(revision, edit, result) => (self.edited(revision, edit, *result, asked), None),

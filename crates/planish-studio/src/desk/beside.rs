@@ -3,6 +3,7 @@
 
 use crate::protocol::state;
 use planish::cloud::{Cloud, Samples};
+use planish::edit::Edit;
 use planish::mesh::TriMesh;
 use planish::model::{Drawing, HistoryEntry};
 use planish::pipeline::voxel_for;
@@ -45,6 +46,13 @@ pub struct Shown {
 
 /// All edits of one way, from the beginning on.
 pub type Branch = Vec<HistoryEntry>;
+
+/// The edit of an entry of the history; none if it is of another version.
+pub fn edit_of(entry: &HistoryEntry) -> Option<Edit> {
+    let mut value: serde_json::Value = serde_json::from_str(&entry.parameters).ok()?;
+    value.as_object_mut()?.insert("edit".into(), entry.command.clone().into());
+    serde_json::from_value(value).ok()
+}
 
 /// The other project.
 #[derive(Clone)]

@@ -2,7 +2,7 @@
 //! is put away.
 
 use super::Table;
-use super::beside::Branch;
+use super::beside::{Branch, edit_of};
 use super::project::{NO_PROJECT, Project, Refused};
 use crate::protocol::{Why, state};
 use crate::web::hub::Client;
@@ -20,12 +20,6 @@ fn path(steps: &[Step]) -> impl Iterator<Item = HistoryEntry> {
 /// Edits that two ways have in common from the beginning on.
 fn common(a: &[HistoryEntry], b: &[HistoryEntry]) -> usize {
     a.iter().zip(b).take_while(|(a, b)| a == b).count()
-}
-
-fn edit_of(entry: &HistoryEntry) -> Option<Edit> {
-    let mut value: serde_json::Value = serde_json::from_str(&entry.parameters).ok()?;
-    value.as_object_mut()?.insert("edit".into(), entry.command.clone().into());
-    serde_json::from_value(value).ok()
 }
 
 impl Project {

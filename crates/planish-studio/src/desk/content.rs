@@ -1,7 +1,8 @@
 //! What comes onto the desk: nothing, or a project from a file, a scan, a mesh or a made part.
 
 use super::jobs::Outcome;
-use super::journal;
+use super::keep::preparation::read_scan;
+use super::keep::{journal, kept};
 use super::project::Project;
 use super::{Desk, Upload};
 use crate::protocol::Sample;
@@ -9,7 +10,7 @@ use planish::mesh::TriMesh;
 use planish::model::{Model, Units};
 use planish::observe::Observer;
 use planish::synthetic::{self, ScannerParams, virtual_scan};
-use planish_io::{FileUnits, ScanOptions};
+use planish_io::FileUnits;
 use std::path::{Path, PathBuf};
 
 /// What lies on the desk next.
@@ -73,25 +74,27 @@ fn read(
         let own = folder.join(name);
         // A project from elsewhere gets a file of its own here.
         let file = if same(&own, path) { own } else { free_name(folder, name) };
-        return Ok(Project::of_model(model, file, String::new()));
+        return Ok(Project::of_model(model, file, String::new()).take_up(observer));
     }
     let units = units.unwrap_or(match planish_io::file_units(Path::new(name)) {
         FileUnits::Standard(units) | FileUnits::Usual(units) => units,
         FileUnits::Unknown => Units::default(),
     });
     let file = folder.join(Path::new(name).with_extension("planish").file_name().unwrap_or_default());
-    if same(&folder.join(name), path) && file.exists() {
+    let is_beside = same(&folder.join(name), path);
+    if is_beside && file.exists() {
         let model = planish_io::read_model(&file).map_err(|e| format!("{}: {e}", file.display()))?;
         let notice = format!("Goes on with {}, which was made of this file before.", file.display());
-        return Ok(Project::of_model(model, file, notice));
+        return Ok(Project::of_model(model, file, notice).take_up(observer));
     }
     let file = if file.exists() { free_name(folder, &file.to_string_lossy()) } else { file };
     if planish_io::is_scan(path) {
-        let cloud = planish_io::read_scan(path, &ScanOptions::default()).map_err(|e| told(&e))?;
-        return Ok(Project::of_scan(cloud, units, file));
+        let cloud = read_scan(path).map_err(|e| told(&e))?;
+        let scan = is_beside.then(|| name.to_owned());
+        return Ok(Project::of_scan(cloud, scan, units, file).take_up(observer));
     }
     let mesh = planish_io::read_mesh(path).map_err(|e| told(&e))?;
-    of_mesh(mesh, units, file, observer).map_err(|e| told(&e))
+    of_mesh(mesh, units, file, observer).map(|p| p.take_up(observer)).map_err(|e| told(&e))
 }
 
 /// A project on a mesh, which is repaired and brought near the origin.
@@ -117,7 +120,7 @@ fn made(sample: Sample, folder: &Path, observer: &dyn Observer) -> Result<Projec
             let part = synthetic::demo(0, PART_TRIANGLES);
             let params = ScannerParams { points: SCAN_POINTS, ..ScannerParams::default() };
             let scanned = virtual_scan(&part, &params, observer).map_err(|e| e.to_string())?;
-            Ok(Project::of_scan(scanned.cloud, Units::Mm, name("scan")))
+            Ok(Project::of_scan(scanned.cloud, None, Units::Mm, name("scan")))
         }
     }
 }
@@ -138,7 +141,8 @@ fn free_name(folder: &Path, name: &str) -> PathBuf {
         1 => folder.join(format!("{stem}.planish")),
         k => folder.join(format!("{stem}-{k}.planish")),
     };
-    (1..).map(named).find(|p| !p.exists() && !journal::path_of(p).exists()).unwrap_or_else(|| named(1))
+    let beside = |p: &Path| [journal::path_of(p), kept::path_of(p)];
+    (1..).map(named).find(|p| !p.exists() && !beside(p).iter().any(|b| b.exists())).unwrap_or_else(|| named(1))
 }
 
 /// Projects in a folder, by name.

@@ -6,6 +6,7 @@ use super::answer::{Answer, with};
 use super::beside::other;
 use super::jobs::{MEASURE, Outcome};
 use super::project::{Fit, NO_PROJECT, deviations};
+use super::sculpt::{SCULPT, follow};
 use crate::protocol::state::StageName;
 use crate::protocol::{Message, Why};
 use crate::web::hub::Client;
@@ -48,6 +49,7 @@ impl<'env> Table<'_, '_, 'env> {
             }
         }
         let finished = self.project.as_ref().is_some_and(|p| p.is_finished());
+        self.desk.jobs.stop_kind(SCULPT);
         self.desk.jobs.stop_kind("fit");
         self.desk.jobs.stop_kind(MEASURE);
         if finished && self.desk.live {
@@ -150,6 +152,7 @@ impl<'env> Table<'_, '_, 'env> {
         self.desk.jobs.stop_kind("fit");
         self.desk.jobs.stop_kind(MEASURE);
         let adjacency = self.ground.map(|g| &g.canvas.adjacency);
+        let (list, folder) = (if coarse { Vec::new() } else { project.kept.relief.clone() }, project.folder());
         Ok(self.desk.jobs.start(
             self.scope,
             ("fit", if coarse { "Coarse grids" } else { "Fitting surfaces" }),
@@ -159,13 +162,29 @@ impl<'env> Table<'_, '_, 'env> {
                 let Some(adjacency) = adjacency else { return Outcome::Fitted(Err(NO_PROJECT.into())) };
                 let made = pipeline::remake(&mut model, adjacency, earlier.as_ref(), &params, observer);
                 model.mesh = Default::default();
+                let mut relief = Vec::new();
+                if made.is_ok() {
+                    // What cannot be made on these surfaces is tried again, and told, once they are shown.
+                    let _ = follow(&mut model, &mut relief, &list, &folder, watch as &dyn Observer);
+                }
                 let seams = measure_seams(&model.network, &model.surfaces, watch as &dyn Observer);
                 Outcome::Fitted(made.map_err(|e| e.to_string()).and_then(|made| {
                     let seams = seams.map_err(|e| e.to_string())?;
                     let (earlier, deviations) = (made.earlier, deviations(&model));
                     let (quality, warnings) = (Quality::new(), Vec::new());
                     let (model, short) = (Arc::new(model), None);
-                    Ok(Box::new(Fit { revision, model, earlier, quality, seams, warnings, deviations, coarse, short }))
+                    Ok(Box::new(Fit {
+                        revision,
+                        model,
+                        earlier,
+                        quality,
+                        seams,
+                        warnings,
+                        deviations,
+                        coarse,
+                        short,
+                        relief,
+                    }))
                 }))
             },
         ))
@@ -203,7 +222,9 @@ impl<'env> Table<'_, '_, 'env> {
                 if let Some(project) = self.project {
                     project.fitted(*fit);
                 }
-                self.measure();
+                if self.follow_list().is_none() {
+                    self.measure();
+                }
                 Ok(())
             }
             Err(why) => {

@@ -2,15 +2,16 @@
 //! when they are told.
 
 use super::beside::{Known, Peer, Shown};
+use super::keep::preparation::{Basis, Preparation};
 use super::project::Fit;
+use super::sculpt::Sculpted;
 use super::{Letter, Project};
 use crate::StudioError;
-use crate::protocol::state::Job;
+use crate::protocol::state::{Job, StageName};
 use planish::edit::{ApplyError, Edit, Made};
-use planish::mesh::TriMesh;
 use planish::model::Drawing;
 use planish::observe::Observer;
-use planish::pipeline::{Assessed, PipelineObserver, PipelineParams, StageRecord};
+use planish::pipeline::{Assessed, PipelineObserver, StageRecord};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
@@ -28,12 +29,14 @@ const TELL_EVERY: Duration = Duration::from_millis(100);
 pub enum Outcome {
     /// A file was read, or a part made.
     Opened(Result<Box<Project>, String>),
-    /// A scan was meshed, with the parameters that suit it; or the mesh mended.
-    Meshed(Result<Box<(TriMesh, Option<PipelineParams>)>, String>),
+    /// Steps to a mesh were made or taken back; or why not, and at which stage.
+    Prepared(Result<Box<Prepared>, (StageName, String)>),
     /// Points of a scan were looked at.
     Cleaned(Result<Arc<Known>, String>),
     /// Reliefs of a revision were parted.
     Parted(Result<(u64, Shown), String>),
+    /// The relief of a revision was edited.
+    Sculpted(u64, Result<Box<Sculpted>, String>),
     /// Another project was read.
     Looked(Result<Peer, String>),
     /// An edit was made on the drawing of a revision.
@@ -46,6 +49,20 @@ pub enum Outcome {
     Exported(Result<super::exports::Ready, String>),
     /// It came to an end that nobody foresaw.
     Fault(String),
+}
+
+/// What steps to a mesh have made.
+pub struct Prepared {
+    /// What came of them.
+    pub basis: Basis,
+    /// The steps before.
+    pub from: Preparation,
+    /// The steps now.
+    pub to: Preparation,
+    /// Edits that are to be made again after them.
+    pub then: usize,
+    /// In words.
+    pub told: String,
 }
 
 /// A running job.

@@ -146,7 +146,9 @@ fn builder(project: &Project, layer: Layer) -> Box<dyn FnOnce() -> Arrays + Send
         }
         (Layer::Surfaces, _, Some(model)) => tessellate::surfaces(&model, center),
         (Layer::Displaced, _, Some(model)) => {
-            tessellate::displaced(&model, short.as_ref().map(|s| &s.maps[..]), center)
+            // Without edits it goes back to the grids, exactly.
+            let edited = (!model.layers.stack.is_empty()).then_some(&model.reliefs[..]);
+            tessellate::displaced(&model, short.as_ref().map(|s| &s.maps[..]).or(edited), center)
         }
         (Layer::Isolines, _, Some(model)) => tessellate::isolines(&model, center),
         (Layer::Nets, _, Some(model)) => tessellate::nets(&model, center),
@@ -159,11 +161,9 @@ fn builder(project: &Project, layer: Layer) -> Box<dyn FnOnce() -> Arrays + Send
 
 /// What geometry of a project is sent relative to: the middle of its box.
 pub fn center(project: &Project) -> DVec3 {
-    if let Some(middle) = project.middle {
-        return middle;
-    }
     match &project.scan {
-        Some(scan) if project.mesh.triangles.is_empty() => scan.bounds().center(),
+        // It stays where it is while points are left out.
+        Some(scan) if project.mesh.triangles.is_empty() => project.left_out.first().unwrap_or(scan).bounds().center(),
         _ => project.mesh.bounds().center(),
     }
 }

@@ -1,9 +1,10 @@
 //! The desk: one thread that owns the project. Requests of all pages come to it one after the other; what takes long runs as
 //! a job beside it, on a copy, and its result is taken over if it still fits.
 //!
-//! 1. what lies on it - `content`, `project`, `beside`      2. answers - `answer`, `edits`, `scan`, `patch`, `branches`, `export`
+//! 1. what lies on it - `content`, `project`, `beside`
+//! 2. answers - `answer`, `edits`, `scan`, `patch`, `sculpt`, `branches`, `export`
 //! 3. jobs - `jobs`
-//! 4. nothing is lost - `journal`, `save`      5. what pages see - `state`, `layers`, `tessellate`
+//! 4. nothing is lost - `keep`      5. what pages see - `state`, `layers`, `tessellate`
 
 mod answer;
 mod beside;
@@ -13,12 +14,12 @@ mod edits;
 mod export;
 mod exports;
 mod jobs;
-mod journal;
+mod keep;
 mod layers;
 mod patch;
 mod project;
-mod save;
 mod scan;
+mod sculpt;
 mod state;
 mod tessellate;
 
@@ -120,6 +121,7 @@ impl Desk {
                 Content::Project(mut project) => {
                     let mesh = Arc::clone(&project.mesh);
                     let ground = (!mesh.triangles.is_empty()).then(|| Ground::new(&mesh));
+                    project.go_on(ground.as_ref());
                     project.recover(ground.as_ref());
                     let mut project = Some(*project);
                     let next = self.sit(&mut project, ground.as_ref());
@@ -137,7 +139,9 @@ impl Desk {
         // Jobs borrow the ground: all have ended when this returns.
         std::thread::scope(|scope| {
             let mut table = Table { desk: self, project, ground, scope };
-            table.measure();
+            if table.follow_list().is_none() {
+                table.measure();
+            }
             table.tell_state();
             let next = loop {
                 let Ok(letter) = table.desk.inbox.recv() else { break Content::End };

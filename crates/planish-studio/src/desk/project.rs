@@ -1,17 +1,20 @@
 //! A project on the desk: a scan or a mesh with its drawing, what was fitted to it, and its file.
 
-use super::beside::{Branch, Known, Peer, Shown, other};
-use super::journal::Journal;
-use super::save::Saver;
+use super::beside::{Branch, Known, Peer, Shown, edit_of, other};
+use super::keep::journal::Journal;
+use super::keep::kept::{self, Kept};
+use super::keep::preparation::{Basis, Preparation};
+use super::keep::save::Saver;
+use super::sculpt;
 use crate::protocol::state::Hole;
-use planish::DVec3;
 use planish::cloud::Cloud;
 use planish::edit::{Edit, Ground, Made, Redo, Undo, apply};
 use planish::mesh::TriMesh;
-use planish::model::{Drawing, HistoryEntry, Model, Units};
+use planish::model::{Drawing, HistoryEntry, Model, Step, Units};
 use planish::network::{Fault, diagnose};
 use planish::observe::{Observer, Silent};
 use planish::pipeline::{Earlier, PipelineParams, Quality, Warning};
+use planish::relief::layers::ReliefEdit;
 use planish::surface::{Deviation, SeamQuality, deviation_of};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -31,8 +34,12 @@ pub struct Project {
     pub known: Option<Arc<Known>>,
     /// The scan before each time that points were left out.
     pub left_out: Vec<Arc<Cloud>>,
-    /// What geometry is sent relative to, where it is not the middle of the box.
-    pub middle: Option<DVec3>,
+    /// Steps to the mesh, and edits of the relief.
+    pub kept: Kept,
+    /// The edits that can be made again after them, with their drawings; as far as this session has made them.
+    ahead: Vec<Step>,
+    /// Edits that are to be made again as soon as there is a mesh.
+    then: usize,
     /// Holes of the mesh, while they can be closed.
     pub holes: Vec<Hole>,
     /// Edits that were left for others.
@@ -75,6 +82,8 @@ pub struct Fit {
     pub coarse: bool,
     /// The reliefs that are shown, if not those of the model.
     pub short: Option<Shown>,
+    /// Edits that its relief has.
+    pub relief: Vec<ReliefEdit>,
 }
 
 /// Distances of each surface of a model to its grid.
@@ -108,12 +117,19 @@ impl Project {
         let mesh = Arc::new(std::mem::take(&mut model.mesh));
         let params = serde_json::from_str(&model.params).unwrap_or_default();
         let journal = Journal::new(&file);
+        let mut kept = Kept::of(&model.studio).unwrap_or_else(|| Kept::on(&mesh.points, None));
+        if !model.layers.stack.is_empty() {
+            // Another command may have changed it.
+            kept.relief = sculpt::edits_of(&model.layers);
+        }
         Project {
             mesh,
             scan: None,
             known: None,
             left_out: Vec::new(),
-            middle: None,
+            kept,
+            ahead: Vec::new(),
+            then: 0,
             holes: Vec::new(),
             branches: Vec::new(),
             peer: None,
@@ -131,15 +147,119 @@ impl Project {
     }
 
     /// A project on a scan, without a mesh.
-    pub fn of_scan(mut cloud: Cloud, units: Units, file: PathBuf) -> Project {
+    /// * `name` - of the scan, if it lies beside the project
+    pub fn of_scan(cloud: Cloud, name: Option<String>, units: Units, file: PathBuf) -> Project {
         let model = Model { units, shift: cloud.shift, ..Model::default() };
-        cloud.points.retain(|p| p.is_finite());
-        Project { scan: Some(Arc::new(cloud)), ..Project::of_model(model, file, String::new()) }
+        let kept = Kept::on(&cloud.points, name);
+        Project { scan: Some(Arc::new(cloud)), kept, ..Project::of_model(model, file, String::new()) }
     }
 
-    /// The project of a scan with the mesh that was made of it.
-    pub fn meshed(self, mesh: TriMesh, params: PipelineParams) -> Project {
-        Project { mesh: Arc::new(mesh), params, middle: None, ..self }.unsaved()
+    /// What steps to the mesh are made on.
+    pub fn basis(&self) -> Basis {
+        Basis {
+            folder: self.folder(),
+            scan: self.scan.clone(),
+            left_out: self.left_out.clone(),
+            known: self.known.clone(),
+            mesh: self.mesh.clone(),
+            params: self.params.clone(),
+        }
+    }
+
+    /// Where its file is.
+    pub fn folder(&self) -> PathBuf {
+        self.file.parent().unwrap_or(Path::new("")).to_owned()
+    }
+
+    /// True if something is drawn, or can be taken back, on the mesh as it is.
+    pub fn has_edits(&self) -> bool {
+        !self.model.undo.is_empty() || self.has_curves()
+    }
+
+    /// True if there are curves.
+    pub fn has_curves(&self) -> bool {
+        !self.model.network.curves.is_empty()
+    }
+
+    /// True if there were curves before the first edit.
+    pub fn is_drawn_by_others(&self) -> bool {
+        self.model.undo.first().map_or(self.has_curves(), |s| !s.other.network.curves.is_empty())
+    }
+
+    /// Edits that can be made again once all steps to the mesh are, the next one first.
+    pub fn ahead(&self) -> Vec<HistoryEntry> {
+        match self.kept.preparation.undone[..] {
+            [] => self.model.redo.iter().rev().map(|s| s.entry.clone()).collect(),
+            _ => self.kept.preparation.ahead.clone(),
+        }
+    }
+
+    /// The project after other steps to the mesh, with nothing drawn. The steps are on the disk when this returns.
+    /// * `then` - edits that are to be made again as soon as there is a mesh
+    pub fn prepared(mut self, basis: Basis, preparation: Preparation, then: usize) -> Project {
+        if !self.model.redo.is_empty() {
+            self.ahead = std::mem::take(&mut self.model.redo);
+        }
+        self.kept.preparation = preparation;
+        self.kept.write(&self.file);
+        // Its edits were taken back.
+        self.journal.clear();
+        let Model { units, shift, history, .. } = self.model;
+        let Basis { scan, left_out, known, mesh, params, .. } = basis;
+        let (model, fit) = (Model { units, shift, history, ..Model::default() }, None);
+        let (faults, branches, revision) = (Vec::new(), Vec::new(), self.revision + 1);
+        Project { scan, left_out, known, mesh, params, model, fit, faults, branches, revision, then, ..self }.unsaved()
+    }
+
+    /// Brings what is kept besides the drawing to the disk.
+    pub fn keep(&mut self) {
+        self.kept.write(&self.file);
+        self.save();
+    }
+
+    /// Takes up steps to the mesh and edits of the relief that were made but are in no project file.
+    pub fn take_up(mut self, observer: &dyn Observer) -> Project {
+        let Some(found) = Kept::read(&self.file, self.kept.preparation.origin) else { return self };
+        let Kept { preparation, relief, relief_undone } = found;
+        (self.kept.relief, self.kept.relief_undone) = (relief, relief_undone);
+        if preparation.done == self.kept.preparation.done {
+            return self;
+        }
+        match self.basis().walk(&self.kept.preparation, &preparation, observer) {
+            Ok(basis) => {
+                let notice = "Goes on where the last session was left, before its mesh was saved.".into();
+                Project { notice, ..self.prepared(basis, preparation, 0) }
+            }
+            Err(why) => Project { notice: format!("The last session is not taken up: {why}"), ..self },
+        }
+    }
+
+    /// Gets the edits ready that can be made again after the steps to the mesh, and makes those that were asked for.
+    pub fn go_on(&mut self, ground: Option<&Ground>) {
+        let preparation = &mut self.kept.preparation;
+        if !preparation.undone.is_empty() || preparation.ahead.is_empty() {
+            return;
+        }
+        let Some(ground) = ground else { return };
+        let entries = std::mem::take(&mut preparation.ahead);
+        let kept = std::mem::take(&mut self.ahead);
+        if kept.iter().rev().map(|s| &s.entry).eq(&entries) {
+            self.model.redo = kept;
+        } else {
+            let edits = entries.iter().map_while(edit_of);
+            let made = edits.map_while(|edit| self.make(&edit, ground, &Silent).ok()).count();
+            (0..made).for_each(|_| {
+                self.model.undo();
+            });
+        }
+        self.revision += 1;
+        self.look(ground);
+        self.save();
+        let count = std::mem::take(&mut self.then);
+        if count > 0 {
+            // What cannot be made again stays in the list.
+            let _ = self.edit(&Edit::Redo(Redo { count }), Some(ground), &Silent);
+        }
     }
 
     /// One that no file holds yet.
@@ -156,8 +276,9 @@ impl Project {
             let (quality, seams) = (Quality::new(), Vec::new());
             let (warnings, deviations) = (Vec::new(), deviations(&model));
             let (revision, model) = (self.revision, Arc::new(model));
-            let (coarse, short) = (false, None);
-            self.fit = Some(Fit { revision, model, earlier, quality, seams, warnings, deviations, coarse, short });
+            let (coarse, short, relief) = (false, None, sculpt::edits_of(&model.layers));
+            self.fit =
+                Some(Fit { revision, model, earlier, quality, seams, warnings, deviations, coarse, short, relief });
         }
         self
     }
@@ -251,9 +372,8 @@ impl Project {
     /// Takes over what a job has fitted. Surfaces of an older drawing are shown, but not kept.
     pub fn fitted(&mut self, fit: Fit) {
         if fit.revision == self.revision && !fit.coarse {
-            let Model { grids, surfaces, reliefs, params, .. } = fit.model.as_ref();
-            (self.model.grids, self.model.surfaces, self.model.reliefs) =
-                (grids.clone(), surfaces.clone(), reliefs.clone());
+            let Model { grids, surfaces, params, .. } = fit.model.as_ref();
+            (self.model.grids, self.model.surfaces) = (grids.clone(), surfaces.clone());
             self.model.params.clone_from(params);
             if self.model.history.last().is_none_or(|h| h.command != "fit") {
                 self.model.history.push(HistoryEntry { command: "fit".into(), parameters: params.clone() });
@@ -261,11 +381,12 @@ impl Project {
             self.save();
         }
         self.fit = Some(fit);
+        self.take_relief();
     }
 
     /// The whole model, for a job or a file.
     pub fn whole(&self) -> Model {
-        Model { mesh: self.mesh.as_ref().clone(), ..self.model.clone() }
+        Model { mesh: self.mesh.as_ref().clone(), studio: self.kept.json(), ..self.model.clone() }
     }
 
     fn save(&mut self) {
@@ -279,6 +400,7 @@ impl Project {
         }
         if self.saver.is_saved() || self.saver.finish(&self.whole()) {
             self.journal.remove();
+            kept::remove(&self.file);
         }
     }
 
@@ -293,8 +415,13 @@ impl Project {
     /// The file was written, or not.
     pub fn saved(&mut self, change: u64, result: Result<(), String>, post: &std::sync::mpsc::Sender<super::Letter>) {
         self.saver.ended(change, result);
-        if self.saver.is_saved() {
-            self.journal.clear();
+        match self.saver.is_saved() {
+            true if !self.mesh.triangles.is_empty() => {
+                self.journal.clear();
+                kept::remove(&self.file);
+            }
+            // The file that was written is of before the steps; theirs is the newer one.
+            _ => self.kept.write(&self.file),
         }
         self.write(post);
     }
@@ -302,5 +429,5 @@ impl Project {
 
 /// Tells one state of the drawing and its history from another.
 fn journal_state(model: &Model) -> u64 {
-    super::journal::state_of(&model.drawing(), model.undo.len(), model.redo.len())
+    super::keep::journal::state_of(&model.drawing(), model.undo.len(), model.redo.len())
 }

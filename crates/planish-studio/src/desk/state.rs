@@ -1,5 +1,6 @@
 //! The state of a project as pages see it.
 
+use super::keep::preparation::{PrepStep, Preparation};
 use super::layers::center;
 use super::project::{Fit, Project};
 use super::{Table, content};
@@ -8,7 +9,7 @@ use crate::protocol::{Why, state};
 use planish::DVec3;
 use planish::grid::Family;
 use planish::mesh::TriMesh;
-use planish::model::{Drawing, Sketch};
+use planish::model::{Drawing, HistoryEntry, Sketch};
 use planish::network::{self, CurveKind};
 use planish::pipeline::worst_seams;
 use std::path::Path;
@@ -40,14 +41,8 @@ impl Table<'_, '_, '_> {
             features: sketch.features.iter().map(|f| f.patch).collect(),
             faults: project.faults.iter().map(fault).collect(),
             symmetry: sketch.symmetry.map(|p| [p.point.to_array(), p.normal.to_array()]),
-            done: project
-                .model
-                .undo
-                .windows(2)
-                .map(|w| step(&w[0], Some(&w[1].other)))
-                .chain(project.model.undo.last().map(|s| step(s, Some(&project.model.drawing()))))
-                .collect(),
-            undone: project.model.redo.iter().map(|s| step(s, Some(&s.other))).collect(),
+            done: done(project),
+            undone: undone(project),
             layers: self.desk.layers.names(project),
             resolution,
             live,
@@ -58,11 +53,13 @@ impl Table<'_, '_, '_> {
             warnings: of_now.map_or_else(Vec::new, |f| f.warnings.iter().map(|w| w.message.clone()).collect()),
             jobs,
             cleaned: project.known.as_ref().map(|k| k.told()),
-            left_out: left_out(project),
+            left_out: project.basis().left_out() as u64,
             holes: project.holes.clone(),
             branches: project.told_branches(),
             longest: of_now.and_then(|f| f.short.as_ref()).map(|s| s.longest),
             peer: project.peer.as_ref().map(|p| p.told()),
+            relief_done: project.kept.relief.iter().map(|e| e.name().into()).collect(),
+            relief_undone: project.kept.relief_undone.iter().map(|e| e.name().into()).collect(),
         }
         .with_control(of_now)
     }
@@ -138,7 +135,7 @@ fn facts(project: &Project) -> state::Project {
     state::Project {
         name: project.file.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         file: project.file.display().to_string(),
-        saved: project.saver.is_saved(),
+        saved: project.mesh.triangles.is_empty() || project.saver.is_saved(),
         unsaved: project.saver.trouble.clone(),
         units: project.model.units.symbol().into(),
         triangles: project.mesh.triangles.len() as u64,
@@ -156,11 +153,6 @@ fn others(project: &Project) -> Vec<String> {
     let own = project.file.file_name().unwrap_or_default();
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     content::projects(folder).into_iter().filter(|f| f.as_str() != own).collect()
-}
-
-fn left_out(project: &Project) -> u64 {
-    let now = project.scan.as_ref().map_or(0, |s| s.points.len());
-    project.left_out.first().map_or(0, |all| (all.points.len() - now) as u64)
 }
 
 fn parted_note(patches: usize, faults: usize) -> String {
@@ -209,11 +201,29 @@ fn fault(fault: &network::Fault) -> Fault {
     Fault { why: Why::of(fault), offer }
 }
 
-fn step(step: &planish::model::Step, after: Option<&Drawing>) -> Step {
-    let counts = after.map_or([0; 3], |d| {
-        [d.network.corners.len(), d.network.curves.len(), d.network.patches.len()].map(|n| n as u32)
-    });
-    Step { edit: step.entry.command.clone(), counts }
+/// Steps to the mesh and edits, oldest first.
+fn done(project: &Project) -> Vec<Step> {
+    let edits = &project.model.undo;
+    let before_next = edits.windows(2).map(|w| step(&w[0].entry, Some(&w[1].other)));
+    let last = edits.last().map(|s| step(&s.entry, Some(&project.model.drawing())));
+    project.kept.preparation.done.iter().map(prepared).chain(before_next).chain(last).collect()
+}
+
+/// What can be made again, the next one last.
+fn undone(project: &Project) -> Vec<Step> {
+    let Preparation { undone, ahead, .. } = &project.kept.preparation;
+    let edits = project.model.redo.iter().map(|s| step(&s.entry, Some(&s.other)));
+    edits.chain(ahead.iter().rev().map(|e| step(e, None))).chain(undone.iter().map(prepared)).collect()
+}
+
+fn step(entry: &HistoryEntry, after: Option<&Drawing>) -> Step {
+    let counts =
+        after.map(|d| [d.network.corners.len(), d.network.curves.len(), d.network.patches.len()].map(|n| n as u32));
+    Step { edit: entry.command.clone(), counts }
+}
+
+fn prepared(step: &PrepStep) -> Step {
+    Step { edit: step.name().into(), counts: None }
 }
 
 fn seams(fit: &Fit) -> Vec<Seam> {

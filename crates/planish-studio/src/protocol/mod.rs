@@ -6,6 +6,7 @@ pub mod frame;
 pub mod state;
 
 use planish::edit::{CurveName, Edit};
+use planish::relief::layers::ReliefEdit;
 use planish::surface::Resolution;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -77,6 +78,27 @@ pub enum Request {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         longest: Option<f64>,
     },
+    /// An edit of the relief, as a script of `planish relief` has it. Surfaces that are made anew get it again.
+    Sculpt {
+        /// Number of the request.
+        id: u32,
+        /// The edit.
+        edit: ReliefEdit,
+    },
+    /// Edits of the relief taken back.
+    Unsculpt {
+        /// Number of the request.
+        id: u32,
+        /// How many.
+        count: usize,
+    },
+    /// Edits of the relief made again.
+    Resculpt {
+        /// Number of the request.
+        id: u32,
+        /// How many.
+        count: usize,
+    },
     /// Noise, normals and outliers of the scan.
     Clean {
         /// Number of the request.
@@ -93,14 +115,6 @@ pub enum Request {
         /// True to leave out what lies without.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         outside: bool,
-    },
-    /// The last points that were left out taken in again, or all.
-    TakeIn {
-        /// Number of the request.
-        id: u32,
-        /// True for all.
-        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-        all: bool,
     },
     /// One hole of the mesh closed; before curves are drawn.
     CloseHole {
@@ -205,9 +219,11 @@ impl Request {
             | Request::Handles { id, .. }
             | Request::Map { id, .. }
             | Request::Relief { id, .. }
+            | Request::Sculpt { id, .. }
+            | Request::Unsculpt { id, .. }
+            | Request::Resculpt { id, .. }
             | Request::Clean { id }
             | Request::Lasso { id, .. }
-            | Request::TakeIn { id, .. }
             | Request::CloseHole { id, .. }
             | Request::Peer { id, .. }
             | Request::Branch { id, .. }

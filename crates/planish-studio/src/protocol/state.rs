@@ -60,6 +60,10 @@ pub struct State {
     pub longest: Option<f64>,
     /// The other project that is looked at.
     pub peer: Option<Peer>,
+    /// Edits of the relief, oldest first, by their names in a script.
+    pub relief_done: Vec<String>,
+    /// Those that can be made again, the next one last.
+    pub relief_undone: Vec<String>,
 }
 
 impl State {
@@ -91,6 +95,8 @@ impl State {
             branches: Vec::new(),
             longest: None,
             peer: None,
+            relief_done: Vec::new(),
+            relief_undone: Vec::new(),
         }
     }
 }
@@ -295,14 +301,15 @@ pub enum Offer {
     DeleteCorner,
 }
 
-/// An edit of the history.
+/// A step of the history: one to the mesh, or an edit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Step {
     /// Its name in a script.
     pub edit: String,
-    /// Corners, curves and patches after it.
-    pub counts: [u32; 3],
+    /// Corners, curves and patches after it; absent for a step to the mesh.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counts: Option<[u32; 3]>,
 }
 
 /// A seam between two patches.

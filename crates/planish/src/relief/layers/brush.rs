@@ -1,6 +1,7 @@
 //! Strokes and stamps: heights along the normal, by distance in space, so that they go on over seams.
 
 use super::super::Relief;
+use super::chain::{comes_near, distance_along};
 use super::ground::{Ground, Place, Texel};
 use super::projection::{Picture, Projection, Spot};
 use super::region::{Region, fade};
@@ -74,12 +75,6 @@ fn raised(
     maps
 }
 
-/// True if a patch comes as near as `reach` to the box of some points.
-fn comes_near(ground: &Ground, patch: usize, points: &[DVec3], reach: f64) -> bool {
-    let (patch, path) = (&ground.boxes[patch], crate::geom::Aabb::of(points));
-    (patch.min - path.max).max(path.min - patch.max).max(DVec3::ZERO).length() <= reach
-}
-
 impl Stroke {
     /// The layer; patches that it does not touch have no vectors.
     /// # Errors
@@ -96,30 +91,11 @@ impl Stroke {
             self.path.iter().map(|place| ground.locate(place, "the stroke")).collect::<Result<_, _>>()?;
         let points: Vec<DVec3> = path.iter().map(|(p, _)| *p).collect();
         let height = |p: usize, k: usize| {
-            let (at, frame) = &ground.nodes[p][k];
-            let (distance, normal) = nearest(&path, *at);
-            // The other side of a thin wall looks away.
-            if distance >= self.radius || frame.normal.dot(normal) <= 0.0 {
-                return 0.0;
-            }
-            self.height * fade(self.radius - distance, self.softness.clamp(0.0, 1.0) * self.radius)
+            let inside = self.radius - distance_along(&path, &ground.nodes[p][k]);
+            if inside > 0.0 { self.height * fade(inside, self.softness.clamp(0.0, 1.0) * self.radius) } else { 0.0 }
         };
         Ok(raised(ground, |p| comes_near(ground, p, &points, self.radius), height))
     }
-}
-
-/// Distance to a chain of points, and its normal there.
-fn nearest(path: &[(DVec3, DVec3)], at: DVec3) -> (f64, DVec3) {
-    let mut best = (path[0].0.distance(at), path[0].1);
-    for pair in path.windows(2) {
-        let (a, along) = (pair[0].0, pair[1].0 - pair[0].0);
-        let t = if along == DVec3::ZERO { 0.0 } else { ((at - a).dot(along) / along.length_squared()).clamp(0.0, 1.0) };
-        let distance = (a + along * t).distance(at);
-        if distance < best.0 {
-            best = (distance, pair[0].1.lerp(pair[1].1, t));
-        }
-    }
-    best
 }
 
 impl Stamp {

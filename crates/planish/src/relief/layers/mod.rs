@@ -3,7 +3,7 @@
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, §7.3 and 7.6: scaling, painting, thresholds,
 //! compositing with an image, transfer.
 //! 1. places and normals of all texels - `ground`      2. where an edit applies - `region`, `projection`
-//! 3. strokes, stamps - `brush`      4. wavelengths - `filter`, `bands`      5. the edits - `edit`
+//! 3. strokes, stamps - `brush`, `chain`      4. wavelengths - `filter`, `bands`      5. the edits - `edit`
 //! 6. from other patches and models - `transfer`, `warp`      7. more of a patch without repeats - `quilt`
 //!
 //! Departs from [K98]: edits do not change the image but lie above it, so each can be weakened or taken back; seams are
@@ -11,6 +11,7 @@
 
 mod bands;
 mod brush;
+mod chain;
 mod edit;
 mod filter;
 mod ground;

@@ -1,6 +1,7 @@
-//! Where an edit applies: patches, a ball in space with a soft border, an image as a mask.
+//! Where an edit applies: patches, a ball in space or a tube along places with a soft border, an image as a mask.
 
 use super::super::{Relief, ReliefError};
+use super::chain::{comes_near, distance_along};
 use super::ground::{Ground, Place, Texel};
 use super::projection::{Pictures, Projection, Spot};
 use crate::geom::is_positive;
@@ -16,9 +17,12 @@ pub struct Region {
     pub patches: Vec<u32>,
     /// Middle of a ball, and of the image.
     pub at: Option<Place>,
-    /// Radius of the ball, units of the model; 0 beside an image for no ball.
+    /// Places that a tube runs along in the place of the ball, joined by straight lines in space. The other side of a thin wall is not
+    /// in it.
+    pub path: Vec<Place>,
+    /// Radius of the ball or the tube, units of the model; 0 beside an image for no ball.
     pub radius: f64,
-    /// Width of the soft border inside the ball, units of the model.
+    /// Width of the soft border inside it, units of the model.
     pub feather: f64,
     /// File of an image beside the script, laid on the surface as that of a stamp: white, times alpha, is in the region, black
     /// is not, and grey is in it by its share.
@@ -33,9 +37,10 @@ pub struct Region {
     pub outside: bool,
 }
 
-/// A region whose place and image were found.
+/// A region whose places and image were found.
 struct Found {
     ball: Option<DVec3>,
+    tube: Vec<(DVec3, DVec3)>,
     mask: Option<Projection>,
 }
 
@@ -50,8 +55,14 @@ impl Region {
         if self.feather.is_nan() || self.feather < 0.0 {
             return refused("the feather is a width of 0 or more".into());
         }
-        if self.at.is_none() && (self.radius != 0.0 || self.feather != 0.0) {
-            return refused("radius and feather of a region are those of a ball; give its middle, at".into());
+        let is_tube = !self.path.is_empty();
+        if self.at.is_none() && !is_tube && (self.radius != 0.0 || self.feather != 0.0) {
+            return refused(
+                "radius and feather of a region are those of a ball or a tube; give its middle, at, or its path".into(),
+            );
+        }
+        if is_tube && (self.at.is_some() || self.image.is_some()) {
+            return refused("a region is along a path, or around a place: give one of path and at".into());
         }
         let mask = match (&self.image, &self.at, self.up, self.width) {
             (Some(name), Some(at), Some(up), Some(width)) => {
@@ -64,11 +75,12 @@ impl Region {
             _ => return refused("up, width and depth of a region are those of its image; name the image".into()),
         };
         let is_ball = self.at.is_some() && (mask.is_none() || self.radius != 0.0);
-        if is_ball && !is_positive(self.radius) {
-            return refused("a region around a place needs a radius above 0".into());
+        if (is_ball || is_tube) && !is_positive(self.radius) {
+            return refused("a region around a place or along a path needs a radius above 0".into());
         }
+        let tube = self.path.iter().map(|place| ground.locate(place, "the region")).collect::<Result<_, _>>()?;
         let place = self.at.as_ref().map(|place| ground.locate(place, "the region")).transpose()?;
-        Ok(Found { ball: place.filter(|_| is_ball).map(|(middle, _)| middle), mask })
+        Ok(Found { ball: place.filter(|_| is_ball).map(|(middle, _)| middle), tube, mask })
     }
 
     /// The shares of all nodes of the patches, from 0 to 1; `None` where a patch is left out altogether.
@@ -76,11 +88,18 @@ impl Region {
     /// # Errors
     /// [`ReliefError::Edit`] for what cannot be meant.
     pub(super) fn shares(&self, ground: &Ground, pictures: &Pictures) -> Result<Vec<Option<Vec<f64>>>, ReliefError> {
-        let Found { ball, mask } = self.found(ground, pictures)?;
+        let Found { ball, tube, mask } = self.found(ground, pictures)?;
+        let points: Vec<DVec3> = tube.iter().map(|(p, _)| *p).collect();
         let share = |p: usize| {
-            let named = self.patches.is_empty() || self.patches.contains(&(p as u32));
+            let is_near = tube.is_empty() || comes_near(ground, p, &points, self.radius);
+            let named = is_near && (self.patches.is_empty() || self.patches.contains(&(p as u32)));
             let inside = |node: &Texel| {
-                let near = ball.map_or(1.0, |middle| fade(self.radius - node.0.distance(middle), self.feather));
+                let away = match ball {
+                    Some(middle) => Some(node.0.distance(middle)),
+                    None if tube.is_empty() => None,
+                    None => Some(distance_along(&tube, node)),
+                };
+                let near = away.map_or(1.0, |away| fade(self.radius - away, self.feather));
                 let share = |mask: &Projection| mask.at(node, ground.spacings[p]).into_iter().product::<f64>();
                 let shown = mask.as_ref().map_or(1.0, |mask| share(mask).clamp(0.0, 1.0));
                 let within = if named { near * shown } else { 0.0 };

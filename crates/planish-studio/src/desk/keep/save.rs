@@ -1,7 +1,7 @@
 //! Saving: the project file is written whole beside its name, on a thread of its own, again and again while there are
 //! changes. What is not in it yet is in the journal.
 
-use super::Letter;
+use crate::desk::Letter;
 use planish::Model;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
