@@ -252,6 +252,7 @@ describe.skipIf(!chromiumPath)('tools', () => {
       await studio.shot('brush');
       await page.mouse.up();
     };
+    await page.keyboard.press(']');
     await stroke();
     await studio.until((s) => s.relief_done.join() === 'stroke' && s.jobs.length === 0);
     await studio.shown();

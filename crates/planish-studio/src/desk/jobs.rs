@@ -3,8 +3,8 @@
 
 use super::beside::{Known, Peer, Shown};
 use super::keep::preparation::{Basis, Preparation};
+use super::keep::strokes::Sculpted;
 use super::project::Fit;
-use super::sculpt::Sculpted;
 use super::{Letter, Project};
 use crate::StudioError;
 use crate::protocol::state::{Job, StageName};

@@ -5,7 +5,7 @@ use super::keep::journal::Journal;
 use super::keep::kept::{self, Kept};
 use super::keep::preparation::{Basis, Preparation};
 use super::keep::save::Saver;
-use super::sculpt;
+use super::keep::strokes;
 use crate::protocol::state::Hole;
 use planish::cloud::Cloud;
 use planish::edit::{Edit, Ground, Made, Redo, Undo, apply};
@@ -120,7 +120,7 @@ impl Project {
         let mut kept = Kept::of(&model.studio).unwrap_or_else(|| Kept::on(&mesh.points, None));
         if !model.layers.stack.is_empty() {
             // Another command may have changed it.
-            kept.relief = sculpt::edits_of(&model.layers);
+            kept.relief = strokes::edits_of(&model.layers);
         }
         Project {
             mesh,
@@ -276,7 +276,7 @@ impl Project {
             let (quality, seams) = (Quality::new(), Vec::new());
             let (warnings, deviations) = (Vec::new(), deviations(&model));
             let (revision, model) = (self.revision, Arc::new(model));
-            let (coarse, short, relief) = (false, None, sculpt::edits_of(&model.layers));
+            let (coarse, short, relief) = (false, None, strokes::edits_of(&model.layers));
             self.fit =
                 Some(Fit { revision, model, earlier, quality, seams, warnings, deviations, coarse, short, relief });
         }

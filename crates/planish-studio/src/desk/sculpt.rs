@@ -3,71 +3,18 @@
 
 use super::Table;
 use super::jobs::Outcome;
+use super::keep::strokes::{Sculpted, entry_of, follow};
 use super::project::{NO_PROJECT, Project};
 use crate::protocol::Why;
 use crate::web::hub::Client;
-use planish::model::{HistoryEntry, Model};
+use planish::model::Model;
 use planish::observe::Observer;
-use planish::relief::Relief;
-use planish::relief::layers::{self, Layers, Picture, ReliefEdit};
-use std::path::Path;
+use planish::relief::layers::ReliefEdit;
 use std::sync::Arc;
 
 const NO_RELIEF: &str = "there is no relief yet - hint: fit surfaces first";
 /// Kind of the jobs that edit a relief.
 pub const SCULPT: &str = "sculpt";
-
-/// A relief with edits.
-pub struct Sculpted {
-    /// The edits.
-    pub edits: Vec<ReliefEdit>,
-    /// What they lie above, and they.
-    pub layers: Layers,
-    /// All of it together.
-    pub reliefs: Vec<Relief>,
-}
-
-/// Makes the relief of a model follow a list of edits: takes those back that it has and the list has not, and makes the others. An edit
-/// that cannot be made ends it, and is told; those before it are made.
-/// * `has` - the edits that it has, and has afterwards
-/// * `folder` - where images of stamps are
-pub fn follow(
-    model: &mut Model,
-    has: &mut Vec<ReliefEdit>,
-    list: &[ReliefEdit],
-    folder: &Path,
-    observer: &dyn Observer,
-) -> Result<(), String> {
-    let shared = has.iter().zip(list).take_while(|(a, b)| a == b).count();
-    while has.len() > shared {
-        model.undo_relief();
-        has.pop();
-    }
-    let pictures = |name: &str| -> Result<Picture, String> {
-        match Path::new(name).file_name() == Some(name.as_ref()) {
-            true => planish_io::maps::read_picture(&folder.join(name)).map_err(|e| format!("{name}: {e}")),
-            false => Err(format!("{name} is not a file of the project's folder")),
-        }
-    };
-    for edit in &list[shared..] {
-        let Model { layers, reliefs, network, surfaces, .. } = &mut *model;
-        layers.begin(reliefs);
-        let made = layers::edit(layers, (network, surfaces), edit, &pictures, observer).map_err(|e| e.to_string())?;
-        model.record_relief(entry_of(edit), made.stack);
-        has.push(edit.clone());
-    }
-    Ok(())
-}
-
-fn entry_of(edit: &ReliefEdit) -> HistoryEntry {
-    HistoryEntry { command: edit.name().into(), parameters: serde_json::to_string(edit).unwrap_or_default() }
-}
-
-/// The edits that the relief of a model has; none if some are not of a script.
-pub fn edits_of(layers: &Layers) -> Vec<ReliefEdit> {
-    let edit = |past: &layers::Past| serde_json::from_str(&past.parameters).ok();
-    layers.undo.iter().map(edit).collect::<Option<_>>().unwrap_or_default()
-}
 
 impl Project {
     /// True if the relief that is there is of the drawing as it is.
