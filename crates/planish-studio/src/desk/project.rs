@@ -204,6 +204,11 @@ impl Project {
         self.kept.write(&self.file);
         // Its edits were taken back.
         self.journal.clear();
+        self.rebuilt(basis, then)
+    }
+
+    /// The project on another basis.
+    fn rebuilt(self, basis: Basis, then: usize) -> Project {
         let Model { units, shift, history, .. } = self.model;
         let Basis { scan, left_out, known, mesh, params, .. } = basis;
         let (model, fit) = (Model { units, shift, history, ..Model::default() }, None);
@@ -228,7 +233,9 @@ impl Project {
         match self.basis().walk(&self.kept.preparation, &preparation, observer) {
             Ok(basis) => {
                 let notice = "Goes on where the last session was left, before its mesh was saved.".into();
-                Project { notice, ..self.prepared(basis, preparation, 0) }
+                self.kept.preparation = preparation;
+                // Edits that came after the steps are in the journal.
+                Project { notice, ..self.rebuilt(basis, 0) }
             }
             Err(why) => Project { notice: format!("The last session is not taken up: {why}"), ..self },
         }
@@ -430,4 +437,45 @@ impl Project {
 /// Tells one state of the drawing and its history from another.
 fn journal_state(model: &Model) -> u64 {
     super::keep::journal::state_of(&model.drawing(), model.undo.len(), model.redo.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::keep::preparation::PrepStep;
+    use super::*;
+    use planish::synthetic::shapes;
+
+    #[test]
+    fn a_hole_closed_and_an_edit_after_it_come_back_where_neither_was_saved() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("ball.planish");
+        let mut mesh = shapes::sphere(1.0, 3);
+        mesh.triangles.retain(|t| t.iter().any(|&v| mesh.points[v as usize].z < 0.8));
+        let top = mesh.points.iter().filter(|p| p.z < 0.99).max_by(|a, b| a.z.total_cmp(&b.z)).unwrap().to_array();
+        planish_io::write_model(&file, &Model { mesh, ..Model::default() }).unwrap();
+        let open = || {
+            let model = planish_io::read_model(&file).unwrap();
+            Project::of_model(model, file.clone(), String::new()).take_up(&Silent)
+        };
+        let before = open();
+        let counts = [before.mesh.points.len(), before.mesh.triangles.len()];
+        let to = before.kept.preparation.with(PrepStep::CloseHole { place: top, before: counts });
+        let basis = before.basis().walk(&before.kept.preparation, &to, &Silent).unwrap();
+        let mut closed = before.prepared(basis, to, 0);
+        let lid = closed.mesh.triangles.len();
+        assert!(lid > counts[1]);
+        let mesh = closed.mesh.clone();
+        let ground = Ground::new(&mesh);
+        let corner: Edit = serde_json::from_str(r#"{"edit":"add_corner","at":[0,0,1]}"#).unwrap();
+        assert!(closed.edit(&corner, Some(&ground), &Silent).is_ok());
+        // The project file was never written: all is beside it.
+        drop(closed);
+        let mut again = open();
+        assert_eq!(again.mesh.triangles.len(), lid);
+        let mesh = again.mesh.clone();
+        let ground = Ground::new(&mesh);
+        again.go_on(Some(&ground));
+        again.recover(Some(&ground));
+        assert_eq!((again.model.network.corners.len(), again.model.undo.len()), (1, 1));
+    }
 }
