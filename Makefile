@@ -7,6 +7,7 @@
 #   make wheel   the Python package with the program inside: out/wheels
 #   make fuzz    damaged files for ten minutes a format, 300 killed sessions, 3 000 hostile inputs through every command
 #   make lint    formatting and clippy, warnings are errors
+#   make guard   headline figures of scanned parts against their floors, all rows: `make test` leaves two long ones out
 #   make test-checked  tests of the library with debug assertions and checks of overflow
 #   make bench   time every stage: bench/runs/<date>-<machine>.json
 #   make bench-studio  figures of the studio: opening, dragging, fitting, memory
@@ -22,7 +23,7 @@ PYTHON  := .venv/bin/python
 DATA    := $(or $(PLANISH_DATA),../shared/data)
 
 .NOTPARALLEL:
-.PHONY: build demo studio site wheel fuzz deny test test-rust test-checked test-readers test-studio test-python lint bench bench-studio figures docs clean
+.PHONY: build demo studio site wheel fuzz deny test test-rust guard test-checked test-readers test-studio test-python lint bench bench-studio figures docs clean
 .DELETE_ON_ERROR:
 
 build: .stamp/packages .stamp/page
@@ -40,6 +41,9 @@ studio: .stamp/page
 test-rust: .stamp/packages .stamp/readers .stamp/page
 	@test -d "$(DATA)" || echo "skipped: the tests on measured meshes; there is no $(DATA), and PLANISH_DATA names none"
 	PLANISH_PYTHON=$(abspath $(PYTHON)) $(CARGO) test --release --locked --workspace --no-fail-fast
+
+guard: .stamp/packages
+	$(CARGO) test --release --locked --workspace --test regress -- --include-ignored
 
 # The library alone is compiled again, and what builds on it; with the whole workspace named its dependencies stay as they are.
 CHECKED := $(foreach check,debug-assertions overflow-checks,--config 'profile.release.package.planish.$(check)=true')

@@ -114,7 +114,7 @@ fn smoothing_ends_within_200_ms() {
 
 #[test]
 fn decimation_ends_within_200_ms() {
-    let mesh = shapes::sphere(1.0, 7);
+    let mesh = shapes::sphere(1.0, 6);
     let params = DecimateParams { target: DecimateTarget::Ratio(0.1), ..DecimateParams::default() };
     stops("decimate", |o| decimate(&mesh, None, &params, o));
 }
@@ -174,7 +174,7 @@ fn measuring_ends_within_200_ms() {
 
 #[test]
 fn cleaning_and_meshing_of_a_scan_end_within_200_ms() {
-    let scanner = ScannerParams { points: 40_000, ..ScannerParams::default() };
+    let scanner = ScannerParams { points: 25_000, ..ScannerParams::default() };
     let truth = part(60_000);
     stops("scanner", |o| virtual_scan(&truth, &scanner, o));
     let scan = virtual_scan(&truth, &scanner, &Silent).expect("a scan").cloud;

@@ -33,8 +33,9 @@ fn guard(part: &str, percent: f64) {
 }
 
 macro_rules! guards {
-    ($($test:ident: $part:literal, $percent:literal;)*) => {
+    ($($(#[$mark:meta])* $test:ident: $part:literal, $percent:literal;)*) => {
         $(#[test]
+        $(#[$mark])*
         fn $test() {
             guard($part, $percent);
         })*
@@ -53,8 +54,10 @@ guards! {
     demo_scanned_at_noise_of_0_1_percent_keeps_its_headline_figures: "demo", 0.1;
     demo_scanned_at_noise_of_0_25_percent_keeps_its_headline_figures: "demo", 0.25;
     demo_scanned_at_noise_of_0_5_percent_keeps_its_headline_figures: "demo", 0.5;
+    #[ignore = "with the other long row nearly half of the time of all: make guard"]
     casting_scanned_at_noise_of_0_1_percent_keeps_its_headline_figures: "casting", 0.1;
     casting_scanned_at_noise_of_0_25_percent_keeps_its_headline_figures: "casting", 0.25;
+    #[ignore = "with the other long row nearly half of the time of all: make guard"]
     casting_scanned_at_noise_of_0_5_percent_keeps_its_headline_figures: "casting", 0.5;
     bracket_scanned_at_noise_of_0_1_percent_keeps_its_headline_figures: "bracket", 0.1;
     bracket_scanned_at_noise_of_0_25_percent_keeps_its_headline_figures: "bracket", 0.25;
