@@ -230,11 +230,11 @@ export class App implements Bench {
     if (answer?.type === 'exported') this.save(this.client.url(answer.url), answer.name);
   }
 
-  async script(): Promise<void> {
-    const answer = await this.ask({ type: 'script' });
+  async script(relief = false): Promise<void> {
+    const answer = await this.ask({ type: 'script', relief });
     if (answer?.type !== 'script') return;
     const url = URL.createObjectURL(new Blob([answer.text], { type: 'text/plain' }));
-    this.save(url, `${store.state.value.project?.name ?? 'edits'}.toml`);
+    this.save(url, `${store.state.value.project?.name ?? 'edits'}${relief ? '-relief' : ''}.toml`);
   }
 
   picture(): void {

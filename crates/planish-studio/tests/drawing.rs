@@ -5,6 +5,7 @@ mod common;
 
 use common::*;
 use planish::DVec3;
+use planish::relief::layers::{Layers, ReliefEdit};
 use planish::synthetic::shapes;
 use planish_io::WriteOptions;
 use serde_json::{Value, json};
@@ -266,6 +267,11 @@ fn strokes_on_the_relief_stay_on_new_surfaces_go_back_and_come_again_after_a_kil
         assert_eq!(page.ask(json!({ "type": "resculpt", "count": 1 })).await["type"], "done");
         page.state_with(|s| s["relief_undone"] == json!([])).await;
         assert_eq!(most(&mut page).await, raised);
+        // As a script of `planish relief edit`.
+        let script = page.ask(json!({ "type": "script", "relief": true })).await;
+        let script: toml::Table = script["text"].as_str().unwrap().parse().unwrap();
+        let step: ReliefEdit = script["step"].as_array().unwrap()[0].clone().try_into().unwrap();
+        assert_eq!(serde_json::to_value(&step).unwrap()["radius"], stroke(0.3)["edit"]["radius"]);
         // New surfaces get it again.
         assert_eq!(page.edit(json!({ "edit": "relax" })).await["type"], "done");
         assert_eq!(page.ask(json!({ "type": "fit" })).await["type"], "done");
@@ -278,7 +284,7 @@ fn strokes_on_the_relief_stay_on_new_surfaces_go_back_and_come_again_after_a_kil
     let killed = killed.unwrap();
     let file = std::fs::read_dir(killed.path()).unwrap().map(|e| e.unwrap().path());
     let file = file.into_iter().find(|p| p.extension().is_some_and(|e| e == "planish")).unwrap();
-    let server = Server::start(killed.path(), Some(file));
+    let server = Server::start(killed.path(), Some(file.clone()));
     run(async {
         let mut page = server.connect().await;
         page.state_with(|s| s["relief_done"] == json!(["stroke"])).await;
@@ -291,6 +297,23 @@ fn strokes_on_the_relief_stay_on_new_surfaces_go_back_and_come_again_after_a_kil
         assert!((raised - 0.05).abs() < 0.01, "{raised}");
     });
     server.end();
+    // One of three edits cannot be made any more: it goes, and the others stay.
+    let mut model = planish_io::read_model(&file).unwrap();
+    let mut kept: Value = serde_json::from_str(&model.studio).unwrap();
+    let list = [stroke(0.3), stroke(0.0), stroke(0.2)].map(|s| s["edit"].clone());
+    kept["relief"] = json!(list);
+    (model.studio, model.layers) = (kept.to_string(), Layers::default());
+    planish_io::write_model(&file, &model).unwrap();
+    let server = Server::start(killed.path(), Some(file.clone()));
+    run(async {
+        let mut page = server.connect().await;
+        page.state_with(|s| s["relief_done"] == json!(["stroke", "stroke"]) && s["jobs"] == json!([])).await;
+    });
+    server.end();
+    let layers = planish_io::read_model(&file).unwrap().layers;
+    let radii: Vec<Value> =
+        layers.undo.iter().map(|p| serde_json::from_str::<Value>(&p.parameters).unwrap()["radius"].clone()).collect();
+    assert_eq!(radii, [0.3, 0.2]);
 }
 
 #[test]

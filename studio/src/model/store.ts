@@ -82,12 +82,24 @@ export const pointColor = signal<PointColor>('height');
 export const holds = signal<Holds | null>(null);
 /** How stiff the brush makes a stretch, against what is around it. */
 export const stiffness = signal(10);
-/** The brush of the relief; its radius and its height are shares of the diagonal. */
-export const brush = signal<{ mode: BrushMode; size: number; height: number }>({
+/** The brush of the relief; its radius and its height are steps from the usual ones. */
+export const brush = signal<{ mode: BrushMode; radius: number; height: number }>({
   mode: 'raise',
-  size: 0.04,
-  height: 0.005,
+  radius: 0,
+  height: 0,
 });
+/** Lengths of the brush: the usual ones, of the diagonal, and the steps from them, of a quarter more each. */
+export const BRUSH = {
+  radius: { usual: 0.04, least: -10, most: 8 },
+  height: { usual: 0.005, least: -12, most: 10 },
+} as const;
+/** A length of the brush, of the diagonal. */
+export const brushLength = (which: keyof typeof BRUSH): number => BRUSH[which].usual * 1.25 ** brush.value[which];
+/** Takes another length of the brush, in steps; beyond the last it stays there. */
+export function setBrush(which: keyof typeof BRUSH, steps: number): void {
+  const { least, most } = BRUSH[which];
+  brush.value = { ...brush.value, [which]: Math.min(most, Math.max(least, steps)) };
+}
 /** Control vertices of the tool with handles. */
 export const handleCount = signal(8);
 /** Pairs of places, on the other project and on this one. */
@@ -112,6 +124,11 @@ export const lassoOutside = signal(false);
 /** Largest angle of a smooth seam, degrees. */
 export const largestAngle = signal(0);
 export const up = signal<'y' | 'z'>('z');
+/** Steps that Undo and Redo go through: with the brush in hand those of the relief. */
+export const history = computed(() => {
+  const { done, undone, relief_done, relief_undone } = state.value;
+  return tool.value === 'sculpt' ? [relief_done.length, relief_undone.length] : [done.length, undone.length];
+});
 /** Largest deviation of what is shown, and of the colour scale, world units. */
 export const scaleFound = signal(0);
 export const dark = signal(false);

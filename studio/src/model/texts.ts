@@ -428,6 +428,7 @@ export const TEXT = {
     edits: (n: number) => `${some(n, 'edit')} of the relief. New surfaces get them again.`,
     back: 'Take the last back',
     again: 'Make it again',
+    script: 'Save as a script',
   },
   look: {
     shape: 'Shape',

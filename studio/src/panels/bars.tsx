@@ -38,7 +38,7 @@ export function TopBar({ app }: { app: App }) {
               type="button"
               class="flat"
               onClick={app.undo}
-              disabled={state.done.length === 0}
+              disabled={store.history.value[0] === 0}
               title={TEXT.top.undoTip}
               aria-label={TEXT.top.undo}
             >
@@ -48,7 +48,7 @@ export function TopBar({ app }: { app: App }) {
               type="button"
               class="flat"
               onClick={app.redo}
-              disabled={state.undone.length === 0}
+              disabled={store.history.value[1] === 0}
               title={TEXT.top.redoTip}
               aria-label={TEXT.top.redo}
             >

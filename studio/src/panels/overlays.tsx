@@ -112,8 +112,8 @@ export function commands(app: App): Command[] {
   for (const tool of TOOLS) {
     if (store.canUse(tool.id, state)) add(tool.name, () => app.choose(tool.id), tool.key);
   }
-  if (state.done.length > 0) add(TEXT.top.undo, app.undo, 'Ctrl Z');
-  if (state.undone.length > 0) add(TEXT.top.redo, app.redo, 'Ctrl Shift Z');
+  if (store.history.value[0]) add(TEXT.top.undo, app.undo, 'Ctrl Z');
+  if (store.history.value[1]) add(TEXT.top.redo, app.redo, 'Ctrl Shift Z');
   if (state.layers.points && !state.layers.mesh) add(words.look, () => app.clean());
   if (state.layers.points && state.curves.length === 0) add(words.mesh, () => app.mesh());
   if (state.layers.mesh) {

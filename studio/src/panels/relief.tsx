@@ -111,17 +111,12 @@ export function ReliefPanel({ app }: { app: App }) {
   );
 }
 
-/** Radii and heights of the brush from the slider, of the diagonal: steps of a quarter more. */
-const sizeAt = (step: number) => 0.04 * 1.25 ** step;
-const heightAt = (step: number) => 0.005 * 1.25 ** step;
+const MODES = ['raise', 'engrave', 'smooth', 'erase'] as const;
 
 function Brush({ app }: { app: App }) {
-  const { project, relief_done: done, relief_undone: undone } = store.state.value;
-  const { mode, size, height } = store.brush.value;
+  const { relief_done: done, relief_undone: undone } = store.state.value;
+  const { mode } = store.brush.value;
   const words = TEXT.relief;
-  const diagonal = project?.diagonal ?? 1;
-  const units = project?.units ?? '';
-  const step = (value: number, usual: number) => Math.round(Math.log(value / usual) / Math.log(1.25));
   const isInHand = store.tool.value === 'sculpt';
   return (
     <Section title={words.brush}>
@@ -135,35 +130,13 @@ function Brush({ app }: { app: App }) {
           <Choice
             label={words.mode}
             value={mode}
-            options={(['raise', 'engrave', 'smooth', 'erase'] as const).map((m) => [m, words[m]] as const)}
+            options={MODES.map((m) => [m, words[m]] as const)}
             onPick={(m) => {
               store.brush.value = { ...store.brush.value, mode: m };
             }}
           />
-          <Slider
-            label={words.radius}
-            value={step(size, sizeAt(0))}
-            min={-10}
-            max={8}
-            step={1}
-            show={() => length(size * diagonal, units)}
-            onInput={(k) => {
-              store.brush.value = { ...store.brush.value, size: sizeAt(k) };
-            }}
-          />
-          {(mode === 'raise' || mode === 'engrave') && (
-            <Slider
-              label={words.height}
-              value={step(height, heightAt(0))}
-              min={-12}
-              max={10}
-              step={1}
-              show={() => length(height * diagonal, units)}
-              onInput={(k) => {
-                store.brush.value = { ...store.brush.value, height: heightAt(k) };
-              }}
-            />
-          )}
+          <BrushLength which="radius" />
+          {(mode === 'raise' || mode === 'engrave') && <BrushLength which="height" />}
         </>
       )}
       {done.length + undone.length > 0 && (
@@ -176,10 +149,29 @@ function Brush({ app }: { app: App }) {
             <button type="button" disabled={undone.length === 0} onClick={() => void app.resculpt()}>
               {words.again}
             </button>
+            <button type="button" disabled={done.length === 0} onClick={() => void app.script(true)}>
+              {words.script}
+            </button>
           </div>
         </>
       )}
     </Section>
+  );
+}
+
+function BrushLength({ which }: { which: keyof typeof store.BRUSH }) {
+  const { project } = store.state.value;
+  const { least, most } = store.BRUSH[which];
+  return (
+    <Slider
+      label={TEXT.relief[which]}
+      value={store.brush.value[which]}
+      min={least}
+      max={most}
+      step={1}
+      show={() => length(store.brushLength(which) * (project?.diagonal ?? 1), project?.units ?? '')}
+      onInput={(steps) => store.setBrush(which, steps)}
+    />
   );
 }
 

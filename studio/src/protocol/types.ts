@@ -839,6 +839,8 @@ export type Request = ({
 } | {
   /** Number of the request. */
   id: number;
+  /** True for those of the relief. */
+  relief?: boolean;
   type: "script";
 } | {
   /** Number of the request. */

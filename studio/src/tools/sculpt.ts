@@ -1,6 +1,6 @@
 // The brush of the relief: raises, engraves, smooths or erases along the way of the cursor.
 import { Vector3 } from 'three';
-import { brush } from '../model/store';
+import { type BrushMode, brush, brushLength, setBrush } from '../model/store';
 import type { ReliefEdit } from '../protocol/types';
 import type { Bench, Spot, Tool } from './tool';
 
@@ -14,9 +14,14 @@ const BLUR_SHARE = 1 / 3;
 const NOTHING = new Float32Array();
 
 /** The edit that a stroke of the brush makes; lengths in world units. */
-export function strokeOf(path: [number, number, number][], radius: number, height: number): ReliefEdit {
+export function strokeOf(
+  mode: BrushMode,
+  path: [number, number, number][],
+  radius: number,
+  height: number,
+): ReliefEdit {
   const region = { path, radius, feather: radius };
-  switch (brush.value.mode) {
+  switch (mode) {
     case 'raise':
       return { edit: 'stroke', path, radius, height };
     case 'engrave':
@@ -48,7 +53,7 @@ export class Sculpt implements Tool {
     const last = this.path[this.path.length - 1];
     if (!place || !last) return;
     this.ring(place);
-    if (place.distanceTo(last) < STEP_SHARE * this.radius()) return;
+    if (place.distanceTo(last) < STEP_SHARE * this.length('radius')) return;
     this.path.push(place.clone());
     const pieces = this.path.flatMap((p, k) => (k > 0 ? [...this.path[k - 1]!.toArray(), ...p.toArray()] : []));
     this.bench.view.setLine('preview', new Float32Array(pieces));
@@ -66,8 +71,7 @@ export class Sculpt implements Tool {
 
   key(key: string): boolean {
     if (key === '[' || key === ']') {
-      const { size } = brush.value;
-      brush.value = { ...brush.value, size: size * (key === '[' ? 0.8 : 1.25) };
+      setBrush('radius', brush.value.radius + (key === '[' ? -1 : 1));
       return true;
     }
     if (key !== 'Escape' || this.path.length === 0) return false;
@@ -81,28 +85,22 @@ export class Sculpt implements Tool {
     this.bench.view.setLine('helper', NOTHING);
   }
 
-  private radius(): number {
-    return 2 * this.bench.view.rig.radius * brush.value.size;
+  /** World units. */
+  private length(which: 'radius' | 'height'): number {
+    return 2 * this.bench.view.rig.radius * brushLength(which);
   }
 
-  private make(path: Vector3[]): void {
-    if (path.length === 0) return;
-    const { bench } = this;
-    const height = 2 * bench.view.rig.radius * brush.value.height;
-    void bench.sculpt(
-      strokeOf(
-        path.map((p) => bench.world(p)),
-        this.radius(),
-        height,
-      ),
-    );
+  private make(places: Vector3[]): void {
+    if (places.length === 0) return;
+    const path = places.map((p) => this.bench.world(p));
+    void this.bench.sculpt(strokeOf(brush.value.mode, path, this.length('radius'), this.length('height')));
   }
 
   private ring(place: Vector3 | null): void {
     const { view } = this.bench;
     if (!place) return view.setLine('helper', NOTHING);
-    const right = new Vector3(1, 0, 0).applyQuaternion(view.rig.turn).multiplyScalar(this.radius());
-    const up = new Vector3(0, 1, 0).applyQuaternion(view.rig.turn).multiplyScalar(this.radius());
+    const right = new Vector3(1, 0, 0).applyQuaternion(view.rig.turn).multiplyScalar(this.length('radius'));
+    const up = new Vector3(0, 1, 0).applyQuaternion(view.rig.turn).multiplyScalar(this.length('radius'));
     const at = (k: number) => {
       const turn = (2 * Math.PI * k) / RING;
       return place.clone().addScaledVector(right, Math.cos(turn)).addScaledVector(up, Math.sin(turn)).toArray();

@@ -2,11 +2,12 @@
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
-import { canUse, EMPTY } from '../../src/model/store';
+import { BRUSH, brush, brushLength, canUse, EMPTY, history, setBrush, state, tool } from '../../src/model/store';
 import { TOOLS } from '../../src/model/texts';
 import { tint } from '../../src/panels/relief';
 import type { Geometry } from '../../src/protocol/frames';
 import type { State } from '../../src/protocol/types';
+import { strokeOf } from '../../src/tools/sculpt';
 import { blend } from '../../src/view/blend';
 import { colorsOf, tints, usualRange } from '../../src/view/cloud';
 import { placeAt, stretch } from '../../src/view/lines';
@@ -77,16 +78,45 @@ describe('relief', () => {
   });
 });
 
+describe('the brush', () => {
+  const path: [number, number, number][] = [
+    [0, 0, 1],
+    [0, 1, 1],
+  ];
+  it('raises and engraves by its height, and smooths and erases along its way', () => {
+    expect(strokeOf('raise', path, 2, 0.5)).toEqual({ edit: 'stroke', path, radius: 2, height: 0.5 });
+    expect(strokeOf('engrave', path, 2, 0.5)).toMatchObject({ edit: 'stroke', height: -0.5 });
+    const region = { path, radius: 2, feather: 2 };
+    expect(strokeOf('erase', path, 2, 0.5)).toEqual({ edit: 'erase', region });
+    expect(strokeOf('smooth', path, 2, 0.5)).toMatchObject({ edit: 'blur', region });
+  });
+  it('has lengths of the diagonal in steps of a quarter, between its ends', () => {
+    setBrush('radius', 1);
+    expect(brushLength('radius')).toBeCloseTo(0.05, 12);
+    setBrush('radius', 99);
+    expect(brush.value.radius).toBe(BRUSH.radius.most);
+    setBrush('radius', 0);
+  });
+  it('in hand has Undo for itself', () => {
+    state.value = { ...EMPTY, done: [{ edit: 'mesh' }], relief_undone: ['stroke'] };
+    expect(history.value).toEqual([1, 0]);
+    tool.value = 'sculpt';
+    expect(history.value).toEqual([0, 1]);
+    tool.value = 'select';
+    state.value = EMPTY;
+  });
+});
+
 describe('tools', () => {
-  const state = (some: Partial<State>): State => ({ ...EMPTY, ...some });
+  const having = (some: Partial<State>): State => ({ ...EMPTY, ...some });
   it('have keys of their own, and are offered where they have something to work on', () => {
     expect(new Set(TOOLS.map((t) => t.key)).size).toBe(TOOLS.length);
     const offered = (s: State) => TOOLS.filter((t) => canUse(t.id, s)).map((t) => t.id);
-    expect(offered(state({ layers: { points: 'p' } }))).toEqual(['select', 'lasso']);
-    const meshed = offered(state({ layers: { mesh: 'm' } }));
+    expect(offered(having({ layers: { points: 'p' } }))).toEqual(['select', 'lasso']);
+    const meshed = offered(having({ layers: { mesh: 'm' } }));
     expect(meshed).toContain('paint');
     for (const id of ['handles', 'hold', 'feature', 'lasso', 'carry']) expect(meshed).not.toContain(id);
-    expect(offered(state({ layers: { mesh: 'm' }, files: ['a.planish'] }))).toContain('carry');
+    expect(offered(having({ layers: { mesh: 'm' }, files: ['a.planish'] }))).toContain('carry');
   });
 });
 

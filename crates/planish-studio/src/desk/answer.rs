@@ -59,7 +59,7 @@ impl<'env> Table<'_, '_, 'env> {
             },
             Request::Get { layer, .. } => self.geometry(client, id, layer),
             Request::Export { format, .. } => self.export(client, id, format),
-            Request::Script { .. } => match self.project.as_ref().map(|p| export::script(&p.model)) {
+            Request::Script { relief, .. } => match self.project.as_ref().map(|p| export::script(p, relief)) {
                 Some(Ok(text)) => self.desk.hub.tell(client, &Message::Script { id, text }),
                 Some(Err(why)) => self.refuse(client, id, Why::of(why)),
                 None => self.refuse(client, id, Why::of(NO_PROJECT)),
@@ -143,6 +143,9 @@ impl<'env> Table<'_, '_, 'env> {
             if let Some((client, id)) = &asked {
                 self.refuse(client, *id, Why::of("it was stopped"));
             }
+            if matches!(outcome, Outcome::Sculpted(..)) {
+                self.unsculpted();
+            }
             self.tell_state();
             return None;
         }
@@ -176,8 +179,8 @@ impl<'env> Table<'_, '_, 'env> {
                 self.parted(revision, shown);
                 (done(), None)
             }
-            Outcome::Sculpted(revision, result) => {
-                (self.sculpted(revision, result).map_or_else(Answer::Refused, |()| done()), None)
+            Outcome::Sculpted(revision, made) => {
+                (self.sculpted(revision, *made).map_or_else(Answer::Refused, |()| done()), None)
             }
             Outcome::Looked(Ok(peer)) => {
                 self.desk.layers.new_peer();

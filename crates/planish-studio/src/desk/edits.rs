@@ -150,6 +150,8 @@ impl<'env> Table<'_, '_, 'env> {
         model.params = serde_json::to_string(&params).unwrap_or_default();
         // Grids of other parameters cannot be followed.
         let earlier = project.fit.as_ref().filter(|f| f.coarse == coarse).and_then(|f| f.earlier.clone());
+        // The new surfaces get the list as it is now.
+        self.desk.jobs.stop_kind(SCULPT);
         self.desk.jobs.stop_kind("fit");
         self.desk.jobs.stop_kind(MEASURE);
         let adjacency = self.ground.map(|g| &g.canvas.adjacency);

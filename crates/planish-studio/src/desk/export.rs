@@ -3,10 +3,11 @@
 use super::Table;
 use super::exports::Ready;
 use super::jobs::Outcome;
+use super::keep::strokes::entry_of;
 use super::project::{Fit, NO_PROJECT, Project};
 use crate::protocol::{Format, Why};
 use crate::web::hub::Client;
-use planish::model::Model;
+use planish::model::{HistoryEntry, Model};
 use planish::observe::Observer;
 use planish::pipeline;
 use planish_io::report::{self, Input, Report};
@@ -112,15 +113,19 @@ fn report(project: &Project) -> Report {
     report
 }
 
-/// The edits of a model as a script for `planish edit`.
+/// The edits of a project as a script for `planish edit`, or those of its relief for `planish relief edit`.
 /// # Errors
 /// If a number cannot be written.
-pub fn script(model: &Model) -> Result<String, String> {
-    let mut text = String::from("# Edits of a session in the studio, for `planish edit`.\n");
-    for step in &model.undo {
-        let value: serde_json::Value = serde_json::from_str(&step.entry.parameters).map_err(|e| e.to_string())?;
+pub fn script(project: &Project, relief: bool) -> Result<String, String> {
+    let (command, entries): (_, Vec<HistoryEntry>) = match relief {
+        true => ("relief edit", project.kept.relief.iter().map(entry_of).collect()),
+        false => ("edit", project.model.undo.iter().map(|step| step.entry.clone()).collect()),
+    };
+    let mut text = format!("# Edits of a session in the studio, for `planish {command}`.\n");
+    for entry in entries {
+        let value: serde_json::Value = serde_json::from_str(&entry.parameters).map_err(|e| e.to_string())?;
         let mut table = toml::Table::new();
-        table.insert("edit".into(), toml::Value::String(step.entry.command.clone()));
+        table.insert("edit".into(), toml::Value::String(entry.command));
         for (key, value) in value.as_object().into_iter().flatten() {
             if let Some(value) = as_toml(value) {
                 table.insert(key.clone(), value);

@@ -36,7 +36,7 @@ pub enum Outcome {
     /// Reliefs of a revision were parted.
     Parted(Result<(u64, Shown), String>),
     /// The relief of a revision was edited.
-    Sculpted(u64, Result<Box<Sculpted>, String>),
+    Sculpted(u64, Box<Sculpted>),
     /// Another project was read.
     Looked(Result<Peer, String>),
     /// An edit was made on the drawing of a revision.

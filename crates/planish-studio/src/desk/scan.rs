@@ -6,7 +6,7 @@ use super::beside::Known;
 use super::content::Content;
 use super::jobs::{Outcome, Prepared};
 use super::keep::lasso::Lasso;
-use super::keep::preparation::{NO_SCAN, PrepStep, Preparation};
+use super::keep::preparation::{Basis, NO_SCAN, PrepStep, Preparation, count_left_out};
 use super::project::{NO_PROJECT, Project};
 use crate::protocol::state::StageName;
 use crate::protocol::{Why, state};
@@ -111,6 +111,9 @@ impl<'env> Table<'_, '_, 'env> {
                 }
                 let to = project.kept.preparation.at(done.saturating_sub(count - edits));
                 let to = Preparation { ahead: project.ahead(), ..to };
+                if edits > 0 {
+                    self.after_edit();
+                }
                 self.prepare(client, id, "Going back", to, 0);
                 true
             }
@@ -130,10 +133,11 @@ impl<'env> Table<'_, '_, 'env> {
         let (from, basis) = (project.kept.preparation.clone(), project.basis());
         let job = self.desk.jobs.start(self.scope, ("mesh", title), move |watch| {
             let observer: &dyn Observer = watch;
-            let before = basis.left_out();
+            let left_out = |basis: &Basis| count_left_out(basis.scan.as_ref(), &basis.left_out);
+            let before = left_out(&basis);
             Outcome::Prepared(match basis.walk(&from, &to, observer) {
                 Ok(basis) => {
-                    let gone = basis.left_out().saturating_sub(before);
+                    let gone = left_out(&basis).saturating_sub(before);
                     let s = if gone == 1 { "" } else { "s" };
                     let told = if gone > 0 { format!("{gone} point{s} left out.") } else { String::new() };
                     Ok(Box::new(Prepared { basis, from, to, then, told }))

@@ -21,9 +21,7 @@ impl Project {
     fn has_relief(&self) -> bool {
         self.fit.as_ref().is_some_and(|f| f.revision == self.revision && !f.coarse && !f.model.reliefs.is_empty())
     }
-}
 
-impl Project {
     /// Takes the relief with its edits over from what was fitted, where that is of the drawing as it is.
     pub(super) fn take_relief(&mut self) {
         let Some(fit) = self.fit.as_ref().filter(|f| f.revision == self.revision && !f.coarse) else { return };
@@ -87,36 +85,47 @@ impl<'env> Table<'_, '_, 'env> {
         if fit.relief == project.kept.relief {
             return None;
         }
-        let (model, mut has, list) = (fit.model.clone(), fit.relief.clone(), project.kept.relief.clone());
+        let (model, mut edits, list) = (fit.model.clone(), fit.relief.clone(), project.kept.relief.clone());
         let (revision, folder) = (fit.revision, project.folder());
         Some(self.desk.jobs.start(self.scope, (SCULPT, "Editing the relief"), move |watch| {
-            let mut model = Model { grids: Vec::new(), ..model.as_ref().clone() };
-            let result = follow(&mut model, &mut has, &list, &folder, watch as &dyn Observer);
+            let Model { network, surfaces, reliefs, layers, .. } = model.as_ref();
+            let (network, surfaces) = (network.clone(), surfaces.clone());
+            let (reliefs, layers) = (reliefs.clone(), layers.clone());
+            let mut model = Model { network, surfaces, reliefs, layers, ..Model::default() };
+            let trouble = follow(&mut model, &mut edits, &list, &folder, watch as &dyn Observer).err();
             let Model { layers, reliefs, .. } = model;
-            Outcome::Sculpted(revision, result.map(|()| Box::new(Sculpted { edits: has, layers, reliefs })))
+            Outcome::Sculpted(revision, Box::new(Sculpted { edits, layers, reliefs, trouble }))
         }))
     }
 
-    /// Takes over an edited relief. What cannot be made goes from the list.
-    pub(super) fn sculpted(&mut self, revision: u64, result: Result<Box<Sculpted>, String>) -> Result<(), Why> {
+    /// An edit of the relief was stopped, by nobody who makes another: the list is what the relief has.
+    pub(super) fn unsculpted(&mut self) {
+        let Some(project) = self.project.as_mut().filter(|p| p.has_relief()) else { return };
+        let has = project.fit.as_ref().map(|f| f.relief.clone());
+        if let Some(has) = has.filter(|_| !self.desk.jobs.has(SCULPT) && !self.desk.jobs.has("fit")) {
+            project.kept.relief = has;
+            project.keep();
+        }
+    }
+
+    /// Takes over an edited relief. An edit that cannot be made goes from the list, and the others are made.
+    pub(super) fn sculpted(&mut self, revision: u64, made: Sculpted) -> Result<(), Why> {
         let Some(project) = &mut *self.project else { return Ok(()) };
         let Some(fit) = project.fit.as_mut().filter(|f| f.revision == revision) else { return Ok(()) };
-        let Sculpted { edits, layers, reliefs } = match result {
-            Ok(made) => *made,
-            Err(why) => {
-                project.kept.relief.pop();
-                project.keep();
-                return Err(Why::of(why));
-            }
-        };
+        let Sculpted { edits, layers, reliefs, trouble } = made;
         let model = Arc::make_mut(&mut fit.model);
         (model.layers, model.reliefs) = (layers, reliefs);
+        if trouble.is_some() && edits.len() < project.kept.relief.len() {
+            project.kept.relief.remove(edits.len());
+        }
         (fit.relief, fit.short) = (edits, None);
         fit.quality.clear();
         project.take_relief();
         project.keep();
         self.desk.layers.new_relief();
-        self.measure();
-        Ok(())
+        if self.follow_list().is_none() {
+            self.measure();
+        }
+        trouble.map_or(Ok(()), |why| Err(Why::of(why)))
     }
 }

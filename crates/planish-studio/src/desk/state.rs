@@ -1,6 +1,6 @@
 //! The state of a project as pages see it.
 
-use super::keep::preparation::{PrepStep, Preparation};
+use super::keep::preparation::{PrepStep, Preparation, count_left_out};
 use super::layers::center;
 use super::project::{Fit, Project};
 use super::{Table, content};
@@ -53,7 +53,7 @@ impl Table<'_, '_, '_> {
             warnings: of_now.map_or_else(Vec::new, |f| f.warnings.iter().map(|w| w.message.clone()).collect()),
             jobs,
             cleaned: project.known.as_ref().map(|k| k.told()),
-            left_out: project.basis().left_out() as u64,
+            left_out: count_left_out(project.scan.as_ref(), &project.left_out) as u64,
             holes: project.holes.clone(),
             branches: project.told_branches(),
             longest: of_now.and_then(|f| f.short.as_ref()).map(|s| s.longest),

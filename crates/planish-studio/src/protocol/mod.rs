@@ -186,6 +186,9 @@ pub enum Request {
     Script {
         /// Number of the request.
         id: u32,
+        /// True for those of the relief.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        relief: bool,
     },
     /// A made part to try things on.
     Sample {
@@ -232,7 +235,7 @@ impl Request {
             | Request::Cancel { id, .. }
             | Request::Get { id, .. }
             | Request::Export { id, .. }
-            | Request::Script { id }
+            | Request::Script { id, .. }
             | Request::Sample { id, .. }
             | Request::Open { id, .. }
             | Request::Close { id } => id,

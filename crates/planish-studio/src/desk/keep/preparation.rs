@@ -229,12 +229,13 @@ impl Basis {
         self.known = None;
         Ok(())
     }
+}
 
-    /// Points that are left out.
-    pub fn left_out(&self) -> usize {
-        let now = self.scan.as_ref().map_or(0, |s| s.points.len());
-        self.left_out.first().map_or(0, |all| all.points.len() - now)
-    }
+/// How many points of a scan are left out.
+/// * `before` - the scan before each time that some were
+pub fn count_left_out(scan: Option<&Arc<Cloud>>, before: &[Arc<Cloud>]) -> usize {
+    let now = scan.map_or(0, |s| s.points.len());
+    before.first().map_or(0, |all| all.points.len() - now)
 }
 
 /// Reads a scan: every place of it is a number.

@@ -8,18 +8,23 @@ use std::path::Path;
 
 /// A relief with edits.
 pub struct Sculpted {
-    /// The edits.
+    /// The edits that it has.
     pub edits: Vec<ReliefEdit>,
     /// What they lie above, and they.
     pub layers: Layers,
     /// All of it together.
     pub reliefs: Vec<Relief>,
+    /// Why the edit that comes next in the list cannot be made.
+    pub trouble: Option<String>,
 }
 
-/// Makes the relief of a model follow a list of edits: takes those back that it has and the list has not, and makes the others. An edit
-/// that cannot be made ends it, and is told; those before it are made.
+/// Makes the relief of a model follow a list of edits: takes those back that it has and the list has not, and makes the others. The
+/// first that cannot be made ends it; those before it are made.
 /// * `has` - the edits that it has, and has afterwards
 /// * `folder` - where images of stamps are
+///
+/// # Errors
+/// Why an edit cannot be made: the one of the list at the number of those that it has.
 pub fn follow(
     model: &mut Model,
     has: &mut Vec<ReliefEdit>,
