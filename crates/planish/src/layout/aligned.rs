@@ -20,7 +20,7 @@ use crate::mesh::TriMesh;
 use crate::network::Network;
 use crate::network::field::{self, FieldParams};
 use crate::observe::{Cancelled, Observer, counted};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::collections::VecDeque;
 use std::rc::Rc;
 
@@ -42,8 +42,12 @@ const PAIR_TO_SIDE: f64 = 0.5;
 /// Rounds of making the proxy finer where cones are tight; each halves its edges there.
 const REFINEMENTS: usize = 2;
 
-/// Rounds of making it finer where there was no room for a map, its whole numbers or its squares.
+/// Rounds of making it finer where there was no room for whole numbers or squares.
 const FINER_ROUNDS: usize = 1;
+
+/// Every integer point of a map needs a vertex. Where too few can get there edges are to be this long in unit squares: four
+/// vertices for one square. Chosen.
+const EDGE_TO_SQUARE: f64 = 0.5;
 
 /// One way to a map.
 struct Attempt {
@@ -94,22 +98,16 @@ impl Aligned {
             }
             let mut charts = charts(&proxy, attempt, observer)?;
             charts.effort = effort.clone();
-            let tight: Vec<DVec3> = charts.tight.iter().map(|&v| proxy.mesh.points[v as usize]).collect();
-            if tight.is_empty() || rounds == 0 || !sizing.has_room_for(tight.len()) {
+            let tight = charts.tight.iter().map(|&v| proxy.mesh.points[v as usize]);
+            let halved = tight.map(|p| (p, sizing.at(p) / 2.0)).collect();
+            if rounds == 0 || !sizing.shorten(halved) {
                 break (proxy, charts);
             }
             rounds -= 1;
-            halve(sizing, &tight);
         };
         let mapped = map::seamless(&proxy.mesh, &proxy.adjacency, &proxy.lines, &charts, observer)?;
         Ok(mapped.map(|mapped| Aligned { proxy, charts, mapped }))
     }
-}
-
-/// Asks for edges of half the length at some places.
-fn halve(sizing: &mut Sizing, places: &[DVec3]) {
-    let edges: Vec<f64> = places.iter().map(|&p| sizing.at(p) / 2.0).collect();
-    places.iter().zip(edges).for_each(|(&place, edge)| sizing.shorten(place, edge));
 }
 
 /// The charts of the field on a proxy.
@@ -126,6 +124,9 @@ fn charts(proxy: &Proxy, attempt: &Attempt, observer: &dyn Observer) -> Result<C
     let field = field::field(mesh, adjacency, lines, &params, observer)?;
     Ok(Charts::new(mesh, adjacency, lines, &field, attempt.roomy))
 }
+
+/// A place with the length of edges that is wanted there.
+type Wanted = (DVec3, f64);
 
 /// Why no network follows the form.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -153,8 +154,8 @@ pub(super) enum AlignError {
     /// Triangles of the proxy leave no way to whole numbers, or no vertex for a corner of patches.
     #[error("its patches have no room in {}", counted(.places.len(), "place", "places"))]
     Cramped {
-        /// Where.
-        places: Vec<DVec3>,
+        /// Where, and how long edges may be there.
+        places: Vec<Wanted>,
     },
     /// Far more patches than a partition needs.
     #[error("patches along its form would be {found}")]
@@ -178,7 +179,7 @@ pub(super) enum AlignError {
 
 impl AlignError {
     /// Where a finer proxy may help.
-    fn places(&self) -> &[DVec3] {
+    fn places(&self) -> &[Wanted] {
         match self {
             AlignError::Cramped { places } => places,
             _ => &[],
@@ -308,13 +309,9 @@ pub(super) fn lay(
                 return best.ok_or(why);
             }
             // Where no number had room, or none that had is the one asked for, finer edges hardly ever help.
-            if best.as_ref().is_none_or(|best| !best.worth.is_kept()) || why.places().is_empty() {
+            if best.as_ref().is_none_or(|best| !best.worth.is_kept()) || !sizing.shorten(why.places().to_vec()) {
                 break;
             }
-            if !sizing.has_room_for(why.places().len()) {
-                break;
-            }
-            halve(&mut sizing, why.places());
         }
     }
     best.ok_or(why)
@@ -437,13 +434,12 @@ impl Aligned {
         observer: &dyn Observer,
     ) -> Result<Draft<'_>, AlignError> {
         let Proxy { mesh, adjacency, lines, .. } = &*self.proxy;
-        let cramped = |faces: Vec<u32>| AlignError::Cramped { places: self.middles(&faces) };
         let from = &self.mapped.map.uv;
         let mapped = map::smooth_integers(mesh, adjacency, lines, &self.charts, (from, &whole.uv), observer)?;
-        let mapped = mapped.map_err(cramped)?;
+        let mapped = mapped.map_err(|faces| AlignError::Cramped { places: self.halved(&faces) })?;
         self.unfolded(&mapped)?;
         let complex = embed::embed(mesh, adjacency, lines, &mapped.map).map_err(|e| match e {
-            EmbedError::Crowded { face } => AlignError::Cramped { places: self.middles(&[face]) },
+            EmbedError::Crowded { faces } => AlignError::Cramped { places: self.coarse(&faces, &mapped.map.uv) },
             e => e.into(),
         })?;
         let mut bench = Bench::new(mesh, adjacency, complex).ok_or(AlignError::Misplaced)?;
@@ -477,9 +473,25 @@ impl Aligned {
         }
     }
 
-    /// The middles of some faces.
-    fn middles(&self, faces: &[u32]) -> Vec<DVec3> {
-        faces.iter().map(|&f| self.proxy.mesh.corners(f as usize).into_iter().sum::<DVec3>() / 3.0).collect()
+    /// Where these faces of the proxy are, with edges that are short enough for the squares of a map.
+    fn coarse(&self, faces: &[u32], uv: &[[DVec2; 3]]) -> Vec<Wanted> {
+        let wanted = |f: u32| {
+            let squares = |k: usize| uv[f as usize][k].distance(uv[f as usize][(k + 1) % 3]);
+            let part =
+                |k: usize| self.proxy.mesh.edge_length(3 * f + k as u32) * f64::min(EDGE_TO_SQUARE / squares(k), 1.0);
+            (self.middle(f), (0..3).map(part).fold(f64::INFINITY, f64::min))
+        };
+        faces.iter().map(|&f| wanted(f)).collect()
+    }
+
+    /// Where these faces of the proxy are, with half of their edges.
+    fn halved(&self, faces: &[u32]) -> Vec<Wanted> {
+        let edges = |f: u32| (3 * f..3 * f + 3).map(|h| self.proxy.mesh.edge_length(h)).sum::<f64>();
+        faces.iter().map(|&f| (self.middle(f), edges(f) / 6.0)).collect()
+    }
+
+    fn middle(&self, face: u32) -> DVec3 {
+        self.proxy.mesh.corners(face as usize).into_iter().sum::<DVec3>() / 3.0
     }
 
     /// A layout brought to the mesh.

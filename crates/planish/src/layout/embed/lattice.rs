@@ -221,19 +221,22 @@ impl<'a> Lattice<'a> {
         for lines_only in [true, false] {
             let mut room = false;
             loop {
-                let (mut made, mut left) = (0, None);
+                let (mut made, mut left) = (0, Vec::new());
                 for f in 0..self.uv.len() as u32 {
                     for p in self.vacant(f, lines_only) {
                         match self.occupy_one(f, p, &mut taken, room) {
                             true => made += 1,
-                            false => left = Some(f),
+                            false => left.push(f),
                         }
                     }
                 }
-                match left {
-                    None if made == 0 => break,
-                    Some(face) if made == 0 && room => return Err(EmbedError::Crowded { face }),
-                    Some(_) if made == 0 => room = true,
+                match made {
+                    0 if left.is_empty() => break,
+                    0 if room => {
+                        left.dedup();
+                        return Err(EmbedError::Crowded { faces: left });
+                    }
+                    0 => room = true,
                     _ => {}
                 }
             }

@@ -19,6 +19,7 @@ use crate::layout::recut::keep_apart;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::CurveKind;
 use crate::network::imprint::Place;
+use crate::observe::counted;
 use lattice::{Freedom, Lattice, UNIT, cross, is_whole, minus};
 use std::collections::HashMap;
 use trace::{Met, Port};
@@ -59,10 +60,10 @@ pub(super) enum EmbedError {
         vertex: u32,
     },
     /// There are more integer points than vertices that could stand there.
-    #[error("no vertex can stand at an integer point of triangle {face} - hint: use a finer mesh or larger squares")]
+    #[error("no vertex can stand at integer points of {} - hint: use a finer mesh or larger squares", counted(.faces.len(), "triangle", "triangles"))]
     Crowded {
-        /// The triangle.
-        face: u32,
+        /// The triangles.
+        faces: Vec<u32>,
     },
     /// The lines of the grid do not close to squares.
     #[error("the grid lines from vertex {vertex} do not close to squares - hint: check the cones of the map")]

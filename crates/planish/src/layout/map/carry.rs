@@ -1,13 +1,16 @@
 //! An injective map is carried over to other places of its corners without losing that.
 //!
-//! What is held moves in a straight line, and with it the whole map by the smoothest shift there is. A step ends where a
-//! face would lose most of its area; then the barrier energy spreads the strain before the next one. So cones and lines get
-//! to whole numbers from an injective map, and no face ever turns over: to turn it back could wind it around a vertex.
+//! What is held moves in a straight line, and all that is free follows so that the barrier energy stays least: its second
+//! derivatives say how ([`super::newton`]). A step ends where a face would lose most of its area; then steps of Newton's
+//! method spread the strain before the next one. So cones and lines get to whole numbers from an injective map, and no face
+//! ever turns over: to turn it back could wind it around a vertex. (Continuation by predictor and corrector: Allgower and
+//! Georg, *Numerical Continuation Methods*, 1990, chapter 2.)
 
 use super::energy::Maps;
+use super::newton::Newton;
 use super::seams::Seams;
+use super::untangle::{HALVINGS, WORTH, dot};
 use crate::observe::{Cancelled, Observer};
-use planish_sparse::SparseCholesky;
 
 /// Part of its area that every face keeps in one step, as interior-point methods keep from their bounds.
 const KEPT: f64 = 0.2;
@@ -15,8 +18,11 @@ const KEPT: f64 = 0.2;
 /// The map is stuck if so small a part of the way is too far.
 const LEAST_STEP: f64 = 1.0 / 256.0;
 
-/// Lowers the barrier energy of the map with these equations, by its free unknowns.
-pub(super) type Settle<'a> = dyn Fn(&Seams, &mut Vec<f64>) -> Result<(), Cancelled> + 'a;
+/// Steps of Newton's method at one place of the way at most; most places of the measured maps took one, the worst eleven.
+const MOST_CORRECTIONS: usize = 12;
+
+/// Newton's method has settled once no face has so many times the area that it had before a step.
+const GAINED: f64 = 1.5;
 
 /// Where a map got to.
 pub(super) enum Carried {
@@ -27,35 +33,56 @@ pub(super) enum Carried {
 }
 
 /// The free unknowns of an injective map with the equations of `maps`, from one with those of `start`.
-/// * `settle` - lowers the barrier energy with given equations
 pub(super) fn carry(
     maps: &Maps,
-    laplacian: &SparseCholesky,
     (start, mut free): (&Seams, Vec<f64>),
-    settle: &Settle,
     observer: &dyn Observer,
 ) -> Result<Carried, Cancelled> {
-    let shift = maps.shift(laplacian, &start.moved(maps.seams));
+    let Some(newton) = Newton::new(maps, observer)? else { return Ok(Carried::Stuck(Vec::new())) };
+    let moved = start.moved(maps.seams);
     let (mut way, mut step) = (0.0, 1.0);
-    settle(start, &mut free)?;
     while way < 1.0 {
-        observer.check()?;
-        let before = start.between(maps.seams, way).coordinates(&free);
+        let seams = start.between(maps.seams, way);
+        let (mut corrections, mut is_settled) = (0, false);
+        let (before, follow) = loop {
+            observer.check()?;
+            let x = seams.coordinates(&free);
+            let Some(hessian) = newton.at(&x, observer)? else { return Ok(Carried::Stuck(Vec::new())) };
+            if is_settled || corrections == MOST_CORRECTIONS || maps.is_spent() {
+                break (x, hessian.following(&moved));
+            }
+            let (energy, gradient) = maps.barrier(&x, 0.0);
+            let correction = hessian.step(&gradient);
+            let length = reach(maps, &seams, &free, &correction, energy, dot(&correction, &gradient));
+            free.iter_mut().zip(&correction).for_each(|(x, s)| *x += length * s);
+            corrections += 1;
+            let growth = maps.growth(&x, &seams.coordinates(&free));
+            is_settled = length == 0.0 || (length == 1.0 && growth.iter().all(|g| *g <= GAINED));
+        };
         step = f64::min(2.0 * step, 1.0 - way);
-        let (seams, moved) = loop {
-            let seams = start.between(maps.seams, way + step);
-            let moved: Vec<f64> = free.iter().zip(&shift).map(|(x, s)| x + step * s).collect();
-            let lost = maps.losing(&before, &seams.coordinates(&moved), KEPT);
+        loop {
+            let ahead: Vec<f64> = free.iter().zip(&follow).map(|(x, s)| x + step * s).collect();
+            let growth = maps.growth(&before, &start.between(maps.seams, way + step).coordinates(&ahead));
+            let keeps = |f: u32| growth[f as usize] > KEPT;
+            let lost: Vec<u32> = (0..growth.len() as u32).filter(|&f| !keeps(f)).collect();
             if lost.is_empty() {
-                break (seams, moved);
+                (free, way) = (ahead, if step == 1.0 - way { 1.0 } else { way + step });
+                break;
             }
             step /= 2.0;
             if step < LEAST_STEP {
                 return Ok(Carried::Stuck(lost));
             }
-        };
-        (free, way) = (moved, if step == 1.0 - way { 1.0 } else { way + step });
-        settle(&seams, &mut free)?;
+        }
     }
     Ok(Carried::There(free))
+}
+
+/// The part of a step, halved as often as needed, by which the energy falls as much as predicted; 0 if there is none.
+fn reach(maps: &Maps, seams: &Seams, free: &[f64], step: &[f64], energy: f64, slope: f64) -> f64 {
+    let falls = |length: &f64| {
+        let tried: Vec<f64> = free.iter().zip(step).map(|(x, s)| x + length * s).collect();
+        maps.barrier(&seams.coordinates(&tried), 0.0).0 <= energy + WORTH * length * slope
+    };
+    std::iter::successors(Some(1.0), |length| Some(length / 2.0)).take(HALVINGS).find(falls).unwrap_or(0.0)
 }

@@ -15,10 +15,10 @@ use rayon::prelude::*;
 const MOST_ENTRIES: usize = 8_000_000;
 
 /// Weight of the change of area beside the change of angles in [`Maps::barrier`] (the authors' choice is a half or less).
-const AREA_WEIGHT: f64 = 0.3;
+pub(super) const AREA_WEIGHT: f64 = 0.3;
 
 /// Weight of the field's directions in [`Maps::barrier`]: enough to keep isolines along it where nothing is folded.
-const HOLD: f64 = 0.5;
+pub(super) const HOLD: f64 = 0.5;
 
 /// Faces that a map stretches by more than this, or by less than its inverse, are not to stay so. Chosen.
 const MOST_STRETCHED: f64 = 3.0;
@@ -46,11 +46,11 @@ pub(super) struct Maps<'a> {
     pub seams: &'a Seams,
     /// Gradients of the corner functions of each face, in the frame of its field: with corners `x`, the Jacobian is
     /// the sum of `x[k] gradient[k]^T`.
-    gradient: Vec<[DVec2; 3]>,
+    pub gradient: Vec<[DVec2; 3]>,
     /// Areas as parts of the whole.
-    share: Vec<f64>,
+    pub share: Vec<f64>,
     /// Whether the barrier keeps every face within a quarter turn of its field, too.
-    within_quarter: bool,
+    pub within_quarter: bool,
     effort: Effort,
 }
 
@@ -90,6 +90,15 @@ impl<'a> Maps<'a> {
             DVec2::new(j.x_axis.length(), j.y_axis.length()).clamp(least, most)
         };
         (0..self.gradient.len()).map(each).collect()
+    }
+
+    pub fn faces(&self) -> usize {
+        self.gradient.len()
+    }
+
+    /// Counts work that takes as long as so many energies of all faces.
+    pub fn count_effort(&self, energies: usize) {
+        self.effort.add(energies * self.gradient.len());
     }
 
     /// True once no more work may go into the maps.
@@ -164,22 +173,10 @@ impl<'a> Maps<'a> {
         Some(free)
     }
 
-    /// The free unknowns of the smoothest shift of the map that has these coordinates where all that is free is zero.
-    pub fn shift(&self, laplacian: &SparseCholesky, moved: &[f64]) -> Vec<f64> {
-        let mut gradient = vec![0.0; moved.len()];
-        for f in 0..self.gradient.len() {
-            self.add(f, -self.share[f] * self.jacobian(f, moved), &mut gradient);
-        }
-        let mut free = self.seams.pull_back(&gradient);
-        laplacian.solve(&mut free);
-        free
-    }
-
-    /// The faces that keep no more than `part` of their determinant on the way from `before` to `after`.
-    pub fn losing(&self, before: &[f64], after: &[f64], part: f64) -> Vec<u32> {
-        let kept = |f: usize| self.jacobian(f, after).determinant() / self.jacobian(f, before).determinant();
-        let keeps = |f: u32| kept(f as usize) > part;
-        (0..self.gradient.len() as u32).into_par_iter().with_min_len(512).filter(|&f| !keeps(f)).collect()
+    /// How many times its determinant each face has after a change of the corners.
+    pub fn growth(&self, before: &[f64], after: &[f64]) -> Vec<f64> {
+        let grown = |f: usize| self.jacobian(f, after).determinant() / self.jacobian(f, before).determinant();
+        (0..self.gradient.len()).into_par_iter().with_min_len(512).map(grown).collect()
     }
 
     /// Adds the gradient by the corners of face `f` from that by its Jacobian.
@@ -202,7 +199,7 @@ impl<'a> Maps<'a> {
     /// the same form, least at the identity, if the map is to stay within a quarter turn.
     pub fn barrier(&self, x: &[f64], softness: f64) -> (f64, Vec<f64>) {
         self.effort.add(self.gradient.len());
-        let each = |f: usize| self.face_barrier(&self.jacobian(f, x), softness);
+        let each = |f: usize| barrier_of(&self.jacobian(f, x), softness, self.within_quarter);
         let infinite = (f64::INFINITY, DMat2::ZERO);
         let each = |f: usize| each(f).map_or(infinite, |(e, by)| (self.share[f] * e, self.share[f] * by));
         let parts: Vec<(f64, DMat2)> = (0..self.gradient.len()).into_par_iter().with_min_len(512).map(each).collect();
@@ -213,28 +210,6 @@ impl<'a> Maps<'a> {
             self.add(f, by_jacobian, &mut gradient);
         }
         (energy, self.seams.pull_back(&gradient))
-    }
-
-    /// The energy of a face by its area, and its gradient by the Jacobian; `None` if it is infinite.
-    fn face_barrier(&self, j: &DMat2, softness: f64) -> Option<(f64, DMat2)> {
-        let det = j.determinant();
-        let Guarded { chi, slope } = Guarded::new(det, softness)?;
-        let squares = j.x_axis.length_squared() + j.y_axis.length_squared();
-        let shape = (squares + AREA_WEIGHT * (det * det + 1.0)) / (2.0 * chi);
-        let by_det = AREA_WEIGHT * det / chi - shape / chi * slope;
-        let cofactor = DMat2::from_cols(DVec2::new(j.y_axis.y, -j.y_axis.x), DVec2::new(-j.x_axis.y, j.x_axis.x));
-        let off = *j - DMat2::IDENTITY;
-        let miss = off.x_axis.length_squared() + off.y_axis.length_squared();
-        let mut energy = shape + HOLD * miss;
-        let mut by_jacobian = *j * (1.0 / chi) + cofactor * by_det + off * (2.0 * HOLD);
-        if self.within_quarter {
-            let half = half_trace(j);
-            let Guarded { chi, slope } = Guarded::new(half, softness)?;
-            let turning = (half * half + 1.0) / (2.0 * chi);
-            energy += turning;
-            by_jacobian += DMat2::from_diagonal(DVec2::splat((half - turning * slope) / (2.0 * chi)));
-        }
-        Some((energy, by_jacobian))
     }
 
     /// Least of what the barrier guards: determinants of all Jacobians, and half their traces.
@@ -258,6 +233,28 @@ impl<'a> Maps<'a> {
         };
         (0..self.gradient.len()).map(each).sum()
     }
+}
+
+/// The energy of a face by its area, and its gradient by the Jacobian; `None` if it is infinite.
+pub(super) fn barrier_of(j: &DMat2, softness: f64, within_quarter: bool) -> Option<(f64, DMat2)> {
+    let det = j.determinant();
+    let Guarded { chi, slope } = Guarded::new(det, softness)?;
+    let squares = j.x_axis.length_squared() + j.y_axis.length_squared();
+    let shape = (squares + AREA_WEIGHT * (det * det + 1.0)) / (2.0 * chi);
+    let by_det = AREA_WEIGHT * det / chi - shape / chi * slope;
+    let cofactor = DMat2::from_cols(DVec2::new(j.y_axis.y, -j.y_axis.x), DVec2::new(-j.x_axis.y, j.x_axis.x));
+    let off = *j - DMat2::IDENTITY;
+    let miss = off.x_axis.length_squared() + off.y_axis.length_squared();
+    let mut energy = shape + HOLD * miss;
+    let mut by_jacobian = *j * (1.0 / chi) + cofactor * by_det + off * (2.0 * HOLD);
+    if within_quarter {
+        let half = half_trace(j);
+        let Guarded { chi, slope } = Guarded::new(half, softness)?;
+        let turning = (half * half + 1.0) / (2.0 * chi);
+        energy += turning;
+        by_jacobian += DMat2::from_diagonal(DVec2::splat((half - turning * slope) / (2.0 * chi)));
+    }
+    Some((energy, by_jacobian))
 }
 
 fn half_trace(j: &DMat2) -> f64 {

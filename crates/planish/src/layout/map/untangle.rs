@@ -22,8 +22,8 @@ const STEPS: usize = 30;
 const MEMORY: usize = 12;
 
 /// Part of the predicted fall of the energy that a step has to reach (Armijo's rule), and how often a step is halved.
-const WORTH: f64 = 1e-4;
-const HALVINGS: usize = 30;
+pub(super) const WORTH: f64 = 1e-4;
+pub(super) const HALVINGS: usize = 30;
 
 /// A step that gains less than this part of the energy ends the round.
 const SETTLED: f64 = 1e-5;
@@ -66,16 +66,6 @@ pub(super) fn untangle(
         softness = ((1.0 - sigma * root / (least.abs() + root)) * softness).max(0.003 * least.abs());
     }
     Ok(least > 0.0)
-}
-
-/// Lowers the barrier energy of an injective map by one round of steps.
-pub(super) fn settle(
-    maps: &Maps,
-    laplacian: &SparseCholesky,
-    free: &mut Vec<f64>,
-    observer: &dyn Observer,
-) -> Result<(), Cancelled> {
-    descend(maps, laplacian, free, 0.0, observer).map(drop)
 }
 
 /// One round; returns the energy at its end.
@@ -155,6 +145,6 @@ fn direction(laplacian: &SparseCholesky, gradient: &[f64], pairs: &[(Vec<f64>, V
     q
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -80,14 +80,22 @@ impl Sizing {
         self.spots.is_empty()
     }
 
-    /// Asks for shorter edges at a place, and for longer ones again at a distance.
-    pub fn shorten(&mut self, place: DVec3, edge: f64) {
-        self.spots.push((place, edge));
-    }
-
-    /// True if so many more places may be given.
-    pub fn has_room_for(&self, places: usize) -> bool {
-        self.spots.len() + places <= MOST_SPOTS
+    /// Asks for edges of at most these lengths at some places, and for longer ones again at a distance. False, and nothing
+    /// changes, if they are that short already, within what one edge may differ by from the next, or there would be too many
+    /// places.
+    pub fn shorten(&mut self, mut places: Vec<(DVec3, f64)>) -> bool {
+        places.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let before = self.spots.len();
+        for (place, edge) in places {
+            if edge * (1.0 + GRADE) < self.at(place) {
+                self.spots.push((place, edge));
+            }
+        }
+        let has_room = self.spots.len() <= MOST_SPOTS;
+        if !has_room {
+            self.spots.truncate(before);
+        }
+        has_room && self.spots.len() > before
     }
 
     /// Length wanted at a place.
