@@ -50,7 +50,7 @@ pub(super) struct Maps<'a> {
     /// Areas as parts of the whole.
     pub share: Vec<f64>,
     /// Whether the barrier keeps every face within a quarter turn of its field, too.
-    pub within_quarter: bool,
+    within_quarter: bool,
     effort: Effort,
 }
 

@@ -390,26 +390,10 @@ mod tests {
 
     #[test]
     fn an_injective_map_is_carried_to_whole_numbers_without_a_fault() {
-        stretches_to_twice_its_breadth(shapes::cuboid(DVec3::new(1.0, 2.0, 3.0), 6));
-    }
-
-    #[test]
-    fn triangles_a_hundred_times_smaller_follow_the_cone_that_they_stand_around() {
-        let mut mesh = shapes::cuboid(DVec3::new(1.0, 2.0, 3.0), 6);
-        let corner = DVec3::new(0.5, 1.0, 1.5);
-        let adjacency = Adjacency::new(&mesh);
-        let cone = mesh.points.iter().position(|p| p.distance(corner) < 1e-9).expect("a corner") as u32;
-        let ring: Vec<u32> =
-            adjacency.fan(cone).flat_map(|h| [next(h), crate::mesh::previous(h)]).map(|h| mesh.origin(h)).collect();
-        let points = mesh.points.clone();
-        ring.iter().for_each(|&v| mesh.points[v as usize] = corner + 0.01 * (points[v as usize] - corner));
-        stretches_to_twice_its_breadth(mesh);
-    }
-
-    /// A box of 1 x 2 x 3 comes to 2 x 2 x 3 without a fault.
-    fn stretches_to_twice_its_breadth(mesh: TriMesh) {
+        let mesh = shapes::cuboid(DVec3::new(1.0, 2.0, 3.0), 6);
         let lines = sharp(&mesh);
         let (charts, mapped) = mapped(&mesh, &lines);
+        // The box of 1 x 2 x 3 is stretched to one of 2 x 2 x 3.
         let adjacency = Adjacency::new(&mesh);
         let whole: Vec<[DVec2; 3]> = (0..mesh.triangles.len())
             .map(|f| {
@@ -425,12 +409,46 @@ mod tests {
         let carried = smooth_integers(&mesh, &adjacency, &lines, &charts, (&mapped.map.uv, &whole), &Silent);
         let carried = carried.unwrap().unwrap();
         assert!(carried.is_injective());
-        let (corner, place) = (charts.corners(), joined(&mesh, &adjacency, &charts, &carried.map.uv));
-        let wanted = joined(&mesh, &adjacency, &charts, &whole);
-        for h in (0..3 * mesh.triangles.len() as u32).filter(|&h| corner[mesh.origin(h) as usize]) {
-            let [found, wanted] = [&place, &wanted].map(|uv| uv[h as usize / 3][h as usize % 3]);
-            assert!(found.distance(wanted) < 1e-6, "{found} {wanted}");
+        for (corners, wanted) in carried.map.uv.iter().zip(&whole) {
+            for k in 0..3 {
+                let off = (corners[(k + 1) % 3] - corners[k]) - (wanted[(k + 1) % 3] - wanted[k]);
+                assert!(off.length() < 1e-6, "{off}");
+            }
         }
+    }
+
+    #[test]
+    fn what_is_free_follows_what_is_held_with_a_gradient_left_that_falls_as_the_square_of_the_step() {
+        let mesh = shapes::sphere(1.0, 3);
+        let (adjacency, lines) = (Adjacency::new(&mesh), vec![false; 3 * mesh.triangles.len()]);
+        let (charts, mapped) = mapped(&mesh, &lines);
+        let uv = joined(&mesh, &adjacency, &charts, &mapped.map.uv);
+        let held_at = |times: f64| {
+            let uv: Vec<[DVec2; 3]> = uv.iter().map(|corners| corners.map(|c| times * c)).collect();
+            Seams::new(&mesh, &adjacency, &lines, &charts, Held::At(&uv)).unwrap()
+        };
+        let seams = held_at(1.0);
+        // Faces of four times the area have a convex energy.
+        let maps = Maps::new(&mesh, &charts, &seams, 0.5, false);
+        let newton = newton::Newton::new(&maps, &Silent).unwrap().unwrap();
+        let hessian = |free: &[f64]| newton.at(&seams.coordinates(free), &Silent).unwrap().unwrap();
+        let left = |seams: &Seams, free: &[f64]| {
+            let gradient = maps.barrier(&seams.coordinates(free), 0.0).1;
+            gradient.iter().map(|g| g * g).sum::<f64>().sqrt()
+        };
+        let mut free = seams.read(&uv).unwrap();
+        for _ in 0..12 {
+            let step = hessian(&free).step(&maps.barrier(&seams.coordinates(&free), 0.0).1);
+            free.iter_mut().zip(&step).for_each(|(x, s)| *x += s);
+        }
+        assert!(left(&seams, &free) < 1e-12, "{}", left(&seams, &free));
+        let after = |by: f64| {
+            let to = held_at(1.0 + by);
+            let follow = hessian(&free).following(&seams.moved(&to));
+            left(&to, &free.iter().zip(&follow).map(|(x, s)| x + s).collect::<Vec<_>>())
+        };
+        let fall = after(1e-2) / after(5e-3);
+        assert!((3.5..4.5).contains(&fall), "{fall}");
     }
 
     /// A prism over a convex polygon around its middle, each triangle and wall split `level` times.

@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// measured.
 const COST: usize = 30;
 
-/// The systems of a map.
+/// The systems of a map without the barrier on its traces.
 pub(super) struct Newton<'a> {
     maps: &'a Maps<'a>,
     pattern: Arc<SparsePattern>,
@@ -84,7 +84,7 @@ impl Hessian<'_> {
 /// Second derivatives of the barrier energy of face `f` without softness, by u and v of its corners, without eigenvalues below
 /// zero.
 fn face_hessian(maps: &Maps, f: usize, x: &[f64]) -> [[f64; 6]; 6] {
-    let by = by_jacobian(&maps.jacobian(f, x), maps.within_quarter);
+    let by = by_jacobian(&maps.jacobian(f, x));
     let part = |p: usize, column: usize| maps.gradient[f][p / 2][column];
     let mut found = [[0.0; 6]; 6];
     for (p, row) in found.iter_mut().enumerate() {
@@ -116,9 +116,9 @@ fn each_entry(maps: &Maps, f: usize, mut entry: impl FnMut(usize, usize, (u32, u
     }
 }
 
-/// Second derivatives of the energy of a face without softness by its Jacobian (columns one after the other), with eigenvalues
-/// below zero set to zero.
-fn by_jacobian(j: &DMat2, within_quarter: bool) -> [[f64; 4]; 4] {
+/// Second derivatives of the energy of a face by its Jacobian (columns one after the other), without softness and without the
+/// barrier on its trace, with eigenvalues below zero set to zero.
+fn by_jacobian(j: &DMat2) -> [[f64; 4]; 4] {
     let [a, b, c, d] = j.to_cols_array();
     // J = U S V^T with turns U and V.
     let sum = DVec2::new(a + d, b - c);
@@ -160,13 +160,6 @@ fn by_jacobian(j: &DMat2, within_quarter: bool) -> [[f64; 4]; 4] {
     for (i, row) in sum.iter_mut().enumerate() {
         row[i] += 2.0 * HOLD;
     }
-    if within_quarter {
-        // (h + 1/h) / 2 with half the trace h.
-        let bend = ((a + d) / 2.0).powi(-3) / 4.0;
-        for (i, k) in [(0, 0), (0, 3), (3, 0), (3, 3)] {
-            sum[i][k] += bend;
-        }
-    }
     sum
 }
 
@@ -177,21 +170,18 @@ mod tests {
 
     #[test]
     fn second_derivatives_are_the_differences_of_gradients_within_1e_6_where_the_energy_is_convex() {
-        for (j, within_quarter) in [
-            (DMat2::from_cols_array(&[1.3, 0.1, -0.2, 1.2]), false),
-            (DMat2::from_cols_array(&[1.5, 0.05, 0.1, 1.6]), true),
-            (DMat2::from_angle(0.4) * DMat2::from_cols_array(&[1.4, 0.0, 0.3, 1.2]), true),
+        for j in [
+            DMat2::from_cols_array(&[1.3, 0.1, -0.2, 1.2]),
+            DMat2::from_cols_array(&[1.5, 0.05, 0.1, 1.6]),
+            DMat2::from_angle(0.4) * DMat2::from_cols_array(&[1.4, 0.0, 0.3, 1.2]),
         ] {
-            let found = by_jacobian(&j, within_quarter);
+            let found = by_jacobian(&j);
             let step = 1e-5;
             for k in 0..4 {
                 let moved = |by: f64| {
                     let mut c = j.to_cols_array();
                     c[k] += by;
-                    energy::barrier_of(&DMat2::from_cols_array(&c), 0.0, within_quarter)
-                        .expect("finite")
-                        .1
-                        .to_cols_array()
+                    energy::barrier_of(&DMat2::from_cols_array(&c), 0.0, false).expect("finite").1.to_cols_array()
                 };
                 let (ahead, behind) = (moved(step), moved(-step));
                 for i in 0..4 {
@@ -205,7 +195,7 @@ mod tests {
     #[test]
     fn second_derivatives_of_any_face_are_positive() {
         for j in [[5.0, 1.0, -3.0, 0.2], [0.01, 0.0, 0.3, 1.0], [-1.0, 0.1, 0.2, -2.0]] {
-            let found = by_jacobian(&DMat2::from_cols_array(&j), false);
+            let found = by_jacobian(&DMat2::from_cols_array(&j));
             for v in [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, -1.0, 0.0], [1.0, 0.0, 0.0, -1.0], [0.3, -2.0, 1.0, 0.7]] {
                 let value: f64 = (0..4).map(|i| (0..4).map(|k| v[i] * found[i][k] * v[k]).sum::<f64>()).sum();
                 assert!(value > 0.0, "{j:?}");

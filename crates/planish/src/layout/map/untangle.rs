@@ -22,8 +22,8 @@ const STEPS: usize = 30;
 const MEMORY: usize = 12;
 
 /// Part of the predicted fall of the energy that a step has to reach (Armijo's rule), and how often a step is halved.
-pub(super) const WORTH: f64 = 1e-4;
-pub(super) const HALVINGS: usize = 30;
+const WORTH: f64 = 1e-4;
+const HALVINGS: usize = 30;
 
 /// A step that gains less than this part of the energy ends the round.
 const SETTLED: f64 = 1e-5;
@@ -93,18 +93,10 @@ fn descend(
             }
             continue;
         }
-        let mut length = 1.0;
-        let mut taken = None;
-        for _ in 0..HALVINGS {
-            let tried: Vec<f64> = free.iter().zip(&step).map(|(x, s)| x + length * s).collect();
-            let (e, g) = evaluate(&tried);
-            if e <= energy + WORTH * length * slope {
-                taken = Some((tried, e, g));
-                break;
-            }
-            length /= 2.0;
-        }
-        let Some((tried, e, g)) = taken else { break };
+        let Some(Taken { length, free: tried, energy: e, gradient: g }) = fall(&evaluate, free, &step, (energy, slope))
+        else {
+            break;
+        };
         let moved: Vec<f64> = step.iter().map(|s| length * s).collect();
         let change: Vec<f64> = g.iter().zip(&gradient).map(|(new, old)| new - old).collect();
         let curvature = dot(&moved, &change);
@@ -121,6 +113,34 @@ fn descend(
         }
     }
     Ok(energy)
+}
+
+/// A step that was taken, or a part of it.
+pub(super) struct Taken {
+    /// The part.
+    pub length: f64,
+    /// Where it led: unknowns, their energy and its gradient.
+    pub free: Vec<f64>,
+    pub energy: f64,
+    pub gradient: Vec<f64>,
+}
+
+/// Takes a step, halved as often as needed for the energy to fall as much as predicted; `None` if that does not help.
+/// * `evaluate` - energy and gradient
+/// * `energy`, `slope` - the energy before, and its change along the step
+pub(super) fn fall(
+    evaluate: &impl Fn(&[f64]) -> (f64, Vec<f64>),
+    free: &[f64],
+    step: &[f64],
+    (energy, slope): (f64, f64),
+) -> Option<Taken> {
+    let take = |length: f64| {
+        let free: Vec<f64> = free.iter().zip(step).map(|(x, s)| x + length * s).collect();
+        let (energy, gradient) = evaluate(&free);
+        Taken { length, free, energy, gradient }
+    };
+    let lengths = std::iter::successors(Some(1.0), |length| Some(length / 2.0)).take(HALVINGS);
+    lengths.map(take).find(|taken| taken.energy <= energy + WORTH * taken.length * slope)
 }
 
 /// The two-loop recursion.

@@ -84,6 +84,7 @@ impl Sizing {
     /// changes, if they are that short already, within what one edge may differ by from the next, or there would be too many
     /// places.
     pub fn shorten(&mut self, mut places: Vec<(DVec3, f64)>) -> bool {
+        // The shortest first: around these many others have what they want.
         places.sort_by(|a, b| a.1.total_cmp(&b.1));
         let before = self.spots.len();
         for (place, edge) in places {
@@ -276,6 +277,19 @@ mod tests {
     /// Half-edges on lines and on the boundary.
     fn tagged(p: &Proxy) -> Vec<bool> {
         p.lines.iter().zip(&p.adjacency.opposite).map(|(&line, &o)| line || o == NONE).collect()
+    }
+
+    #[test]
+    fn edges_are_shortened_where_they_are_too_long_and_only_there_and_at_no_more_places_than_are_allowed() {
+        let mesh = shapes::rectangle(1.0, 1.0, 4, 4);
+        let mut sizing = Sizing::even(&mesh, 200);
+        let (edge, here) = (sizing.edge, DVec3::ZERO);
+        assert!(!sizing.shorten(vec![(here, edge)]) && !sizing.shorten(Vec::new()) && sizing.is_even());
+        // The second has what it wants from the first.
+        assert!(sizing.shorten(vec![(here, edge / 2.0), (here, edge / 4.0)]) && sizing.spots.len() == 1);
+        assert!(sizing.at(here) == edge / 4.0 && sizing.at(DVec3::X) == edge.min(edge / 4.0 + GRADE));
+        let many = (0..=MOST_SPOTS).map(|i| (DVec3::X * 10.0 * (i + 1) as f64, edge / 2.0)).collect();
+        assert!(!sizing.shorten(many) && sizing.spots.len() == 1);
     }
 
     #[test]
