@@ -1,13 +1,16 @@
 //! Inputs: meshes, models and networks from files, with what the user is told when they cannot be used.
 
 use crate::failure::Failure;
+use crate::products::{self, Staged};
 use planish::cloud::Cloud;
+use planish::cloud::bricks::StoreError;
 use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{Model, Units};
 use planish::network::Network;
 use planish::pipeline::{BRICK_POINTS, Warning};
-use planish_io::BrickFolder;
+use planish::{DVec3, Observer};
 use planish_io::report::{Input, count};
+use planish_io::{BrickFolder, ScanWriter, WriteError};
 use std::path::Path;
 
 /// A mesh or a model.
@@ -59,27 +62,96 @@ pub fn scan(path: &Path, options: &crate::args::ScanArgs) -> Result<Cloud, Failu
     planish_io::read_scan(path, &options).map_err(|e| Failure::input(path, e))
 }
 
-/// Reads a scan, and what to tell of points that are too far off to be of it.
-/// # Errors
-/// If the file is no usable scan.
-pub fn scan_body(path: &Path, options: &crate::args::ScanArgs) -> Result<(Cloud, Option<Warning>), Failure> {
-    let options = planish_io::ScanOptions { columns: options.columns.clone(), classes: options.classes.clone() };
-    let (cloud, left_out) = planish_io::read_body(path, &options).map_err(|e| Failure::input(path, e))?;
-    Ok((cloud, far_off(left_out as u64)))
+/// A scan whose points are used.
+pub enum Scan {
+    /// In memory.
+    Whole(Cloud),
+    /// In a folder, of more points than a brick has.
+    Bricks(BrickFolder),
 }
 
-/// Parts a scan into bricks in a folder, and what to tell of points that are too far off to be of it.
-/// # Errors
-/// If the file is no usable scan, or the folder cannot be written.
-pub fn scan_in_bricks(
-    path: &Path,
-    options: &crate::args::ScanArgs,
-    folder: &Path,
-) -> Result<(BrickFolder, Option<Warning>), Failure> {
-    let options = planish_io::ScanOptions { columns: options.columns.clone(), classes: options.classes.clone() };
-    let bricks = BrickFolder::create(path, &options, folder, BRICK_POINTS).map_err(|e| Failure::input(path, e))?;
-    let left_out = bricks.left_out();
-    Ok((bricks, far_off(left_out)))
+impl Scan {
+    /// Reads a scan, and what to tell of points that are too far off to be of it.
+    /// * `room` - where a large scan may lie in bricks meanwhile; without it all are in memory
+    /// # Errors
+    /// If the file is no usable scan, or the folder cannot be written.
+    pub fn read(
+        path: &Path,
+        options: &crate::args::ScanArgs,
+        room: Option<&Staged>,
+        observer: &dyn Observer,
+    ) -> Result<(Scan, Option<Warning>), Failure> {
+        let options = planish_io::ScanOptions { columns: options.columns.clone(), classes: options.classes.clone() };
+        let wrong = |e: planish_io::ReadError| Failure::input(path, e);
+        let large = planish_io::points_told(path).is_some_and(|n| n > BRICK_POINTS as u64);
+        match room.filter(|_| large) {
+            Some(room) => {
+                let folder = room.path("bricks");
+                std::fs::create_dir(&folder).map_err(|e| products::unwritable(&folder, &e))?;
+                let bricks = BrickFolder::create(path, &options, &folder, BRICK_POINTS, observer).map_err(wrong)?;
+                let left_out = bricks.left_out();
+                Ok((Scan::Bricks(bricks), far_off(left_out)))
+            }
+            None => {
+                let (cloud, left_out) = planish_io::read_body(path, &options).map_err(wrong)?;
+                Ok((Scan::Whole(cloud), far_off(left_out as u64)))
+            }
+        }
+    }
+
+    /// What brings its points back to their place.
+    pub fn shift(&self) -> DVec3 {
+        match self {
+            Scan::Whole(cloud) => cloud.shift,
+            Scan::Bricks(bricks) => bricks.shift(),
+        }
+    }
+
+    /// Number of points, and diagonal of their box.
+    pub fn size(&self) -> (u64, f64) {
+        match self {
+            Scan::Whole(cloud) => (cloud.points.len() as u64, cloud.bounds().diagonal()),
+            Scan::Bricks(bricks) => (bricks.points(), bricks.bounds().diagonal()),
+        }
+    }
+}
+
+/// Points on their way to a file, piece by piece, from inside a stage.
+pub struct PointsFile {
+    writer: ScanWriter,
+    failed: Option<WriteError>,
+}
+
+impl PointsFile {
+    /// An empty one.
+    /// # Errors
+    /// [`WriteError::UnknownExtension`].
+    pub fn create(path: &Path, units: Units) -> Result<PointsFile, WriteError> {
+        Ok(PointsFile { writer: ScanWriter::create(path, units)?, failed: None })
+    }
+
+    /// Adds a piece.
+    /// # Errors
+    /// What the stage is told; [`PointsFile::failure`] has the rest.
+    pub fn add(&mut self, piece: Cloud) -> Result<(), StoreError> {
+        self.writer.add(piece).map_err(|e| {
+            let told = StoreError(e.to_string());
+            self.failed = Some(e);
+            told
+        })
+    }
+
+    /// Why a piece was not added.
+    pub fn failure(&mut self) -> Option<WriteError> {
+        self.failed.take()
+    }
+
+    /// Writes the file.
+    /// # Errors
+    /// If it cannot be written, or has no points.
+    pub fn finish(self) -> Result<(), WriteError> {
+        self.writer.finish()
+    }
 }
 
 fn far_off(left_out: u64) -> Option<Warning> {

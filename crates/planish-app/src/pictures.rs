@@ -47,16 +47,41 @@ const COLORS: usize = 1024;
 /// Titles of the two pictures under a slider.
 const SLIDER: [&str; 2] = ["Surfaces", "Displaced"];
 
+/// Points of a scan as they came: as many as a picture of it shows.
+pub struct Raw {
+    /// Every so-manieth is shown.
+    step: usize,
+    points: Vec<DVec3>,
+    strays: Vec<DVec3>,
+    /// How many there are of both.
+    count: [usize; 2],
+}
+
+impl Raw {
+    /// None yet of so many.
+    pub fn new(total: u64) -> Raw {
+        let step = total.div_ceil(DOTS as u64).max(1) as usize;
+        Raw { step, points: Vec::new(), strays: Vec::new(), count: [0; 2] }
+    }
+
+    /// Adds points.
+    /// * `strays` - which are outliers
+    pub fn add(&mut self, points: &[DVec3], strays: &[bool]) {
+        for (p, &off) in points.iter().zip(strays) {
+            let count = &mut self.count[usize::from(off)];
+            if count.is_multiple_of(self.step) {
+                if off { &mut self.strays } else { &mut self.points }.push(*p);
+            }
+            *count += 1;
+        }
+    }
+}
+
 /// Draws all pictures of a report.
-/// * `raw` - points of a scan on the surface, and its outliers
+/// * `raw` - the points of a scan
 /// # Errors
 /// If the parts of the model do not belong together.
-pub fn pictures(
-    model: &Model,
-    raw: Option<&[Vec<DVec3>; 2]>,
-    report: &Report,
-    up: Up,
-) -> Result<Vec<Picture>, Failure> {
+pub fn pictures(model: &Model, raw: Option<&Raw>, report: &Report, up: Up) -> Result<Vec<Picture>, Failure> {
     let (up, toward) = view(up);
     let camera = close_up(Camera::fit(&model.mesh.bounds(), toward, up, ASPECT), &model.mesh);
     // The page is the ground, light or dark.
@@ -76,10 +101,10 @@ pub fn pictures(
         pictures.push(Picture { title: title.into(), caption, png, scale: None, place });
     };
 
-    if let Some([points, strays]) = raw {
-        let (dots, colors) = dots(points, strays, &model.mesh);
+    if let Some(raw) = raw {
+        let (dots, colors) = dots(raw, &model.mesh);
         let look = Look { paint: Paint::PerTriangle(&colors), hollows: 0.0, ..Look::default() };
-        let caption = format!("{} raw points as they came, {} outliers in red.", points.len(), strays.len());
+        let caption = format!("{} raw points as they came, {} outliers in red.", raw.count[0], raw.count[1]);
         add("Scan", caption, draw(&dots, look)?);
     }
     let input = draw(&model.mesh, Look { paint: Paint::Plain(CLAY), ..Look::default() })?;
@@ -373,19 +398,15 @@ fn outlines(model: &Model) -> Vec<Line> {
 }
 
 /// Points as small triangles that lie like the surface beside them, outliers in a colour of their own and facing up.
-fn dots(points: &[DVec3], strays: &[DVec3], mesh: &TriMesh) -> (TriMesh, Vec<[u8; 3]>) {
+fn dots(raw: &Raw, mesh: &TriMesh) -> (TriMesh, Vec<[u8; 3]>) {
+    let Raw { points, strays, count, .. } = raw;
     let tree = Bvh::new(mesh);
     let area: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
     // The dots of all points together cover a share of the surface: what lies behind shows through.
-    let side = (COVERED * area / points.len().max(1) as f64).sqrt();
+    let side = (COVERED * area / count[0].max(1) as f64).sqrt();
     let finite = |p: &&DVec3| p.is_finite();
-    let step = points.len().div_ceil(DOTS).max(1);
-    let plain: Vec<(DVec3, DVec3)> = points
-        .par_iter()
-        .step_by(step)
-        .filter(finite)
-        .map(|p| (*p, mesh.normal(tree.closest(*p).place.face as usize)))
-        .collect();
+    let plain: Vec<(DVec3, DVec3)> =
+        points.par_iter().filter(finite).map(|p| (*p, mesh.normal(tree.closest(*p).place.face as usize))).collect();
     // Only strays around the shape are in the picture.
     let bounds = mesh.bounds();
     let reach = bounds.diagonal();

@@ -17,6 +17,9 @@ pub enum ReadError {
         /// What it says.
         error: io::Error,
     },
+    /// The observer no longer wanted it.
+    #[error("cancelled")]
+    Cancelled(#[from] planish::observe::Cancelled),
     /// A folder, a pipe or a device.
     #[error("it is {0}, not a file - hint: name a file; save what comes through a pipe in one")]
     NotAFile(&'static str),

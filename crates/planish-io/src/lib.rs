@@ -37,7 +37,7 @@ mod usd;
 mod usd_material;
 mod weld;
 
-pub use bricks::{BrickFolder, Source};
+pub use bricks::{BrickFolder, Gathered, Source};
 pub use error::{ReadError, WriteError};
 pub use export::{ExportKind, export, export_kind, export_mesh};
 pub use far::{FileUnits, file_units, shift_of, single_step};
@@ -57,8 +57,8 @@ pub use relief_files::{
     SIDECAR as RELIEF_SIDECAR, image_facts, is_relief_name, read_relief, relief_names, relief_roundtrip, write_relief,
 };
 pub use scan::{
-    SCAN_EXTENSIONS, ScanOptions, Take, WRITTEN_SCANS, check_columns, is_scan, points_told, read_body, read_scan,
-    write_scan, write_scan_in,
+    SCAN_EXTENSIONS, ScanOptions, ScanWriter, Take, WRITTEN_SCANS, check_columns, is_scan, points_told, read_body,
+    read_scan, write_scan, write_scan_in,
 };
 pub use step::{StepInput, StepSummary, read_step_surfaces, write_step};
 pub use tile_files::{TILE_LIST, TilesError, is_tile_name, tile_names, write_tiles};

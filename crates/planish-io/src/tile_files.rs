@@ -3,6 +3,7 @@
 use crate::{WriteError, WriteOptions, write_tagged_mesh};
 use glam::DVec3;
 use planish::mesh::{FeatureTags, MeshParts, TileError, TriMesh, tiles};
+use planish::observe::{Cancelled, Observer};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -42,6 +43,9 @@ pub enum TilesError {
     /// A file is not written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// The observer no longer wanted them.
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// Writes the tiles of a mesh into a folder and returns how many there are. Vertices on the border of two tiles have the same bits in both.
@@ -55,6 +59,7 @@ pub fn write_tiles(
     tags: &FeatureTags,
     (size, shift): (f64, DVec3),
     options: &WriteOptions,
+    observer: &dyn Observer,
 ) -> Result<usize, TilesError> {
     let mut parts = MeshParts::new(mesh, tags);
     let mut list = TileList {
@@ -66,6 +71,7 @@ pub fn write_tiles(
         tiles: Vec::new(),
     };
     for (tile @ [i, j, k], faces) in tiles(mesh, size, shift)? {
+        observer.check()?;
         let mut part = parts.part(&faces);
         part.mesh.points.iter_mut().for_each(|p| *p += shift);
         let file = format!("tile_{i}_{j}_{k}.ply");

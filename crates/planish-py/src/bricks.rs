@@ -4,10 +4,10 @@ use crate::cloud::{PyCloud, mesh_of, scan_params};
 use crate::error::{told, told_of};
 use crate::objects::PyMesh;
 use crate::params::Given;
-use crate::watch;
+use crate::watch::{self, Both};
 use planish::cloud::bricks::{BrickStore, StoreError, halo};
 use planish::pipeline::{BRICK_POINTS, BrickMesh, BrickPlan, BrickWelder, ScanError, ScanParams, clean_brick};
-use planish_io::{BrickFolder, ReadError, ScanOptions};
+use planish_io::{BrickFolder, Gathered, ReadError, ScanOptions};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -68,14 +68,17 @@ impl PyBricks {
     }
 }
 
-/// Bricks of the pieces that an iterable gives.
-fn of_pieces(scan: &Bound<PyAny>, folder: &Path, most: usize) -> PyResult<BrickFolder> {
+/// The points of the pieces that an iterable gives.
+fn gathered(scan: &Bound<PyAny>, folder: &Path) -> PyResult<Gathered> {
     let pieces = scan.try_iter()?;
     let mut raised = None;
-    let made = BrickFolder::of_pieces(
+    let made = BrickFolder::gather(
         &mut |take| {
             for piece in &pieces {
-                let cloud = piece.and_then(|p| Ok(p.cast::<PyCloud>()?.get().cloud.clone()));
+                let cloud = piece.and_then(|p| {
+                    scan.py().check_signals()?;
+                    Ok(p.cast::<PyCloud>()?.get().cloud.clone())
+                });
                 match cloud {
                     // Pieces may be moved, each by another shift.
                     Ok(cloud) => take(cloud.in_place())?,
@@ -89,7 +92,6 @@ fn of_pieces(scan: &Bound<PyAny>, folder: &Path, most: usize) -> PyResult<BrickF
             Ok(())
         },
         folder,
-        most,
     );
     match raised {
         Some(raised) => Err(raised),
@@ -157,9 +159,16 @@ impl PyBricks {
         let options = ScanOptions { columns, classes: classes.unwrap_or_default() };
         let made = match scan.extract::<PathBuf>() {
             Ok(file) => {
-                py.detach(|| BrickFolder::create(&file, &options, &folder, most)).map_err(|e| told_of(py, &file, &e))?
+                let create = |o: &dyn Both| match BrickFolder::create(&file, &options, &folder, most, o.one()) {
+                    Err(ReadError::Cancelled(c)) => Err(c),
+                    made => Ok(made),
+                };
+                watch::run(py, "points", progress, create)?.map_err(|e| told_of(py, &file, &e))?
             }
-            Err(_) => of_pieces(scan, &folder, most)?,
+            Err(_) => {
+                let gathered = gathered(scan, &folder)?;
+                watch::run(py, "points", progress, |o| BrickFolder::of_gathered(gathered, most, o.one()))?
+            }
         };
         watch::run(py, "bricks", progress, |o| {
             let halo = halo(&made, &params.clean, o.one())?;
@@ -209,6 +218,30 @@ impl PyBricks {
             let made = plan.mesh(&self.folder, brick, &self.recipe.params, o.one())?;
             self.folder.write(&mesh_name(brick), &made).map_err(of_store)
         })
+    }
+
+    /// The points of a brick on the surface, when all is settled, without outliers: as of `Samples.project`, with the noise and the
+    /// sides of the whole scan. Raises CloudError, IndexError.
+    ///
+    /// * outliers: keep outliers, flagged
+    /// * spacing: distance of the points that are kept, world units; across bricks they may be closer
+    #[pyo3(signature = (brick, *, progress=None, **parameters))]
+    fn project(
+        &self,
+        py: Python,
+        brick: usize,
+        progress: Option<&Bound<PyAny>>,
+        parameters: Option<&Bound<PyDict>>,
+    ) -> PyResult<PyCloud> {
+        self.check(brick)?;
+        let mut given = Given::new("Bricks.project", parameters)?;
+        let params = ScanParams { points: given.take()?, ..self.recipe.params.clone() };
+        given.done()?;
+        let made = watch::run(py, "points", progress, |o| {
+            let plan = self.plan().map_err(of_store)?;
+            plan.project(&self.folder, brick, &params, o.one())
+        })?;
+        Ok(PyCloud::cleaned(made))
     }
 
     /// The meshes of all bricks as one. Raises CloudError, ContourError.

@@ -44,9 +44,10 @@ impl PyCloud {
     }
 
     /// What cleaning made of a cloud.
-    fn cleaned(made: Cleaned) -> PyCloud {
-        let lines: Vec<Vec<[f64; 3]>> = made.lines.iter().map(|l| l.iter().map(|p| p.to_array()).collect()).collect();
-        let facts = json!({ "outliers": made.outliers, "moved_rms": made.moved_rms, "lines": lines });
+    pub fn cleaned(made: Cleaned) -> PyCloud {
+        let lines: Vec<Vec<[f64; 3]>> =
+            made.facts.lines.iter().map(|l| l.iter().map(|p| p.to_array()).collect()).collect();
+        let facts = json!({ "outliers": made.facts.outliers, "moved_rms": made.facts.moved_rms, "lines": lines });
         PyCloud { cloud: Arc::new(made.cloud), facts }
     }
 }

@@ -202,6 +202,25 @@ def test_bricks_tell_what_is_wrong_with_folders_and_files(scan: Path, tmp_path: 
     assert (len(again), again.points) == (len(bricks), bricks.points)
 
 
+def test_points_of_bricks_lie_on_the_surface_as_those_of_the_whole(scan: Path, tmp_path: Path) -> None:
+    whole = planish.read(scan)
+    points = whole.clean().project()
+    bricks = planish.Bricks.create(scan, tmp_path / "bricks", most=4_000)
+    with pytest.raises(planish.CloudError, match="plan"):
+        bricks.project(0)
+    for k in range(len(bricks)):
+        bricks.clean(k)
+    bricks.settle()
+    pieces = [bricks.project(k) for k in range(len(bricks))]
+    assert abs(sum(len(p.points) for p in pieces) - len(points.points)) < 0.01 * len(points.points)
+    assert all(p.attributes.keys() == points.attributes.keys() for p in pieces)
+    surface = whole.mesh()
+    off = np.concatenate([surface.closest(p.points)["distance"] for p in pieces])
+    assert np.median(off) < 1.1 * np.median(surface.closest(points.points)["distance"])
+    thin = bricks.project(0, spacing=0.1 * float(np.ptp(whole.points, axis=0).max()))
+    assert 0 < len(thin.points) < len(pieces[0].points)
+
+
 def test_wrong_options_are_told_as_elsewhere(parts: list[Path], tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="jobs=0"):
         distributed.run_many(parts, tmp_path, jobs=0)

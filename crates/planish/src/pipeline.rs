@@ -3,7 +3,7 @@
 //! [K98] Krishnamurthy, *Fitting Smooth Surfaces to Dense Polygon Meshes*, fig. 1.3: curves, grids, surfaces,
 //! displacement maps; before it a mesh of the scan, its repair and an automatic network, after it the measuring.
 //!
-//! 1. [`run`], everything: a scan is meshed (as [`mesh_scan`] does, but in one piece), its points are brought to the surface, and the parameters of
+//! 1. [`run`], everything: a scan is meshed as [`mesh_scan`] does, its points are brought to the surface, and the parameters of
 //!    what follows are those that suit its noise ([`params_for`])
 //! 2. [`fit`], from a mesh on: repair, layout, imprint, grids, surfaces, seams, relief, measure. [`layout()`] stops at the
 //!    network, for one that is edited before
@@ -21,7 +21,10 @@ mod rework;
 mod scan;
 mod truth;
 
-pub use bricks::{BRICK_POINTS, BrickMesh, BrickPlan, BrickWelder, clean_brick, mesh_bricks, mesh_scan};
+pub use bricks::{
+    BRICK_POINTS, BrickMesh, BrickPlan, BrickWelder, TakePoints, clean_brick, clean_bricks, mesh_bricks, mesh_planned,
+    mesh_scan, project_bricks,
+};
 pub use deform::{Move, deform, join, matched, moved};
 pub use quality::{
     FOLDED_DEG, displaced_mesh, displaced_patches, inner_angles, span_count, surface_mesh, surface_mesh_cut,
@@ -35,7 +38,8 @@ pub use scan::{
 };
 pub use truth::{EdgesFound, Zone, edge_reach, edges_found, truth_figures, zone};
 
-use crate::cloud::{self, Cleaned, Cloud, CloudError};
+use crate::cloud::bricks::{BrickStore, CloudStore};
+use crate::cloud::{self, Cloud, CloudError, PointFacts};
 use crate::grid::{self, FeatureError, Grid, GridError, GridParams, Relaxer};
 use crate::layout::{self, Known, Layout, LayoutError, LayoutParams};
 use crate::mend::{self, Repairs};
@@ -65,10 +69,11 @@ pub struct PipelineParams {
 }
 
 /// What a run starts from.
-#[derive(Debug)]
 pub enum Input<'a> {
     /// Points: they are cleaned and meshed first.
     Scan(&'a Cloud),
+    /// Points in bricks, for what does not fit into memory.
+    Bricks(&'a dyn BrickStore),
     /// A mesh.
     Mesh {
         /// Any triangle mesh; it is repaired first.
@@ -117,41 +122,92 @@ pub struct Run {
 pub struct Scanned {
     /// The samples and the mesh that was made of them.
     pub meshed: ScanMeshed,
-    /// The points on the surface of the samples, and which are outliers.
-    pub points: Cleaned,
+    /// What is known of its points on their surface.
+    pub points: PointFacts,
 }
 
 /// Everything, from a scan or a mesh to a model.
 /// # Errors
 /// The first stage that fails; [`Cancelled::is_cause_of`] tells one that was stopped.
 pub fn run(input: Input, params: &RunParams, observer: &dyn PipelineObserver) -> Result<Run, PipelineError> {
-    let cloud = match input {
+    run_with_points(input, params, &mut |_, _| Ok(()), observer)
+}
+
+/// As [`run`], and gives the points of a scan on its surface to `take`: all at once, or brick by brick where it is worked so.
+/// # Errors
+/// As [`run`], or what `take` says.
+pub fn run_with_points(
+    input: Input,
+    params: &RunParams,
+    take: &mut TakePoints,
+    observer: &dyn PipelineObserver,
+) -> Result<Run, PipelineError> {
+    let weights = [&SCAN_WEIGHTS[..], &WEIGHTS].concat();
+    let mut clock = Clock::new(observer, &weights);
+    let scanned = match input {
         Input::Mesh { mesh, tags, network } => {
             let params = (params.stages)(PipelineParams::default(), mesh.bounds().diagonal());
             let fitted = fit(mesh, tags, network, &params, observer)?;
             return Ok(Run { fitted, params, scan: None });
         }
-        Input::Scan(cloud) => cloud,
+        Input::Scan(cloud) if cloud.points.len() > BRICK_POINTS => {
+            in_bricks(&CloudStore::new(cloud, BRICK_POINTS), &params.scan, take, &mut clock)?
+        }
+        Input::Scan(cloud) => in_one_piece(cloud, &params.scan, take, &mut clock)?,
+        Input::Bricks(store) => in_bricks(store, &params.scan, take, &mut clock)?,
     };
-    let weights = [&SCAN_WEIGHTS[..], &WEIGHTS].concat();
-    let mut clock = Clock::new(observer, &weights);
-    let scan = &params.scan;
-    let meshed = clock.stage(
-        "mesh",
-        |o| scan::mesh_at_once(cloud, scan, o),
-        |m| [("triangles", m.meshed.extracted.mesh.triangles.len())],
-    )?;
+    let extracted = &scanned.meshed.meshed.extracted;
+    let params = (params.stages)(params_for(&scanned.meshed), extracted.mesh.bounds().diagonal());
+    let mut fitted = fit_with(&extracted.mesh, Some(&extracted.tags), None, None, &params, &mut clock)?;
+    // Outliers are no part of the shape: its size is that of the mesh.
+    run_figures(&scanned.meshed, &scanned.points, extracted.mesh.bounds().diagonal(), &mut fitted);
+    Ok(Run { fitted, params, scan: Some(scanned) })
+}
+
+/// The mesh of a scan in one piece, and its points on the surface.
+fn in_one_piece(
+    cloud: &Cloud,
+    params: &ScanParams,
+    take: &mut TakePoints,
+    clock: &mut Clock,
+) -> Result<Scanned, PipelineError> {
+    let meshed = clock.stage("mesh", |o| scan::mesh_at_once(cloud, params, o), triangles)?;
     let points = clock.stage(
         "points",
-        |o| cloud::project(cloud, &meshed.samples, scan.clean.outlier, &scan.points, o),
-        |p| [("points", p.cloud.points.len())],
+        |o| {
+            let made = cloud::project(cloud, &meshed.samples, params.clean.outlier, &params.points, o)?;
+            let facts = made.facts.clone();
+            take(cloud, made)?;
+            Ok::<PointFacts, CloudError>(facts)
+        },
+        |points| [("points", points.kept)],
     )?;
-    let (mesh, tags) = (&meshed.meshed.extracted.mesh, &meshed.meshed.extracted.tags);
-    let params = (params.stages)(params_for(&meshed), mesh.bounds().diagonal());
-    let mut fitted = fit_with(mesh, Some(tags), None, None, &params, &mut clock)?;
-    // Outliers are no part of the shape: its size is that of the mesh.
-    run_figures(&meshed, &points, mesh.bounds().diagonal(), &mut fitted);
-    Ok(Run { fitted, params, scan: Some(Scanned { meshed, points }) })
+    Ok(Scanned { meshed, points })
+}
+
+/// The same of a scan in bricks.
+fn in_bricks(
+    store: &dyn BrickStore,
+    params: &ScanParams,
+    take: &mut TakePoints,
+    clock: &mut Clock,
+) -> Result<Scanned, PipelineError> {
+    let (plan, meshed) = clock.stage(
+        "mesh",
+        |o| {
+            let plan = clean_bricks(store, params, &Part::new(o, 0.0, 0.6))?;
+            let meshed = mesh_planned(store, &plan, params, &Part::new(o, 0.6, 0.4))?;
+            Ok::<(BrickPlan, ScanMeshed), ScanError>((plan, meshed))
+        },
+        |(_, meshed)| triangles(meshed),
+    )?;
+    let points =
+        clock.stage("points", |o| project_bricks(store, &plan, params, take, o), |points| [("points", points.kept)])?;
+    Ok(Scanned { meshed, points })
+}
+
+fn triangles(made: &ScanMeshed) -> [(&'static str, usize); 1] {
+    [("triangles", made.meshed.extracted.mesh.triangles.len())]
 }
 
 /// Stages from a scan to its mesh, with their shares of the time in the measure of [`WEIGHTS`].

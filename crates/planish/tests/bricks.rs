@@ -2,10 +2,13 @@
 
 use glam::DVec3;
 use planish::Silent;
-use planish::cloud::Cloud;
 use planish::cloud::bricks::CloudStore;
+use planish::cloud::{self, Cleaned, Cloud, PointFacts, ProjectParams};
 use planish::mesh::{Attribute, CompareParams, Diagnosis, TriMesh, compare, diagnose, self_intersections};
-use planish::pipeline::{ScanError, ScanMeshed, ScanParams, mesh_bricks, mesh_scan};
+use planish::pipeline::{
+    Input, RunParams, ScanError, ScanMeshed, ScanParams, clean_bricks, mesh_bricks, mesh_scan, project_bricks,
+    run_with_points,
+};
 use planish::synthetic::{bracket, demo, even_scan, shapes};
 
 fn in_bricks(scan: &Cloud, most: usize) -> ScanMeshed {
@@ -106,4 +109,95 @@ fn normals_of_the_file_tell_all_bricks_the_outside() {
     let mesh = mesh(&made);
     let up = (0..mesh.triangles.len()).map(|t| mesh.area_vector(t)).sum::<DVec3>().z;
     assert!(up < -0.95 * diagnose(mesh).area, "{up}");
+}
+
+/// The points of a scan in bricks on its surface, and what is known of them.
+fn points_in_bricks(scan: &Cloud, points: ProjectParams) -> (Vec<Cleaned>, PointFacts) {
+    let store = CloudStore::new(scan, 5_000);
+    let params = ScanParams { points, ..ScanParams::default() };
+    let plan = clean_bricks(&store, &params, &Silent).unwrap();
+    let mut pieces = Vec::new();
+    let mut take = |raw: &Cloud, piece: Cleaned| {
+        assert_eq!(raw.points.len(), piece.strays.len());
+        pieces.push(piece);
+        Ok(())
+    };
+    let facts = project_bricks(&store, &plan, &params, &mut take, &Silent).unwrap();
+    (pieces, facts)
+}
+
+#[test]
+fn points_of_a_scan_in_bricks_come_to_the_surface_as_near_as_in_one_piece_with_what_the_file_tells_of_them() {
+    let truth = bracket(1, 120).unwrap();
+    let diagonal = truth.bounds().diagonal();
+    let mut scan = even_scan(&truth, 40_000, 1e-3 * diagonal, 1);
+    (0..40).for_each(|k| scan.points[100 * k] += DVec3::splat(0.05 * diagonal));
+    let own = (0..scan.points.len()).map(|k| k as f32).collect();
+    scan.attributes = vec![Attribute { name: "number".into(), width: 1, values: own }];
+    let params = ScanParams::default();
+    let samples = cloud::clean(&scan, &params.clean, &Silent).unwrap();
+    let whole = cloud::project(&scan, &samples, params.clean.outlier, &params.points, &Silent).unwrap();
+    let (pieces, facts) = points_in_bricks(&scan, params.points.clone());
+    assert_eq!(pieces.iter().map(|p| p.cloud.points.len()).sum::<usize>(), facts.kept);
+    assert!(facts.kept.abs_diff(whole.facts.kept) < 40, "{} for {}", facts.kept, whole.facts.kept);
+    assert!((facts.moved_rms / whole.facts.moved_rms - 1.0).abs() < 0.03);
+    let bvh = planish::geom::Bvh::new(&truth);
+    let off = |clouds: &[&Cloud]| {
+        let all: Vec<f64> = clouds.iter().flat_map(|c| &c.points).map(|p| bvh.closest(*p).distance).collect();
+        (all.iter().map(|d| d * d).sum::<f64>() / all.len() as f64).sqrt()
+    };
+    let parts: Vec<&Cloud> = pieces.iter().map(|p| &p.cloud).collect();
+    let (a, b) = (off(&[&whole.cloud]), off(&parts));
+    assert!(b < 1.05 * a, "{b} in bricks, {a} in one piece");
+    // Each point still has its own number, and is near where it was.
+    let names = |c: &Cloud| c.attributes.iter().map(|a| a.name.clone()).collect::<Vec<_>>();
+    for part in parts {
+        assert_eq!(names(part), names(&whole.cloud));
+        let numbers = &part.attribute("number", 1).unwrap().values;
+        let moved = numbers.iter().zip(&part.points).map(|(&k, p)| scan.points[k as usize].distance(*p));
+        assert!(moved.fold(0.0, f64::max) < 0.01 * diagonal);
+    }
+    let length = |facts: &PointFacts| -> f64 {
+        facts.lines.iter().flat_map(|l| l.windows(2)).map(|w| w[0].distance(w[1])).sum()
+    };
+    let ratio = length(&facts) / length(&whole.facts);
+    assert!((ratio - 1.0).abs() < 0.1, "{ratio} times as much length of sharp lines");
+}
+
+#[test]
+fn thinned_points_of_bricks_keep_their_distance_across_cuts_and_bodies_are_numbered_by_area() {
+    let ball = |radius: f64, at: DVec3, count: usize| {
+        let scan = even_scan(&shapes::sphere(radius, 5), count, 1e-3, 1);
+        scan.points.into_iter().map(move |p| p + at).collect::<Vec<_>>()
+    };
+    let scan = Cloud::new([ball(0.5, DVec3::ZERO, 10_000), ball(1.0, DVec3::X * 3.0, 20_000)].concat());
+    let spacing = 0.1;
+    let (pieces, facts) = points_in_bricks(&scan, ProjectParams { spacing, outliers: false });
+    let points: Vec<DVec3> = pieces.iter().flat_map(|p| p.cloud.points.clone()).collect();
+    let near = |i: usize, j: usize| points[i].distance(points[j]) < spacing;
+    assert!((0..points.len()).all(|i| (0..i).all(|j| !near(i, j))));
+    // Between the loosest and the densest that no point can be added to: circles of one and of half a spacing.
+    let area = 4.0 * std::f64::consts::PI * 1.25;
+    let most = area / (spacing * spacing * 0.75f64.sqrt());
+    assert!(facts.kept as f64 > 0.5 * most && (facts.kept as f64) < most, "{} of {most}", facts.kept);
+    for piece in &pieces {
+        let segment = &piece.cloud.attribute("segment", 1).unwrap().values;
+        assert!(segment.iter().zip(&piece.cloud.points).all(|(&s, p)| (s == 0.0) == (p.x > 1.5)));
+    }
+}
+
+#[test]
+fn a_run_on_bricks_has_the_mesh_of_these_and_gives_its_points() {
+    let scan = even_scan(&shapes::sphere(1.0, 5), 12_000, 1e-3, 1);
+    let store = CloudStore::new(&scan, 5_000);
+    let mut count = 0;
+    let mut take = |_: &Cloud, piece: Cleaned| {
+        count += piece.cloud.points.len();
+        Ok(())
+    };
+    let run = run_with_points(Input::Bricks(&store), &RunParams::default(), &mut take, &Silent).unwrap();
+    let scanned = run.scan.unwrap();
+    assert!(mesh(&scanned.meshed) == mesh(&in_bricks(&scan, 5_000)));
+    assert_eq!((count, scanned.meshed.bricks > 2), (scanned.points.kept, true));
+    assert!(count > 11_900 && run.fitted.quality.contains_key("scan.bricks"));
 }

@@ -56,7 +56,7 @@ fn anew(session: &Session, args: &Fit) -> Result<(Report, Model, Option<Reach>),
         truth: None,
     };
     let from = From { input: placed.input(network), shift: placed.shift, warning: placed.warning(units.symbol()) };
-    let Made { report, model, reach, .. } = fitted(session, &job, from, vec![read])?;
+    let Made { report, model, reach, .. } = fitted(session, &job, from, vec![read], None)?;
     Ok((report, model, reach))
 }
 

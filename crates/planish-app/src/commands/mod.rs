@@ -32,7 +32,7 @@ pub use batch::folder_names;
 use planish::grid::Grid;
 use planish::mesh::{Adjacency, TriMesh, folded_back, self_intersections};
 use planish::model::{Model, Units};
-use planish::observe::Cancelled;
+use planish::observe::{Cancelled, Observer};
 use planish::pipeline::{Figure, PipelineError, Quality, StageRecord, Warning};
 use planish::relief::{Relief, ReliefError};
 use planish::surface::Surface;
@@ -173,7 +173,16 @@ impl Session {
         name: &'static str,
         work: impl FnOnce() -> Result<T, Failure>,
     ) -> Result<(T, StageRecord), Failure> {
-        let (result, record) = self.bars.step(name, |_| work());
+        self.watched(name, |_| work())
+    }
+
+    /// The same with work that looks whether it is still wanted.
+    fn watched<T>(
+        &self,
+        name: &'static str,
+        work: impl FnOnce(&dyn Observer) -> Result<T, Failure>,
+    ) -> Result<(T, StageRecord), Failure> {
+        let (result, record) = self.bars.step(name, work);
         if progress::interrupted() {
             return Err(Failure::interrupted());
         }

@@ -4,23 +4,27 @@ use super::missed::{self, Reach};
 use super::{Session, commit_report, pipeline_failure, write_failure, write_relief, write_text};
 use crate::args::{AllStages, Run, SeamArgs};
 use crate::failure::{Failure, Status};
-use crate::files;
-use crate::pictures;
+use crate::files::{self, PointsFile, Scan};
+use crate::pictures::{self, Raw};
 use crate::placed::{self, Placed};
 use crate::products::Staged;
 use crate::summary::Summary;
 use crate::tolerance::Tolerance;
 use planish::DVec3;
+use planish::cloud::bricks::{self, StoreError};
+use planish::cloud::{Cleaned, Cloud};
 use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{HistoryEntry, Model, Units};
 use planish::network::Network;
-use planish::pipeline::{self, Figure, Fitted, Input, RunParams, ScanParams, Scanned, StageRecord};
+use planish::pipeline::{self, Figure, Fitted, Input, RunParams, ScanParams, StageRecord};
 use planish_io::report::{self, Report, SeamRow, count, distance, number, percent};
 use planish_io::{StepInput, Up, WriteError, WriteOptions};
 use std::path::Path;
 
 pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
     let input = &args.inputs[0];
+    // The first to come and the last to go: it removes a folder that was made in vain.
+    let room = Staged::folder(&args.output)?;
     let staged = Staged::folder(&args.output)?;
     let scan = ScanParams { points: args.points.params(None)?, ..args.meshing.params()? };
     let units = session.units_of(input);
@@ -43,8 +47,12 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
             return Err(Failure::usage("--network", "lies on a mesh, and the input is a scan")
                 .hint("use `planish mesh` first, and give its mesh"));
         }
-        let ((scan, far_off), read) = session.step("read", || files::scan_body(input, &args.scan))?;
-        return produce(session, job, From { warning: far_off, ..From::scan(&scan) }, staged, vec![read]);
+        let ((scan, warning), read) = session.watched("read", |o| Scan::read(input, &args.scan, Some(&room), o))?;
+        let of_scan = match &scan {
+            Scan::Whole(cloud) => Input::Scan(cloud),
+            Scan::Bricks(bricks) => Input::Bricks(bricks),
+        };
+        return produce(session, job, From { input: of_scan, shift: scan.shift(), warning }, staged, vec![read]);
     }
     args.meshing.refuse("use `planish mesh` first")?;
     if let Some(flag) = args.points.first_given() {
@@ -82,6 +90,15 @@ pub struct From<'a> {
 }
 
 impl<'a> From<'a> {
+    /// Number of points of a scan.
+    fn points(&self) -> u64 {
+        match &self.input {
+            Input::Scan(cloud) => cloud.points.len() as u64,
+            Input::Bricks(store) => bricks::points_of(store.bricks()) as u64,
+            Input::Mesh { .. } => 0,
+        }
+    }
+
     /// A scan.
     pub fn scan(scan: &'a planish::cloud::Cloud) -> From<'a> {
         From { input: Input::Scan(scan), shift: scan.shift, warning: None }
@@ -133,19 +150,14 @@ pub fn produce(
     before: Vec<StageRecord>,
 ) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
-    let cloud = if let Input::Scan(cloud) = from.input { Some(cloud) } else { None };
-    let Made { mut report, model, scan, reach } = fitted(session, &job, from, before)?;
-    report.warnings.extend(placed::moved(model.shift, "preview.glb lies"));
-    let raw = match (cloud, scan) {
-        (Some(cloud), Some(Scanned { points, .. })) => {
-            planish_io::write_scan(staged.path("points.ply"), &points.cloud)
-                .map_err(|e| write_failure(job.path, &job.output.join("points.ply"), e))?;
-            let mut raw: [Vec<DVec3>; 2] = Default::default();
-            cloud.points.iter().zip(&points.strays).for_each(|(p, &off)| raw[usize::from(off)].push(*p));
-            Some(raw)
-        }
-        _ => None,
+    let mut points = match from.points() {
+        0 => None,
+        total => Some(Points::new(&staged.path(POINTS), total, job.units)?),
     };
+    let Made { mut report, model, reach } = fitted(session, &job, from, before, points.as_mut())?;
+    report.warnings.extend(placed::moved(model.shift, "preview.glb lies"));
+    let wrong = |e| write_failure(job.path, &job.output.join(POINTS), e);
+    let raw = points.map(Points::finish).transpose().map_err(wrong)?;
     let name = job.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let options = WriteOptions { units: model.units, up: job.up, name };
     let ((), write) = session.step("write", || write_products(&staged, &job, &model, &options, &mut report))?;
@@ -166,29 +178,71 @@ pub fn produce(
     Ok(status)
 }
 
+/// Name of the cleaned points of a scan among the products.
+const POINTS: &str = "points.ply";
+
+/// The points of a scan on their way to their file, and to their picture.
+pub struct Points {
+    file: PointsFile,
+    raw: Raw,
+}
+
+impl Points {
+    fn new(path: &Path, total: u64, units: Units) -> Result<Points, Failure> {
+        let file = PointsFile::create(path, units).map_err(|e| Failure::usage(path, e))?;
+        Ok(Points { file, raw: Raw::new(total) })
+    }
+
+    fn take(&mut self, raw: &Cloud, cleaned: Cleaned) -> Result<(), StoreError> {
+        self.raw.add(&raw.points, &cleaned.strays);
+        self.file.add(cleaned.cloud)
+    }
+
+    fn finish(self) -> Result<Raw, WriteError> {
+        self.file.finish()?;
+        Ok(self.raw)
+    }
+}
+
 /// A model with its report so far.
 pub struct Made {
     /// The report.
     pub report: Report,
     /// The model, with units and history.
     pub model: Model,
-    /// What became of a scan.
-    pub scan: Option<Scanned>,
     /// What is reached of a demanded tolerance.
     pub reach: Option<Reach>,
 }
 
 /// Runs the pipeline on an input.
-pub fn fitted(session: &Session, job: &Job, from: From, before: Vec<StageRecord>) -> Result<Made, Failure> {
+/// * `points` - takes those of a scan
+pub fn fitted(
+    session: &Session,
+    job: &Job,
+    from: From,
+    before: Vec<StageRecord>,
+    mut points: Option<&mut Points>,
+) -> Result<Made, Failure> {
     let (units, From { input, shift, warning }) = (job.units, from);
     let facts = match &input {
-        Input::Scan(scan) => super::clean::scan_facts(job.path, scan, units),
+        Input::Scan(scan) => {
+            super::clean::scan_facts(job.path, (scan.points.len() as u64, scan.bounds().diagonal()), units)
+        }
+        Input::Bricks(store) => {
+            let bricks = store.bricks();
+            let size = (bricks::points_of(bricks) as u64, bricks::bounds_of(bricks).diagonal());
+            super::clean::scan_facts(job.path, size, units)
+        }
         Input::Mesh { mesh, .. } => files::mesh_facts(job.path, mesh, units),
     };
     let guessed = session.guessed_units(job.path, facts.diagonal, shift != DVec3::ZERO).filter(|_| job.truth.is_none());
     let mut report = Report::new(job.command, facts);
-    let run = pipeline::run(input, &job.params, &session.bars)
-        .map_err(|e| pipeline_failure(job.path, job.network_path, e))?;
+    let mut take = |raw: &Cloud, cleaned: Cleaned| points.as_mut().map_or(Ok(()), |points| points.take(raw, cleaned));
+    let run = pipeline::run_with_points(input, &job.params, &mut take, &session.bars);
+    let run = run.map_err(|e| match points.and_then(|points| points.file.failure()) {
+        Some(e) => write_failure(job.path, &job.output.join(POINTS), e),
+        None => pipeline_failure(job.path, job.network_path, e),
+    })?;
     let Fitted { mut model, stages, quality, seams, warnings } = run.fitted;
     report.stages = before;
     report.stages.extend(stages);
@@ -222,7 +276,7 @@ pub fn fitted(session: &Session, job: &Job, from: From, before: Vec<StageRecord>
     (model.units, model.shift) = (units, shift);
     model.params = serde_json::to_string(&run.params).map_err(Failure::fault)?;
     model.history.push(HistoryEntry { command: "fit".into(), parameters: model.params.clone() });
-    Ok(Made { report, model, scan: run.scan, reach })
+    Ok(Made { report, model, reach })
 }
 
 /// Done, or a demanded tolerance is missed: that of the distance, or that of the angle.

@@ -8,14 +8,18 @@
 
 mod part;
 
-use crate::scan::{ScanOptions, Take, pieces};
+use crate::scan::{Ending, ScanOptions, Take, pieces};
 use crate::{ReadError, atomic};
 use glam::DVec3;
+pub use part::Gathered;
 use part::{Record, records};
 use planish::cloud::Cloud;
-use planish::cloud::bricks::{Brick, BrickCells, BrickFacts, BrickSamples, BrickStands, BrickStore, StoreError};
+use planish::cloud::bricks::{
+    Brick, BrickCells, BrickFacts, BrickSamples, BrickStands, BrickStore, StoreError, bounds_of,
+};
 use planish::geom::Aabb;
 use planish::mesh::Attribute;
+use planish::observe::{Observer, Silent};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -43,10 +47,22 @@ struct Manifest {
     shift: DVec3,
     scanners: Vec<DVec3>,
     has_normals: bool,
+    /// Name and width of what else the file tells of its points.
+    columns: Vec<(String, usize)>,
+    /// Columns that the format has room for and no point of the file has, and what the numbers of others are to be multiplied by.
+    bare: Vec<String>,
+    scales: Vec<(String, f64)>,
     /// Points of the file, numbers or not, without those left out.
     points: u64,
     /// Points that were too far off to be of the scan.
     left_out: u64,
+}
+
+impl Manifest {
+    /// Bytes of all columns of a point.
+    fn more(&self) -> usize {
+        4 * self.columns.iter().map(|c| c.1).sum::<usize>()
+    }
 }
 
 impl BrickFolder {
@@ -55,18 +71,53 @@ impl BrickFolder {
     /// * `folder` - there, and empty
     /// # Errors
     /// As of [`crate::read_body`], or if the folder cannot be written.
-    pub fn create(scan: &Path, options: &ScanOptions, folder: &Path, most: usize) -> Result<BrickFolder, ReadError> {
-        BrickFolder::of_pieces(&mut |take| pieces(scan, options, take).map(drop), folder, most)
+    pub fn create(
+        scan: &Path,
+        options: &ScanOptions,
+        folder: &Path,
+        most: usize,
+        observer: &dyn Observer,
+    ) -> Result<BrickFolder, ReadError> {
+        BrickFolder::created(scan, options, folder, (most, AT_ONCE), observer)
     }
 
-    /// As [`BrickFolder::create`], for points that come in pieces from elsewhere.
+    fn created(
+        scan: &Path,
+        options: &ScanOptions,
+        folder: &Path,
+        most: (usize, u64),
+        observer: &dyn Observer,
+    ) -> Result<BrickFolder, ReadError> {
+        let mut ending = Ending::default();
+        let mut source = |take: &mut Take| {
+            ending = pieces(scan, options, take)?;
+            Ok(())
+        };
+        let mut gathered = part::gather(&mut source, folder, observer)?;
+        gathered.manifest.bare = ending.bare.into_iter().map(str::to_owned).collect();
+        gathered.manifest.scales = ending.scales.into_iter().map(|(name, scale)| (name.to_owned(), scale)).collect();
+        BrickFolder::parted(gathered, most, observer)
+    }
+
+    /// Writes points that come in pieces from elsewhere into a folder, to be parted by [`BrickFolder::of_gathered`].
     /// * `source` - gives each piece to what it is called with; all have the same attributes, and the last one has all scanners
     /// # Errors
     /// What the source says, [`ReadError::NoPoints`], or if the folder cannot be written.
-    pub fn of_pieces(source: &mut Source, folder: &Path, most: usize) -> Result<BrickFolder, ReadError> {
-        let manifest = part::part(source, folder, (most, AT_ONCE))?;
-        let made = BrickFolder { folder: folder.to_path_buf(), manifest };
-        made.write(MANIFEST, &made.manifest).map_err(|e| part::lost(folder, std::io::Error::other(e)))?;
+    pub fn gather(source: &mut Source, folder: &Path) -> Result<Gathered, ReadError> {
+        part::gather(source, folder, &Silent)
+    }
+
+    /// As [`BrickFolder::create`], of points that were gathered.
+    /// # Errors
+    /// If the folder cannot be written, or if cancelled.
+    pub fn of_gathered(gathered: Gathered, most: usize, observer: &dyn Observer) -> Result<BrickFolder, ReadError> {
+        BrickFolder::parted(gathered, (most, AT_ONCE), observer)
+    }
+
+    fn parted(gathered: Gathered, most: (usize, u64), observer: &dyn Observer) -> Result<BrickFolder, ReadError> {
+        let (folder, manifest) = part::part(gathered, most, observer)?;
+        let made = BrickFolder { folder, manifest };
+        made.write(MANIFEST, &made.manifest).map_err(|e| part::lost(&made.folder, std::io::Error::other(e)))?;
         Ok(made)
     }
 
@@ -94,7 +145,7 @@ impl BrickFolder {
 
     /// Box of the points, less the shift.
     pub fn bounds(&self) -> Aabb {
-        Aabb::of(self.manifest.bricks.iter().flat_map(|b| [&b.bounds.min, &b.bounds.max]))
+        bounds_of(&self.manifest.bricks)
     }
 
     /// Keeps something in the folder by a name.
@@ -112,6 +163,29 @@ impl BrickFolder {
     /// If it is not there, or damaged.
     pub fn read<T: DeserializeOwned>(&self, name: &str) -> Result<T, StoreError> {
         kept(&self.folder, name)
+    }
+}
+
+impl BrickFolder {
+    /// Passes the points of a brick by, each with the bytes of its columns.
+    fn records(&self, brick: usize, see: &mut dyn FnMut(Record, &[u8])) -> Result<(), StoreError> {
+        let path = points_file(&self.folder, brick);
+        records(&path, self.manifest.more(), &Silent, see).map_err(|e| StoreError(format!("{}: {e}", path.display())))
+    }
+
+    /// Points with what tells of the outside.
+    fn cloud<'a>(&self, found: impl Iterator<Item = &'a Record> + Clone) -> Cloud {
+        let mut cloud = Cloud::new(found.clone().map(|r| r.point).collect());
+        cloud.shift = self.manifest.shift;
+        if self.manifest.has_normals {
+            let values = found.clone().flat_map(|r| r.normal).collect();
+            cloud.attributes.push(Attribute { name: "normal".into(), width: 3, values });
+        }
+        if !self.manifest.scanners.is_empty() {
+            cloud.scanners.clone_from(&self.manifest.scanners);
+            cloud.seen_by = found.map(|r| r.seen_by).collect();
+        }
+        cloud
     }
 }
 
@@ -142,24 +216,37 @@ impl BrickStore for BrickFolder {
         let reach = bricks[brick].reach(halo);
         let mut found: Vec<Record> = Vec::new();
         for k in (0..bricks.len()).filter(|&k| bricks[k].bounds.meets(&reach)) {
-            let path = points_file(&self.folder, k);
-            let taken = records(&path, &mut |r| {
+            self.records(k, &mut |r, _| {
                 if bricks[brick].is_near(r.point, halo) {
                     found.push(r);
                 }
-            });
-            taken.map_err(|e| StoreError(format!("{}: {e}", path.display())))?;
+            })?;
         }
         found.sort_unstable_by_key(|r| r.index);
-        let mut cloud = Cloud::new(found.iter().map(|r| r.point).collect());
-        cloud.shift = self.manifest.shift;
-        if self.manifest.has_normals {
-            let values = found.iter().flat_map(|r| r.normal).collect();
-            cloud.attributes.push(Attribute { name: "normal".into(), width: 3, values });
-        }
-        if !self.manifest.scanners.is_empty() {
-            cloud.scanners.clone_from(&self.manifest.scanners);
-            cloud.seen_by = found.iter().map(|r| r.seen_by).collect();
+        Ok(self.cloud(found.iter()))
+    }
+
+    fn points_in(&self, brick: usize) -> Result<Cloud, StoreError> {
+        let mut found: Vec<(Record, usize)> = Vec::new();
+        let mut numbers: Vec<f32> = Vec::new();
+        self.records(brick, &mut |r, rest| {
+            found.push((r, found.len()));
+            numbers.extend(rest.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
+        })?;
+        found.sort_unstable_by_key(|r| r.0.index);
+        let mut cloud = self.cloud(found.iter().map(|r| &r.0));
+        let all = self.manifest.more() / 4;
+        let mut before = 0;
+        for (name, width) in &self.manifest.columns {
+            let from = before;
+            before += width;
+            if self.manifest.bare.contains(name) {
+                continue;
+            }
+            let scale = self.manifest.scales.iter().find(|s| s.0 == *name).map_or(1.0, |s| s.1);
+            let values = found.iter().flat_map(|r| &numbers[all * r.1 + from..][..*width]);
+            let values = values.map(|&x| Ending::scaled(scale, x)).collect();
+            cloud.attributes.push(Attribute { name: name.clone(), width: *width, values });
         }
         Ok(cloud)
     }
@@ -195,7 +282,6 @@ const HELD: u64 = 12;
 mod tests {
     use super::*;
     use crate::{read_body, write_scan};
-    use planish::Silent;
     use planish::cloud::bricks::CloudStore;
     use planish::pipeline::{ScanMeshed, ScanParams, mesh_bricks};
     use planish::synthetic::{demo, even_scan};
@@ -209,10 +295,7 @@ mod tests {
         write_scan(&file, scan).unwrap();
         let folder = room.path().join("folder");
         std::fs::create_dir(&folder).unwrap();
-        let mut source = |take: &mut Take| pieces(&file, &ScanOptions::default(), take).map(drop);
-        let manifest = part::part(&mut source, &folder, (MOST, 2000)).unwrap();
-        let made = BrickFolder { folder, manifest };
-        made.write(MANIFEST, &made.manifest).unwrap();
+        let made = BrickFolder::created(&file, &ScanOptions::default(), &folder, (MOST, 2000), &Silent).unwrap();
         let (whole, left_out) = read_body(&file, &ScanOptions::default()).unwrap();
         assert_eq!((made.left_out(), made.points()), (left_out as u64, whole.points.len() as u64));
         (room, made, whole)
@@ -238,6 +321,7 @@ mod tests {
                 assert_eq!((disk.points, disk.shift), (memory.points, memory.shift));
                 assert_eq!((disk.scanners, disk.seen_by), (memory.scanners, memory.seen_by));
             }
+            assert_eq!(folder.points_in(k).unwrap(), memory.points_in(k).unwrap());
         }
     }
 
@@ -250,7 +334,11 @@ mod tests {
         // More on one plane than a brick has points: a cut between equal numbers.
         (1000..5000).for_each(|k| cloud.points[k].x = cloud.points[1000].x);
         let values = (0..3 * cloud.points.len()).map(|k| (k as f32).sin()).collect();
-        cloud.attributes = vec![Attribute { name: "normal".into(), width: 3, values }];
+        let column = |name: &str, width: usize, values| Attribute { name: name.into(), width, values };
+        let colors = (0..3 * cloud.points.len()).map(|k| (k % 256) as f32 / 255.0).collect();
+        let reflectance = (0..cloud.points.len()).map(|k| (k as f32).cos()).collect();
+        cloud.attributes =
+            vec![column("normal", 3, values), column("color", 3, colors), column("reflectance", 1, reflectance)];
         let (_room, folder, whole) = both(&cloud, "map.ply");
         assert_eq!(folder.left_out(), 1);
         same(&folder, &whole);
@@ -266,6 +354,35 @@ mod tests {
         same(&folder, &whole);
         let (_room, folder, whole) = both(&scan(), "lines.laz");
         same(&folder, &whole);
+        let mut cloud = scan();
+        let colors = (0..3 * cloud.points.len()).map(|k| (k % 256) as f32 / 255.0).collect();
+        cloud.attributes = vec![Attribute { name: "color".into(), width: 3, values: colors }];
+        let (_room, folder, whole) = both(&cloud, "table.xyz");
+        same(&folder, &whole);
+    }
+
+    #[test]
+    fn parting_stops_wherever_it_is_no_longer_wanted() {
+        use std::sync::atomic::{AtomicUsize, Ordering};
+        struct Looks(AtomicUsize);
+        impl Observer for Looks {
+            fn progress(&self, _fraction: f64) {}
+
+            fn cancelled(&self) -> bool {
+                self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1)).is_err()
+            }
+        }
+        let (room, ..) = both(&scan(), "scan.ply");
+        let file = room.path().join("scan.ply");
+        let parted = |looks: usize| {
+            let folder = tempfile::tempdir().unwrap();
+            let observer = Looks(AtomicUsize::new(looks));
+            BrickFolder::created(&file, &ScanOptions::default(), folder.path(), (MOST, 2000), &observer)
+        };
+        let enough = (0..).find(|&looks| parted(looks).is_ok()).unwrap();
+        // Passes over the whole, its parts, and each brick.
+        assert!(enough > 30, "{enough}");
+        assert!((0..enough).all(|looks| matches!(parted(looks), Err(ReadError::Cancelled(_)))));
     }
 
     #[test]
@@ -288,7 +405,8 @@ mod tests {
         std::fs::remove_file(folder.folder.join(MANIFEST)).unwrap();
         assert!(BrickFolder::open(&folder.folder).is_err());
         let (scan, nowhere) = (room.path().join("scan.ply"), room.path().join("nowhere"));
-        let told = BrickFolder::create(&scan, &ScanOptions::default(), &nowhere, MOST).unwrap_err().to_string();
+        let told =
+            BrickFolder::create(&scan, &ScanOptions::default(), &nowhere, MOST, &Silent).unwrap_err().to_string();
         assert!(told.starts_with("its points cannot be kept in ") && told.contains("make room there"), "{told}");
     }
 }

@@ -9,4 +9,4 @@ mod read;
 mod write;
 
 pub(crate) use read::{is_points, pieces, read, read_points, told};
-pub(crate) use write::{write, write_points};
+pub(crate) use write::{Rows, write, write_points};

@@ -1,7 +1,7 @@
 //! E57: scans with poses (ASTM E2807). All scans of a file become one cloud, and a cloud of several stations becomes as
 //! many scans, each in the coordinates of its scanner.
 
-use super::{Bare, PIECE, Take, column, foreign, guarded};
+use super::{Ending, PIECE, Take, column, foreign, guarded};
 use crate::{Place, ReadError, WriteError};
 use e57::{
     CartesianCoordinate, E57Reader, E57Writer, Quaternion, Record, RecordName, RecordValue, Transform, Translation,
@@ -17,7 +17,7 @@ pub(super) fn told(file: BufReader<File>) -> Result<u64, ReadError> {
     guarded(move || Ok(E57Reader::new(file).map_err(foreign)?.pointclouds().iter().map(|scan| scan.records).sum()))
 }
 
-pub(super) fn pieces(mut file: BufReader<File>, take: &mut Take) -> Result<Bare, ReadError> {
+pub(super) fn pieces(mut file: BufReader<File>, take: &mut Take) -> Result<Ending, ReadError> {
     let mut mark = [0; 8];
     if file.read_exact(&mut mark).is_err() || mark != *b"ASTM-E57" {
         return Err(ReadError::WrongFormat {
@@ -72,7 +72,7 @@ pub(super) fn pieces(mut file: BufReader<File>, take: &mut Take) -> Result<Bare,
             }
         }
         let bare = [("color", has_color), ("intensity", has_intensity)];
-        Ok(bare.into_iter().filter(|b| !b.1).map(|b| b.0).collect())
+        Ok(Ending { bare: bare.into_iter().filter(|b| !b.1).map(|b| b.0).collect(), ..Ending::default() })
     })
 }
 

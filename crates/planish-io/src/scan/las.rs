@@ -1,6 +1,6 @@
 //! LAS and LAZ: airborne and terrestrial laser scans.
 
-use super::{Bare, PIECE, Take, column, foreign, guarded};
+use super::{Ending, PIECE, Take, column, foreign, guarded};
 use crate::{Place, ReadError, WriteError};
 use glam::DVec3;
 use las::point::Format;
@@ -56,7 +56,7 @@ pub(super) fn told(mut file: BufReader<File>) -> Result<u64, ReadError> {
     guarded(move || Ok(Reader::new(file).map_err(foreign)?.header().number_of_points()))
 }
 
-pub(super) fn pieces(mut file: BufReader<File>, classes: &[u8], take: &mut Take) -> Result<Bare, ReadError> {
+pub(super) fn pieces(mut file: BufReader<File>, classes: &[u8], take: &mut Take) -> Result<Ending, ReadError> {
     let mut mark = [0; 4];
     if file.read_exact(&mut mark).is_err() || mark != *b"LASF" {
         return Err(ReadError::WrongFormat {
@@ -122,7 +122,7 @@ pub(super) fn pieces(mut file: BufReader<File>, classes: &[u8], take: &mut Take)
                 hint: "choose other classes",
             });
         }
-        Ok(if has_color { Bare::new() } else { vec!["color"] })
+        Ok(Ending { bare: if has_color { Vec::new() } else { vec!["color"] }, ..Ending::default() })
     })
 }
 

@@ -10,8 +10,10 @@ mod npy;
 mod pcd;
 mod table;
 mod views;
+mod writer;
 
 pub use table::check_columns;
+pub use writer::ScanWriter;
 
 use crate::{Place, ReadError, WriteError, atomic, ply};
 use glam::DVec3;
@@ -49,13 +51,14 @@ pub fn is_scan(path: &Path) -> bool {
     }
 }
 
-/// Points that the header of a scan tells of; `None` for formats without one, and for what is damaged.
+/// Points that the header of a scan tells of, or lines of a text; `None` for formats that are read whole, and for what is damaged.
 pub fn points_told(path: &Path) -> Option<u64> {
     let mut file = opened(path).ok()?;
     match lower(path).as_str() {
         "e57" => e57::told(file).ok(),
         "las" | "laz" => las::told(file).ok(),
         "ply" => ply::told(&mut file).ok(),
+        "xyz" | "txt" | "csv" | "asc" | "pts" => table::told(file).ok(),
         _ => None,
     }
 }
@@ -89,7 +92,7 @@ pub fn read_body(path: impl AsRef<Path>, options: &ScanOptions) -> Result<(Cloud
 
 fn read_in_place(path: &Path, options: &ScanOptions) -> Result<Cloud, ReadError> {
     let mut cloud = Cloud::default();
-    let bare = pieces(path, options, &mut |piece| {
+    let ending = pieces(path, options, &mut |piece| {
         append(&mut cloud, piece);
         Ok(())
     })?;
@@ -100,7 +103,12 @@ fn read_in_place(path: &Path, options: &ScanOptions) -> Result<Cloud, ReadError>
         let (count, limit) = (cloud.points.len() as u64, u32::MAX as u64 - 1);
         return Err(ReadError::TooLarge { what: "points", count, limit, place: Place::Byte(0) });
     }
-    cloud.attributes.retain(|a| !bare.contains(&a.name.as_str()));
+    cloud.attributes.retain(|a| !ending.bare.contains(&a.name.as_str()));
+    for a in &mut cloud.attributes {
+        if let Some((_, scale)) = ending.scales.iter().find(|s| s.0 == a.name && s.1 != 1.0) {
+            a.values.iter_mut().for_each(|x| *x = Ending::scaled(*scale, *x));
+        }
+    }
     if cloud.scanners.is_empty() {
         cloud.seen_by.clear();
     }
@@ -113,14 +121,27 @@ pub type Take<'a> = dyn FnMut(Cloud) -> Result<(), ReadError> + 'a;
 /// Points that are read at once.
 const PIECE: usize = 1 << 16;
 
-/// Attributes that the format has room for and no point of the file has.
-pub(crate) type Bare = Vec<&'static str>;
+/// What is known of the attributes at the end of a file alone.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Ending {
+    /// Those that the format has room for and no point of the file has.
+    pub bare: Vec<&'static str>,
+    /// What their numbers are to be multiplied by.
+    pub scales: Vec<(&'static str, f64)>,
+}
+
+impl Ending {
+    /// What a number of an attribute is.
+    pub fn scaled(scale: f64, x: f32) -> f32 {
+        (f64::from(x) * scale) as f32
+    }
+}
 
 /// Reads a scan piece by piece, where the format allows; else it is one piece. All pieces have the same attributes, and the last
 /// one has all scanners.
 /// # Errors
 /// As of [`read_scan`], or what `take` says.
-pub(crate) fn pieces(path: &Path, options: &ScanOptions, take: &mut Take) -> Result<Bare, ReadError> {
+pub(crate) fn pieces(path: &Path, options: &ScanOptions, take: &mut Take) -> Result<Ending, ReadError> {
     let extension = lower(path);
     let file = opened(path)?;
     if file.get_ref().metadata()?.len() == 0 {
@@ -133,18 +154,20 @@ pub(crate) fn pieces(path: &Path, options: &ScanOptions, take: &mut Take) -> Res
         "ply" => {
             let mut points =
                 |mesh: TriMesh| take(Cloud { points: mesh.points, attributes: mesh.attributes, ..Cloud::default() });
-            return ply::pieces(file, PIECE, &mut points).map(|()| Bare::new());
+            return ply::pieces(file, PIECE, &mut points).map(|()| Ending::default());
         }
         "pcd" => pcd::read(&whole()?)?,
         "npy" | "npz" => npy::read(&whole()?)?,
         "conf" => views::read(&whole()?, path)?,
-        "xyz" | "txt" | "csv" | "asc" | "pts" => table::read(&whole()?, &extension, options.columns.as_deref())?,
+        "xyz" | "txt" | "csv" | "asc" | "pts" => {
+            return table::pieces(file, &extension, options.columns.as_deref(), take);
+        }
         _ => {
             let known = SCAN_EXTENSIONS.iter().chain(&["ply", "npy"]).map(|e| format!(".{e}")).collect::<Vec<_>>();
             return Err(ReadError::UnknownExtension { extension, known: known.join(", ") });
         }
     };
-    take(cloud).map(|()| Bare::new())
+    take(cloud).map(|()| Ending::default())
 }
 
 /// Adds a piece of a scan to the rest.
@@ -190,6 +213,18 @@ pub fn write_scan_in(path: impl AsRef<Path>, cloud: &Cloud, units: Units) -> Res
     if cloud.points.is_empty() {
         return Err(WriteError::Nothing("the scan has no points"));
     }
+    check(cloud)?;
+    let world: Vec<DVec3> = cloud.points.iter().map(|&p| p + cloud.shift).collect();
+    match extension.as_str() {
+        "ply" => atomic::write(path, |out| ply::write_points(out, &world, &cloud.attributes, GENERATOR)),
+        "las" | "laz" => atomic::write(path, |out| las::write(out, &world, cloud, extension == "laz")),
+        "e57" => atomic::write_at(path, |at| e57::write(at, &world, cloud, units.metres())),
+        _ => atomic::write(path, |out| table::write(out, &world, cloud)),
+    }
+}
+
+/// Refuses what no format can hold.
+fn check(cloud: &Cloud) -> Result<(), WriteError> {
     if let Some(v) = cloud.points.iter().position(|p| !p.is_finite()) {
         return Err(WriteError::Value {
             value: format!("the position {}", cloud.points[v]),
@@ -203,16 +238,11 @@ pub fn write_scan_in(path: impl AsRef<Path>, cloud: &Cloud, units: Units) -> Res
             return Err(WriteError::Inconsistent { what, place: Place::Item("attribute", k) });
         }
     }
-    let world: Vec<DVec3> = cloud.points.iter().map(|&p| p + cloud.shift).collect();
-    match extension.as_str() {
-        "ply" => atomic::write(path, |out| {
-            ply::write_points(out, &world, &cloud.attributes, &format!("planish {}", env!("CARGO_PKG_VERSION")))
-        }),
-        "las" | "laz" => atomic::write(path, |out| las::write(out, &world, cloud, extension == "laz")),
-        "e57" => atomic::write_at(path, |at| e57::write(at, &world, cloud, units.metres())),
-        _ => atomic::write(path, |out| table::write(out, &world, cloud)),
-    }
+    Ok(())
 }
+
+/// What the files say they were written by.
+const GENERATOR: &str = concat!("planish ", env!("CARGO_PKG_VERSION"));
 
 fn lower(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()

@@ -1,11 +1,11 @@
 //! Points as lines of numbers: XYZ, TXT, CSV, ASC, PTS.
 
-use super::column;
+use super::{Ending, Take, column};
 use crate::text::{Lines, shown};
 use crate::{Place, ReadError, WriteError};
 use glam::DVec3;
 use planish::cloud::Cloud;
-use std::io::Write;
+use std::io::{self, Read, Write};
 
 /// The columns of one line, and whether a comma in them is a decimal point.
 struct Row<'a> {
@@ -70,73 +70,146 @@ fn real(word: &[u8], decimal_comma: bool) -> Option<f64> {
     }
 }
 
-/// Reads points. `columns` names them; without it a header line does, else their number and range.
-pub(super) fn read(bytes: &[u8], extension: &str, columns: Option<&str>) -> Result<Cloud, ReadError> {
-    let mut lines = Lines::new(bytes, 0, 1);
-    let mut names: Option<Vec<String>> = columns.map(parse_columns).transpose()?;
-    let mut rows: Vec<f64> = Vec::new();
-    let mut width = 0;
-    let mut count = 0;
-    let mut header: Option<(Vec<String>, usize)> = None;
-    while let Some(line) = lines.next_line() {
-        let mut line = line.trim_ascii();
-        let comment = line.starts_with(b"#") || line.starts_with(b"//");
-        if comment {
-            line = line.trim_ascii_start().strip_prefix(b"//").unwrap_or(&line[1..]).trim_ascii();
+/// Bytes that are read at once, up to the end of a line: more than the thousand lines that columns are guessed from.
+const BLOCK: usize = 1 << 23;
+
+/// Reads points piece by piece. `columns` names them; without it a header line does, else their number and range.
+pub(super) fn pieces(
+    file: impl Read,
+    extension: &str,
+    columns: Option<&str>,
+    take: &mut Take,
+) -> Result<Ending, ReadError> {
+    in_blocks(file, Reader::new(extension, columns)?, BLOCK, take)
+}
+
+fn in_blocks(mut file: impl Read, mut reader: Reader, size: usize, take: &mut Take) -> Result<Ending, ReadError> {
+    let mut block = Vec::new();
+    let mut is_last = false;
+    while !is_last {
+        let more = (&mut file).take(size as u64).read_to_end(&mut block)?;
+        is_last = more < size;
+        let end = if is_last { block.len() } else { block.iter().rposition(|&b| b == b'\n').map_or(0, |k| k + 1) };
+        let rows = reader.rows(&block[..end])?;
+        if !rows.is_empty() {
+            take(reader.cloud(&rows)?)?;
         }
-        let Row { words: found, decimal_comma } = split(line);
-        if found.is_empty() {
-            continue;
-        }
-        let numbers: Vec<Option<f64>> = found.iter().map(|w| real(w, decimal_comma)).collect();
-        if comment || numbers.iter().all(Option::is_none) {
-            // A line of words before the data names the columns.
-            if count == 0 && numbers.iter().all(Option::is_none) && found.len() >= 3 {
-                let words: Vec<String> =
-                    found.iter().map(|w| String::from_utf8_lossy(w).to_ascii_lowercase()).collect();
-                // A line of words that names no x may be a remark, unless it has as many words as there are columns.
-                let names_x = words.iter().any(|n| canonical(n) == "x");
-                if names_x || !comment && header.is_none() {
-                    header = Some((words, lines.number()));
-                }
-                continue;
-            }
-            if comment || count == 0 {
-                continue;
-            }
-        }
-        // PTS begins each scan with the number of its points.
-        if found.len() == 1 && (extension == "pts" || count == 0) && numbers[0].is_some_and(|n| n.fract() == 0.0) {
-            continue;
-        }
-        if width == 0 {
-            width = found.len();
-            if let (None, Some((words, line))) = (&names, &header) {
-                names = named(words, width, *line)?;
-            }
-            if width < 3 {
-                let what = format!("a line has {width} numbers, a point needs 3");
-                return Err(ReadError::Syntax { what, place: Place::Line(lines.number()) });
-            }
-        }
-        if found.len() < width {
-            let what = format!("a line has {} numbers, those before have {width}", found.len());
-            return Err(ReadError::Syntax { what, place: Place::Line(lines.number()) });
-        }
-        for k in 0..width {
-            let Some(x) = numbers[k] else {
-                let what = format!("\"{}\" is not a number", shown(found[k]));
-                return Err(ReadError::Syntax { what, place: Place::Line(lines.number()) });
-            };
-            rows.push(x);
-        }
-        count += 1;
+        block.drain(..end);
     }
-    if count == 0 {
+    if reader.count == 0 {
         return Err(ReadError::NoPoints);
     }
-    let names = names.unwrap_or_else(|| guess(&rows, width, extension));
-    assemble(&rows, width, count, &names)
+    // Colours are bytes or pairs of them if they do not fit into what is less.
+    let scale = match reader.brightest {
+        most if most > 255.0 => 1.0 / 65535.0,
+        most if most > 1.0 => 1.0 / 255.0,
+        _ => 1.0,
+    };
+    Ok(Ending { bare: Vec::new(), scales: vec![("color", scale)] })
+}
+
+/// How many points a file has at most: its lines.
+pub(super) fn told(mut file: impl Read) -> io::Result<u64> {
+    let (mut block, mut count) = (vec![0; BLOCK], 1);
+    loop {
+        match file.read(&mut block)? {
+            0 => return Ok(count),
+            n => count += block[..n].iter().filter(|&&b| b == b'\n').count() as u64,
+        }
+    }
+}
+
+/// What is known of a file so far.
+struct Reader<'a> {
+    extension: &'a str,
+    names: Option<Vec<String>>,
+    /// A line of words before the data, and its number.
+    header: Option<(Vec<String>, usize)>,
+    /// Numbers of a line; 0 before the first.
+    width: usize,
+    count: usize,
+    lines: usize,
+    /// The largest number of a colour.
+    brightest: f64,
+}
+
+impl<'a> Reader<'a> {
+    fn new(extension: &'a str, columns: Option<&str>) -> Result<Reader<'a>, ReadError> {
+        let names = columns.map(parse_columns).transpose()?;
+        Ok(Reader { extension, names, header: None, width: 0, count: 0, lines: 0, brightest: 0.0 })
+    }
+
+    /// The numbers of the next lines.
+    fn rows(&mut self, bytes: &[u8]) -> Result<Vec<f64>, ReadError> {
+        let mut lines = Lines::new(bytes, 0, self.lines + 1);
+        let mut rows: Vec<f64> = Vec::new();
+        while let Some(line) = lines.next_line() {
+            self.lines = lines.number();
+            let place = Place::Line(self.lines);
+            let mut line = line.trim_ascii();
+            let comment = line.starts_with(b"#") || line.starts_with(b"//");
+            if comment {
+                line = line.trim_ascii_start().strip_prefix(b"//").unwrap_or(&line[1..]).trim_ascii();
+            }
+            let Row { words: found, decimal_comma } = split(line);
+            if found.is_empty() {
+                continue;
+            }
+            let numbers: Vec<Option<f64>> = found.iter().map(|w| real(w, decimal_comma)).collect();
+            if comment || numbers.iter().all(Option::is_none) {
+                // A line of words before the data names the columns.
+                if self.count == 0 && numbers.iter().all(Option::is_none) && found.len() >= 3 {
+                    let words: Vec<String> =
+                        found.iter().map(|w| String::from_utf8_lossy(w).to_ascii_lowercase()).collect();
+                    // A line of words that names no x may be a remark, unless it has as many words as there are columns.
+                    let names_x = words.iter().any(|n| canonical(n) == "x");
+                    if names_x || !comment && self.header.is_none() {
+                        self.header = Some((words, self.lines));
+                    }
+                    continue;
+                }
+                if comment || self.count == 0 {
+                    continue;
+                }
+            }
+            // PTS begins each scan with the number of its points.
+            let is_count = self.extension == "pts" || self.count == 0;
+            if found.len() == 1 && is_count && numbers[0].is_some_and(|n| n.fract() == 0.0) {
+                continue;
+            }
+            if self.width == 0 {
+                if let (None, Some((words, line))) = (&self.names, &self.header) {
+                    self.names = named(words, found.len(), *line)?;
+                }
+                if found.len() < 3 {
+                    let what = format!("a line has {} numbers, a point needs 3", found.len());
+                    return Err(ReadError::Syntax { what, place });
+                }
+                self.width = found.len();
+            }
+            if found.len() < self.width {
+                let what = format!("a line has {} numbers, those before have {}", found.len(), self.width);
+                return Err(ReadError::Syntax { what, place });
+            }
+            for k in 0..self.width {
+                let Some(x) = numbers[k] else {
+                    let what = format!("\"{}\" is not a number", shown(found[k]));
+                    return Err(ReadError::Syntax { what, place });
+                };
+                rows.push(x);
+            }
+            self.count += 1;
+        }
+        Ok(rows)
+    }
+
+    /// The points of rows, with colours as they are in the file.
+    fn cloud(&mut self, rows: &[f64]) -> Result<Cloud, ReadError> {
+        let names = self.names.get_or_insert_with(|| guess(rows, self.width, self.extension));
+        let (cloud, brightest) = assemble(rows, self.width, names)?;
+        self.brightest = self.brightest.max(brightest);
+        Ok(cloud)
+    }
 }
 
 /// The names of a header line over rows of `width` numbers; `None` if it is a remark.
@@ -233,7 +306,8 @@ fn guess(rows: &[f64], width: usize, extension: &str) -> Vec<String> {
     names
 }
 
-fn assemble(rows: &[f64], width: usize, count: usize, names: &[String]) -> Result<Cloud, ReadError> {
+/// The points of rows, with colours as they are, and the largest number of a colour.
+fn assemble(rows: &[f64], width: usize, names: &[String]) -> Result<(Cloud, f64), ReadError> {
     let find = |name: &str| names.iter().take(width).position(|n| canonical(n) == name);
     let (Some(x), Some(y), Some(z)) = (find("x"), find("y"), find("z")) else {
         return Err(ReadError::Header {
@@ -242,20 +316,18 @@ fn assemble(rows: &[f64], width: usize, count: usize, names: &[String]) -> Resul
             hint: "name them with --columns, for example xyzirgb",
         });
     };
-    let mut cloud = Cloud::new((0..count).map(|i| &rows[i * width..]).map(|r| DVec3::new(r[x], r[y], r[z])).collect());
+    let mut cloud = Cloud::new(rows.chunks(width).map(|r| DVec3::new(r[x], r[y], r[z])).collect());
     let mut used = vec![x, y, z];
+    let mut brightest: f64 = 0.0;
     let groups = [("normal", ["nx", "ny", "nz"]), ("color", ["red", "green", "blue"])];
     for (name, members) in groups {
         let found: Vec<usize> = members.iter().filter_map(|m| find(m)).collect();
         if found.len() == 3 {
-            let most = rows.chunks(width).flat_map(|r| found.iter().map(|&k| r[k])).fold(0.0, f64::max);
-            let scale = match name {
-                "color" if most > 255.0 => 1.0 / 65535.0,
-                "color" if most > 1.0 => 1.0 / 255.0,
-                _ => 1.0,
-            };
-            let values = rows.chunks(width).flat_map(|r| found.iter().map(|&k| (r[k] * scale) as f32)).collect();
-            cloud.attributes.push(column(name, 3, values));
+            let values = || rows.chunks(width).flat_map(|r| found.iter().map(|&k| r[k]));
+            if name == "color" {
+                brightest = values().fold(0.0, f64::max);
+            }
+            cloud.attributes.push(column(name, 3, values().map(|x| x as f32).collect()));
             used.extend(found);
         }
     }
@@ -265,7 +337,7 @@ fn assemble(rows: &[f64], width: usize, count: usize, names: &[String]) -> Resul
             cloud.attributes.push(column(canonical(name), 1, values));
         }
     }
-    Ok(cloud)
+    Ok((cloud, brightest))
 }
 
 /// Writes `x y z` and, if there are, normal, colour (0 to 255) and the single numbers, with a header line.
@@ -302,4 +374,31 @@ pub(super) fn write<W: Write>(out: &mut W, world: &[DVec3], cloud: &Cloud) -> Re
         writeln!(out)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_in_blocks_of_any_size_is_the_same_with_the_same_lines_in_its_errors() {
+        let text: String = (0..300).map(|k| format!("{k} {} 0.5 {} 7 9\r\n", 2 * k, k % 256)).collect();
+        let text = format!("# made by nobody\nx y z red green blue\n{text}");
+        let read = |text: &str, size: usize| {
+            let mut cloud = Cloud::default();
+            let ending = in_blocks(text.as_bytes(), Reader::new("xyz", None)?, size, &mut |piece| {
+                crate::scan::append(&mut cloud, piece);
+                Ok(())
+            })?;
+            Ok::<_, ReadError>((cloud, ending.scales))
+        };
+        let whole = read(&text, BLOCK).unwrap();
+        assert_eq!((whole.0.points.len(), &whole.1), (300, &vec![("color", 1.0 / 255.0)]));
+        for size in [7, 64, 1000] {
+            assert_eq!(read(&text, size).unwrap(), whole);
+        }
+        let wrong = text.replace("150 300 0.5 150 7 9", "150 300 0.5 x 7 9");
+        let told = |size: usize| read(&wrong, size).unwrap_err().to_string();
+        assert!(told(64) == told(BLOCK) && told(64).contains("line 153"), "{}", told(64));
+    }
 }

@@ -28,7 +28,7 @@ fn know(scan: &Cloud, observer: &dyn Observer) -> Result<Known, String> {
     let samples = cloud::clean(scan, &params, observer).map_err(|e| e.to_string())?;
     let all = ProjectParams { spacing: 0.0, outliers: true };
     let found = cloud::project(scan, &samples, params.outlier, &all, observer).map_err(|e| e.to_string())?;
-    Ok(Known { samples, cloud: found.cloud, outliers: found.outliers })
+    Ok(Known { samples, cloud: found.cloud, outliers: found.facts.outliers })
 }
 
 impl<'env> Table<'_, '_, 'env> {

@@ -19,12 +19,14 @@ mod local;
 mod orient;
 mod project;
 mod sites;
+mod stand;
 
 pub use blend::{Blend, Blended};
 pub use cells::Cell;
 pub use local::Quadric;
 pub use orient::Dipoles;
-pub use project::{Cleaned, ProjectParams, project};
+pub(crate) use project::{Brought, Gathered, PointScale};
+pub use project::{Cleaned, PointFacts, ProjectParams, project};
 
 use crate::geom::{Aabb, KdTree};
 use crate::linalg::eigen3;

@@ -1,11 +1,13 @@
 //! Every point moved onto the surface, with normal, curvature and flags; sharp lines of the samples.
 //!
 //! [X03] §8.1, eq. 5 and 6 (curvatures); `docs/methods/samples.md`, section 8. Outliers are flagged and not deleted. Sharp lines
-//! are made of the points beside a second sheet, moved to where both sheets meet, thinned and joined.
+//! are made of the points beside a second sheet, moved to where both sheets meet, thinned and joined. Points come as a whole or brick
+//! by brick ([`super::bricks::bring`]).
 
 use super::sites::cover;
-use super::{Blend, Cloud, CloudError, Samples};
-use crate::geom::{KdTree, is_positive};
+use super::stand::Stand;
+use super::{Blend, Cell, Cloud, CloudError, Samples};
+use crate::geom::{Aabb, KdTree, is_positive};
 use crate::mesh::Attribute;
 use crate::observe::Observer;
 use glam::DVec3;
@@ -43,10 +45,19 @@ pub struct Cleaned {
     /// Points on the surface, with `normal`, `curvature` (mean), `gauss`, `irregularity`, `noise`, `segment`, `feature`,
     /// `outlier`, `confidence`, and the attributes of the scan.
     pub cloud: Cloud,
-    /// Sharp lines.
-    pub lines: Vec<Vec<DVec3>>,
     /// For each point of the scan whether it is an outlier or no number.
     pub strays: Vec<bool>,
+    /// What is known of all points together.
+    pub facts: PointFacts,
+}
+
+/// What is known of the points of a scan on its surface.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PointFacts {
+    /// Points that were kept.
+    pub kept: usize,
+    /// Sharp lines.
+    pub lines: Vec<Vec<DVec3>>,
     /// Number of outliers among the points that are numbers.
     pub outliers: usize,
     /// Root of the mean squared distance of the points that are no outliers to the surface, world units.
@@ -78,90 +89,200 @@ pub fn project(
     params: &ProjectParams,
     observer: &dyn Observer,
 ) -> Result<Cleaned, CloudError> {
-    let centers: Vec<DVec3> = samples.samples.iter().map(|s| s.center).collect();
-    let tree = KdTree::new(&centers);
-    let blend = Blend::new(&samples.cells);
-    let finite: Vec<u32> = (0..cloud.points.len() as u32).filter(|&i| cloud.points[i as usize].is_finite()).collect();
-    let mut placed: Vec<Placed> = Vec::with_capacity(finite.len());
-    while placed.len() < finite.len() {
-        observer.check()?;
-        observer.progress(placed.len() as f64 / finite.len() as f64);
-        let range = placed.len()..(placed.len() + POINTS_PER_CHUNK).min(finite.len());
-        placed.par_extend(range.into_par_iter().map_init(Vec::new, |near, k| {
-            place(cloud.points[finite[k] as usize], samples, &tree, &blend, outlier, near)
-        }));
+    let stands = samples.samples.iter().map(Stand::of).collect();
+    let Samples { noise, spacing, diagonal, .. } = *samples;
+    let scale = PointScale { noise, spacing, diagonal, outlier };
+    let brought = Brought::new(cloud, stands, &samples.cells, &scale, observer)?;
+    let mut gathered = Gathered::new(spacing, params);
+    let Cleaned { cloud, strays, .. } = gathered.add(cloud, brought);
+    observer.progress(1.0);
+    Ok(Cleaned { cloud, strays, facts: gathered.finish() })
+}
+
+/// What points are measured by, world units.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PointScale {
+    /// As of [`Samples`].
+    pub noise: f64,
+    pub spacing: f64,
+    pub diagonal: f64,
+    /// Residual in noise levels from which a point is an outlier.
+    pub outlier: f64,
+}
+
+/// Points brought to the surface: all of a scan, or those of a brick.
+pub(crate) struct Brought {
+    /// Those that are numbers, as indices.
+    finite: Vec<u32>,
+    /// Of each of these its place.
+    placed: Vec<Placed>,
+    stands: Vec<Stand>,
+}
+
+impl Brought {
+    /// Brings points to the surface.
+    /// * `stands`, `cells` - all that reach them
+    /// # Errors
+    /// [`CloudError::Cancelled`].
+    pub(super) fn new(
+        cloud: &Cloud,
+        stands: Vec<Stand>,
+        cells: &[Cell],
+        scale: &PointScale,
+        observer: &dyn Observer,
+    ) -> Result<Brought, CloudError> {
+        let finite: Vec<u32> =
+            (0..cloud.points.len() as u32).filter(|&i| cloud.points[i as usize].is_finite()).collect();
+        let mut placed: Vec<Placed> = Vec::with_capacity(finite.len());
+        if stands.is_empty() {
+            placed
+                .extend(finite.iter().map(|&i| Placed::stray(cloud.points[i as usize], DVec3::ZERO, 0, f64::INFINITY)));
+            return Ok(Brought { finite, placed, stands });
+        }
+        let tree = KdTree::new(&stands.iter().map(|s| s.center).collect::<Vec<_>>());
+        let blend = Blend::new(cells);
+        while placed.len() < finite.len() {
+            observer.check()?;
+            observer.progress(placed.len() as f64 / finite.len() as f64);
+            let range = placed.len()..(placed.len() + POINTS_PER_CHUNK).min(finite.len());
+            placed.par_extend(range.into_par_iter().map_init(Vec::new, |near, k| {
+                place(cloud.points[finite[k] as usize], (&stands, &tree), &blend, scale, near)
+            }));
+        }
+        Ok(Brought { finite, placed, stands })
     }
-    let outliers = placed.iter().filter(|p| p.outlier).count();
-    let inner = (placed.len() - outliers).max(1) as f64;
-    let moved_rms = (placed.iter().filter(|p| !p.outlier).map(|p| p.moved * p.moved).sum::<f64>() / inner).sqrt();
-    let mut strays = vec![true; cloud.points.len()];
-    placed.iter().zip(&finite).for_each(|(p, &i)| strays[i as usize] = p.outlier);
-    let lines = feature_lines(&placed, LINE_SPACING * samples.spacing);
-    let thinned = params.spacing > 0.0;
-    let mut kept: Vec<u32> =
-        (0..placed.len() as u32).filter(|&k| !placed[k as usize].outlier || (params.outliers && !thinned)).collect();
-    if thinned {
-        let points: Vec<DVec3> = kept.iter().map(|&k| placed[k as usize].at).collect();
-        let order = KdTree::new(&points);
+}
+
+/// The points of a scan on their way to be one cloud, piece by piece.
+pub(crate) struct Gathered<'a> {
+    params: &'a ProjectParams,
+    /// Distance of points of sharp lines, world units.
+    gap: f64,
+    edges: Vec<DVec3>,
+    /// Points that were kept so far, where they are thinned.
+    thinned: Vec<DVec3>,
+    kept: usize,
+    outliers: usize,
+    /// Number of the others, and sum of their squared distances to the surface.
+    inner: usize,
+    moved: f64,
+}
+
+impl<'a> Gathered<'a> {
+    /// Nothing yet.
+    /// * `spacing` - of the points
+    pub fn new(spacing: f64, params: &'a ProjectParams) -> Gathered<'a> {
+        let (edges, thinned) = (Vec::new(), Vec::new());
+        Gathered { params, gap: LINE_SPACING * spacing, edges, thinned, kept: 0, outliers: 0, inner: 0, moved: 0.0 }
+    }
+
+    /// Adds a piece: its points as they are kept, and which of them are strays; without facts.
+    pub fn add(&mut self, cloud: &Cloud, piece: Brought) -> Cleaned {
+        let Brought { finite, placed, stands } = piece;
+        let inner = placed.iter().filter(|p| !p.outlier);
+        self.moved += inner.clone().map(|p| p.moved * p.moved).sum::<f64>();
+        let count = inner.count();
+        self.inner += count;
+        self.outliers += placed.len() - count;
+        self.edges.extend(placed.iter().filter_map(|p| p.edge));
+        let mut strays = vec![true; cloud.points.len()];
+        placed.iter().zip(&finite).for_each(|(p, &i)| strays[i as usize] = p.outlier);
+        let kept = self.chosen(&placed);
+        self.kept += kept.len();
+        let mut result = cloud.select(&kept.iter().map(|&k| finite[k as usize]).collect::<Vec<_>>());
+        result.points = kept.iter().map(|&k| placed[k as usize].at).collect();
+        describe(&mut result, &kept.iter().map(|&k| &placed[k as usize]).collect::<Vec<_>>(), &stands);
+        Cleaned { cloud: result, strays, facts: PointFacts::default() }
+    }
+
+    /// The points that are kept.
+    fn chosen(&mut self, placed: &[Placed]) -> Vec<u32> {
+        let spacing = self.params.spacing;
+        if spacing <= 0.0 {
+            let stays = |k: &u32| !placed[*k as usize].outlier || self.params.outliers;
+            return (0..placed.len() as u32).filter(stays).collect();
+        }
+        let mut kept: Vec<u32> = (0..placed.len() as u32).filter(|&k| !placed[k as usize].outlier).collect();
+        let at = |k: &u32| placed[*k as usize].at;
+        let mut reach = Aabb::of(&kept.iter().map(at).collect::<Vec<_>>());
+        reach = Aabb { min: reach.min - spacing, max: reach.max + spacing };
+        let before: Vec<DVec3> = self.thinned.iter().copied().filter(|p| reach.contains(*p)).collect();
+        if !before.is_empty() {
+            let (tree, mut near) = (KdTree::new(&before), Vec::new());
+            kept.retain(|k| {
+                tree.nearest_within(at(k), 1, spacing, &mut near);
+                near.is_empty()
+            });
+        }
+        let order = KdTree::new(&kept.iter().map(at).collect::<Vec<_>>());
         let sorted: Vec<u32> = order.order().iter().map(|&k| kept[k as usize]).collect();
-        let points: Vec<DVec3> = sorted.iter().map(|&k| placed[k as usize].at).collect();
-        kept =
-            cover(&points, &KdTree::new(&points), |_| params.spacing).into_iter().map(|i| sorted[i as usize]).collect();
+        let points: Vec<DVec3> = sorted.iter().map(at).collect();
+        let chosen = cover(&points, &KdTree::new(&points), |_| spacing);
+        self.thinned.extend(chosen.iter().map(|&i| points[i as usize]));
+        chosen.into_iter().map(|i| sorted[i as usize]).collect()
     }
-    let ids: Vec<u32> = kept.iter().map(|&k| finite[k as usize]).collect();
-    let mut result = cloud.select(&ids);
-    result.points = kept.iter().map(|&k| placed[k as usize].at).collect();
-    result.attributes.retain(|a| a.name != "normal");
+
+    /// What is known of all points.
+    pub fn finish(self) -> PointFacts {
+        PointFacts {
+            kept: self.kept,
+            lines: feature_lines(&self.edges, self.gap),
+            outliers: self.outliers,
+            moved_rms: (self.moved / self.inner.max(1) as f64).sqrt(),
+        }
+    }
+}
+
+/// Gives the points of a cloud what is known of their places, before their own attributes.
+fn describe(cloud: &mut Cloud, placed: &[&Placed], stands: &[Stand]) {
     let column = |name: &str, of: &dyn Fn(&Placed) -> f64| Attribute {
         name: name.into(),
         width: 1,
-        values: kept.iter().map(|&k| of(&placed[k as usize]) as f32).collect(),
+        values: placed.iter().map(|p| of(p) as f32).collect(),
     };
-    let sample = |p: &Placed| &samples.samples[p.sample as usize];
+    let known = |name: &str, of: &dyn Fn(&Stand) -> f64| {
+        // Where there are no samples at all nothing is known.
+        column(name, &|p| stands.get(p.sample as usize).map_or(0.0, of))
+    };
     let normal = Attribute {
         name: "normal".into(),
         width: 3,
-        values: kept.iter().flat_map(|&k| placed[k as usize].normal.to_array().map(|x| x as f32)).collect(),
+        values: placed.iter().flat_map(|p| p.normal.to_array().map(|x| x as f32)).collect(),
     };
     let mut attributes = vec![
         normal,
         column("curvature", &|p| p.mean),
         column("gauss", &|p| p.gauss),
-        column("irregularity", &|p| sample(p).irregularity),
-        column("noise", &|p| sample(p).noise),
-        column("segment", &|p| sample(p).segment as f64),
+        known("irregularity", &|s| s.irregularity),
+        known("noise", &|s| s.noise),
+        known("segment", &|s| f64::from(s.segment)),
         column("feature", &|p| f64::from(u8::from(p.edge.is_some()))),
         column("outlier", &|p| f64::from(u8::from(p.outlier))),
-        column("confidence", &|p| sample(p).confidence),
+        known("confidence", &|s| s.confidence),
     ];
     let named = |name: &str| attributes.iter().any(|a| a.name == name);
-    let own: Vec<Attribute> = result.attributes.drain(..).filter(|a| !named(&a.name)).collect();
+    let own: Vec<Attribute> = cloud.attributes.drain(..).filter(|a| !named(&a.name)).collect();
     attributes.extend(own);
-    result.attributes = attributes;
-    observer.progress(1.0);
-    Ok(Cleaned { cloud: result, lines, strays, outliers, moved_rms })
+    cloud.attributes = attributes;
+}
+
+impl Placed {
+    /// A point that is not of the surface.
+    fn stray(p: DVec3, normal: DVec3, sample: u32, moved: f64) -> Placed {
+        Placed { at: p, normal, sample, moved, mean: 0.0, gauss: 0.0, edge: None, outlier: true }
+    }
 }
 
 fn place(
     p: DVec3,
-    samples: &Samples,
-    tree: &KdTree,
+    (stands, tree): (&[Stand], &KdTree),
     blend: &Blend,
-    outlier: f64,
+    scale: &PointScale,
     near: &mut Vec<(f64, u32)>,
 ) -> Placed {
     tree.nearest(p, SAMPLES_PER_POINT, near);
     let first = near.first().map_or(0, |n| n.1);
-    let stray = |moved: f64| Placed {
-        at: p,
-        normal: samples.samples[first as usize].normal,
-        sample: first,
-        moved,
-        mean: 0.0,
-        gauss: 0.0,
-        edge: None,
-        outlier: true,
-    };
+    let stray = |moved: f64| Placed::stray(p, stands[first as usize].normal, first, moved);
     // Down the gradient to the surface; the blend is no exact distance, so more than once.
     let mut at = p;
     let mut here = None;
@@ -170,7 +291,7 @@ fn place(
         let normal = blend.normal(at, &b);
         at -= b.value * normal;
         here = Some((b, normal));
-        if b.value.abs() < 1e-9 * samples.diagonal {
+        if b.value.abs() < 1e-9 * scale.diagonal {
             break;
         }
     }
@@ -178,13 +299,13 @@ fn place(
     // The sample that stands for the point: near, and of its side.
     let sample = near
         .iter()
-        .find(|n| samples.samples[n.1 as usize].normal.dot(normal) > SHARP_DEG.to_radians().cos())
+        .find(|n| stands[n.1 as usize].normal.dot(normal) > SHARP_DEG.to_radians().cos())
         .map_or(first, |n| n.1);
-    let s = &samples.samples[sample as usize];
+    let s = &stands[sample as usize];
     let moved = at.distance(p);
-    let noise = s.noise.max(samples.noise);
-    let off = near.first().is_none_or(|n| n.0.sqrt() > s.support + outlier * noise);
-    if moved > outlier * noise.max(1e-9 * s.radius) || off || !at.is_finite() {
+    let noise = s.noise.max(scale.noise);
+    let off = near.first().is_none_or(|n| n.0.sqrt() > s.support + scale.outlier * noise);
+    if moved > scale.outlier * noise.max(1e-9 * s.radius) || off || !at.is_finite() {
         return stray(moved);
     }
     // The sheets of the heaviest cell: the one here tells the curvature, another close by an edge.
@@ -202,7 +323,7 @@ fn place(
             .iter()
             .filter(|q| {
                 let (d, n) = q.distance(at);
-                n.dot(normal) < SHARP_DEG.to_radians().cos() && d.abs() < FEATURE_NOISE * noise + samples.spacing
+                n.dot(normal) < SHARP_DEG.to_radians().cos() && d.abs() < FEATURE_NOISE * noise + scale.spacing
             })
             .find_map(|q| meet(*own, *q, at));
     }
@@ -227,12 +348,11 @@ fn meet(a: super::Quadric, b: super::Quadric, p: DVec3) -> Option<DVec3> {
 }
 
 /// Joins thinned feature points: every point to the nearest one on each of two sides.
-fn feature_lines(placed: &[Placed], gap: f64) -> Vec<Vec<DVec3>> {
-    let all: Vec<DVec3> = placed.iter().filter_map(|p| p.edge).collect();
+fn feature_lines(all: &[DVec3], gap: f64) -> Vec<Vec<DVec3>> {
     if all.len() < 2 || !is_positive(gap) {
         return Vec::new();
     }
-    let tree = KdTree::new(&all);
+    let tree = KdTree::new(all);
     let sorted: Vec<DVec3> = tree.order().iter().map(|&i| all[i as usize]).collect();
     let sorted_tree = KdTree::new(&sorted);
     let points: Vec<DVec3> = cover(&sorted, &sorted_tree, |_| gap).into_iter().map(|i| sorted[i as usize]).collect();

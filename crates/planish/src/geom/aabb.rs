@@ -36,6 +36,11 @@ impl Aabb {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
+    /// Is a point in the box, or on its border?
+    pub fn contains(&self, p: DVec3) -> bool {
+        p.cmpge(self.min).all() && p.cmple(self.max).all()
+    }
+
     /// Midpoint of the box.
     pub fn center(&self) -> DVec3 {
         (self.min + self.max) / 2.0

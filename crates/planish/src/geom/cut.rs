@@ -26,7 +26,8 @@ pub struct Cut {
 impl Cut {
     /// So many nodes without costs.
     pub fn new(nodes: usize) -> Cut {
-        Cut { arcs: Vec::new(), first: vec![NONE; nodes + 2], excess: vec![0; nodes] }
+        // Room for a side and three links of each.
+        Cut { arcs: Vec::with_capacity(8 * nodes), first: vec![NONE; nodes + 2], excess: vec![0; nodes] }
     }
 
     /// Adds the costs of a node on the first side and on the second one.

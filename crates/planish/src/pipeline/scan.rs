@@ -4,7 +4,7 @@
 
 use super::record::Figure;
 use super::{Fitted, PipelineParams, Quality, Warning};
-use crate::cloud::{self, CleanParams, Cleaned, Cloud, CloudError, ProjectParams, Samples};
+use crate::cloud::{self, CleanParams, Cloud, CloudError, PointFacts, ProjectParams, Samples};
 use crate::contour::{self, ContourParams, Meshed, MeshingError, Sampling};
 use crate::field::{SampleField, Spacing};
 use crate::geom::Bvh;
@@ -355,7 +355,7 @@ pub fn scan_figures(made: &ScanMeshed, quality: &mut Quality, warnings: &mut Vec
 
 /// The figures and warnings of a scan in a run, among those of its model.
 /// * `diagonal` - of the mesh
-pub(super) fn run_figures(made: &ScanMeshed, points: &Cleaned, diagonal: f64, fitted: &mut Fitted) {
+pub(super) fn run_figures(made: &ScanMeshed, points: &PointFacts, diagonal: f64, fitted: &mut Fitted) {
     let mut found = Quality::new();
     scan_figures(made, &mut found, &mut fitted.warnings);
     found.insert("scan.outliers".into(), Figure::Count(points.outliers as u64));

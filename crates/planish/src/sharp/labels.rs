@@ -16,7 +16,7 @@ use crate::geom::cut::Cut;
 use crate::mesh::NONE;
 use crate::observe::{Cancelled, Observer};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
 /// Beyond three usual deviations a face says only that it does not belong.
 const MOST_SQUARED: f64 = 9.0;
@@ -80,13 +80,19 @@ impl Labels {
             cell: scale.cell,
         };
         labels.fit(&energy);
+        let mut band = Band { faces: Vec::new(), place: vec![NONE; labels.of.len()] };
         for _ in 0..LABEL_ROUNDS {
             energy.measure(&labels);
+            let mut stays: Vec<i64> = (0..labels.of.len() as u32)
+                .into_par_iter()
+                .map(|f| energy.cost(f, labels.sheets[labels.of[f as usize] as usize].as_ref()))
+                .collect();
             let mut changed = 0;
             // A label gets faces in its own turn alone, so that those it had before the round are all.
             for (label, faces) in labels.faces().into_iter().enumerate() {
                 observer.check()?;
-                changed += energy.expand(&mut labels, label as u32, &faces);
+                band.fill(&energy, &labels, label as u32, &faces);
+                changed += energy.expand(&mut labels, label as u32, &band, &mut stays);
             }
             labels.fit(&energy);
             if changed == 0 {
@@ -142,8 +148,10 @@ impl Energy<'_> {
         (0..2).map(|k| (off[k] / self.usual[k]).powi(2).min(MOST_SQUARED) / 2.0).sum()
     }
 
-    fn cost(&self, f: u32, sheet: &Surface) -> i64 {
-        (NAT_STEPS * self.points[f as usize] * self.misfit(f, sheet)).round() as i64
+    /// The same for all of its points, in steps; without a sheet more than with any.
+    fn cost(&self, f: u32, sheet: Option<&Surface>) -> i64 {
+        let of = |sheet| (NAT_STEPS * self.points[f as usize] * self.misfit(f, sheet)).round() as i64;
+        sheet.map_or(i64::MAX / 1_000_000, of)
     }
 
     fn price(&self, h: u32) -> i64 {
@@ -171,70 +179,83 @@ impl Energy<'_> {
     }
 
     /// Lets a label take the faces around it that it wants; returns how many it took.
-    /// * `faces` - those that it has, and others
-    fn expand(&self, labels: &mut Labels, label: u32, faces: &[u32]) -> usize {
-        let Some(sheet) = labels.sheets[label as usize].clone() else { return 0 };
-        let band = self.band(labels, label, faces);
-        if band.is_empty() {
+    /// * `band` - those faces; `stays` - what each face costs with the sheet that it has
+    fn expand(&self, labels: &mut Labels, label: u32, band: &Band, stays: &mut [i64]) -> usize {
+        let sheet = labels.sheets[label as usize].as_ref();
+        if sheet.is_none() || band.faces.is_empty() {
             return 0;
         }
-        let name = |f: u32| band.binary_search(&f).ok().map(|i| i as u32);
-        let mut cut = Cut::new(band.len());
-        for (i, &f) in band.iter().enumerate() {
+        let goes: Vec<i64> = band.faces.iter().map(|&f| self.cost(f, sheet)).collect();
+        let mut cut = Cut::new(band.faces.len());
+        for ((i, &f), goes) in (0..).zip(&band.faces).zip(&goes) {
             let own = labels.of[f as usize];
-            let stays = labels.sheets[own as usize].as_ref().map_or(i64::MAX / 1_000_000, |s| self.cost(f, s));
-            cut.sides(i as u32, stays, self.cost(f, &sheet));
+            cut.sides(i, stays[f as usize], *goes);
             for h in 3 * f..3 * f + 3 {
                 let o = self.lines.adjacency.opposite[h as usize];
                 if o == NONE {
                     continue;
                 }
                 let (other, price) = (labels.of[o as usize / 3], self.price(h));
-                match name(o / 3) {
+                match band.place[o as usize / 3] {
+                    NONE if other == label => cut.sides(i, price, 0),
+                    NONE if other == own => cut.sides(i, 0, price),
+                    NONE => {}
                     // Each edge once.
-                    Some(j) if h < o && other == own => cut.link(i as u32, j, price, price),
-                    Some(j) if h < o => {
+                    j if h < o && other == own => cut.link(i, j, price, price),
+                    j if h < o => {
                         cut.sides(j, price, 0);
-                        cut.link(i as u32, j, price, 0);
+                        cut.link(i, j, price, 0);
                     }
-                    Some(_) => {}
-                    None if other == label => cut.sides(i as u32, price, 0),
-                    None if other == own => cut.sides(i as u32, 0, price),
-                    None => {}
+                    _ => {}
                 }
             }
         }
         let takes = cut.least();
-        let taken = band.iter().zip(takes).filter(|x| x.1);
         let mut count = 0;
-        for (&f, _) in taken {
+        for ((&f, goes), _) in band.faces.iter().zip(goes).zip(takes).filter(|x| x.1) {
             labels.of[f as usize] = label;
+            stays[f as usize] = goes;
             count += 1;
         }
         count
     }
+}
 
-    /// The faces of other labels near those of a label, ascending.
-    fn band(&self, labels: &Labels, label: u32, faces: &[u32]) -> Vec<u32> {
-        let opposite = &self.lines.adjacency.opposite;
-        let reach = REACH_CELLS * self.cell;
-        let mut from: BTreeMap<u32, u32> = BTreeMap::new();
-        let mut queue = VecDeque::new();
-        for &f in faces.iter().filter(|&&f| labels.of[f as usize] == label) {
-            queue.push_back((f, f));
+/// The faces of other labels near those of a label.
+struct Band {
+    /// Ascending.
+    faces: Vec<u32>,
+    /// For each face of the mesh its place among these, or [`NONE`].
+    place: Vec<u32>,
+}
+
+impl Band {
+    /// Takes the faces near those of another label.
+    /// * `faces` - those that it has, and others
+    fn fill(&mut self, energy: &Energy, labels: &Labels, label: u32, faces: &[u32]) {
+        let Band { faces: found, place } = self;
+        found.drain(..).for_each(|f| place[f as usize] = NONE);
+        if labels.sheets[label as usize].is_none() {
+            return;
         }
+        let Lines { adjacency, centers, .. } = energy.lines;
+        let reach = REACH_CELLS * energy.cell;
+        let own = faces.iter().filter(|&&f| labels.of[f as usize] == label);
+        let mut queue: VecDeque<(u32, u32)> = own.map(|&f| (f, f)).collect();
         while let Some((f, source)) = queue.pop_front() {
             for h in 3 * f..3 * f + 3 {
-                let o = opposite[h as usize];
-                if o == NONE || labels.of[o as usize / 3] == label || from.contains_key(&(o / 3)) {
+                let o = adjacency.opposite[h as usize];
+                if o == NONE || labels.of[o as usize / 3] == label || place[o as usize / 3] != NONE {
                     continue;
                 }
-                if self.lines.centers[o as usize / 3].distance(self.lines.centers[source as usize]) < reach {
-                    from.insert(o / 3, source);
+                if centers[o as usize / 3].distance(centers[source as usize]) < reach {
+                    place[o as usize / 3] = source;
+                    found.push(o / 3);
                     queue.push_back((o / 3, source));
                 }
             }
         }
-        from.into_keys().collect()
+        found.sort_unstable();
+        found.iter().zip(0..).for_each(|(&f, k)| place[f as usize] = k);
     }
 }

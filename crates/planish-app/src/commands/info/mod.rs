@@ -126,7 +126,10 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
 fn scan_info(session: &Session, args: &Info) -> Result<Report, Failure> {
     let file = &args.files[0];
     let (scan, read) = session.step("read", || files::scan(file, &ScanArgs::default()))?;
-    let mut report = Report::new("info", super::clean::scan_facts(file, &scan, session.units_of(file)));
+    let mut report = Report::new(
+        "info",
+        super::clean::scan_facts(file, (scan.points.len() as u64, scan.bounds().diagonal()), session.units_of(file)),
+    );
     report.stages.push(read);
     let lost = scan.points.iter().filter(|p| !p.is_finite()).count();
     let mut places: Vec<[u64; 3]> =

@@ -9,13 +9,12 @@ pub use smooth::smooth;
 use super::{Session, commit_report, write_failure};
 use crate::args::Mesh;
 use crate::failure::{Failure, Status};
-use crate::files;
+use crate::files::{self, Scan};
 use crate::placed::{self, Placed};
-use crate::products::{self, Staged};
+use crate::products::Staged;
 use crate::progress;
 use crate::summary::Summary;
 use crate::tolerance::Scale;
-use planish::DVec3;
 use planish::cloud::bricks::StoreError;
 use planish::cloud::{self, CloudError};
 use planish::contour::{self, Meshed, MeshingError, Sampling};
@@ -24,22 +23,21 @@ use planish::geom::Aabb;
 use planish::mesh::{TriMesh, diagnose};
 use planish::model::Units;
 use planish::pipeline::{self, Figure, ScanError, ScanMeshed, ScanParams, StageRecord, Warning};
+use planish::{DVec3, Observer};
 use planish_io::report::{Input, Report, count, number};
 use planish_io::script::Script;
-use planish_io::{BrickFolder, MeshFormat, TilesError, WriteOptions};
+use planish_io::{MeshFormat, TilesError, WriteOptions};
 use std::path::Path;
 
 /// Cells along the longest side unless the user says.
 const RESOLUTION: usize = 129;
 /// What is to be meshed.
 enum Source {
-    /// With what to tell of points that are not of it.
-    Scan(planish::cloud::Cloud, Option<Warning>),
-    /// A large one, with the room that its bricks lie in while they are worked.
-    Bricks {
-        bricks: BrickFolder,
+    /// With what to tell of points that are not of it, and the room that its bricks lie in while they are worked.
+    Scan {
+        scan: Scan,
         far_off: Option<Warning>,
-        _room: Staged,
+        _room: Option<Staged>,
     },
     Mesh(Placed),
     Script(Script),
@@ -50,8 +48,7 @@ impl Source {
     /// What brings the coordinates back to their place.
     fn shift(&self) -> DVec3 {
         match self {
-            Source::Scan(scan, _) => scan.shift,
-            Source::Bricks { bricks, .. } => bricks.shift(),
+            Source::Scan { scan, .. } => scan.shift(),
             Source::Mesh(placed) => placed.shift,
             Source::Script(_) | Source::Grid(_) => DVec3::ZERO,
         }
@@ -66,9 +63,9 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
     let params = args.meshing.params()?;
     let grid_params = args.volume.params(None)?;
-    let ((source, input, units), read) = session.step("read", || read(session, args, params.cells))?;
+    let ((source, input, units), read) = session.watched("read", |o| read(session, args, params.cells, o))?;
     match &source {
-        Source::Scan(..) | Source::Bricks { .. } => {}
+        Source::Scan { .. } => {}
         Source::Grid(_) => {
             args.meshing.refuse_cleaning("--volume-close tells whether the border of a volume closes the surface")?
         }
@@ -86,8 +83,10 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let plain = |made: Meshed| Made::Plain(Box::new(made));
     let (made, record) = session.bars.step("mesh", |o| {
         Ok::<Made, Trouble>(match &source {
-            Source::Scan(scan, _) => Made::OfScan(Box::new(pipeline::mesh_scan(scan, &params, o)?)),
-            Source::Bricks { bricks, .. } => Made::OfScan(Box::new(pipeline::mesh_bricks(bricks, &params, o)?)),
+            Source::Scan { scan, .. } => Made::OfScan(Box::new(match scan {
+                Scan::Whole(cloud) => pipeline::mesh_scan(cloud, &params, o)?,
+                Scan::Bricks(bricks) => pipeline::mesh_bricks(bricks, &params, o)?,
+            })),
             Source::Mesh(placed) => plain(contour::from_mesh(&placed.mesh, sampling, contour, o)?),
             Source::Script(Script::Part(part)) => plain(contour::from_part(part, sampling, contour, o)?),
             Source::Script(Script::Job(milling)) => plain(contour::from_field(milling, sampling, contour, o)?),
@@ -109,28 +108,29 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     let shift = source.shift();
     let options = WriteOptions { units, ..WriteOptions::default() };
     let mut tiles = None;
-    let (moved, write) = session.step("write", || match args.tiles {
+    let (moved, write) = session.watched("write", |o| match args.tiles {
         None => placed::write(&staged.file_path(), mesh, tags, shift, &options)
             .map_err(|e| write_failure(&args.input, &args.output, e)),
         Some(side) => {
             let size = side.length(Scale { diagonal: mesh.bounds().diagonal(), units });
-            let written = planish_io::write_tiles(&staged.path(""), mesh, tags, (size, shift), &options);
+            let written = planish_io::write_tiles(&staged.path(""), mesh, tags, (size, shift), &options, o);
             tiles = Some(written.map_err(|e| match e {
                 TilesError::Tile(e) => Failure::usage("--tiles", e.to_string()),
+                TilesError::Cancelled(_) => Failure::interrupted(),
                 TilesError::Write(e) => write_failure(&args.input, &args.output, e),
             })?);
             Ok(None)
         }
     })?;
     let mut report = Report::new("mesh", input);
-    if let Source::Mesh(_) | Source::Scan(..) | Source::Bricks { .. } = &source {
+    if let Source::Mesh(_) | Source::Scan { .. } = &source {
         let far = shift != DVec3::ZERO;
         report.warnings.extend(session.guessed_units(&args.input, report.input.diagonal, far));
     }
     if let Source::Mesh(placed) = &source {
         report.warnings.extend(placed.warning(units.symbol()));
     }
-    if let Source::Scan(_, far_off) | Source::Bricks { far_off, .. } = &source {
+    if let Source::Scan { far_off, .. } = &source {
         report.warnings.extend(far_off.clone());
     }
     report.warnings.extend(moved);
@@ -191,11 +191,11 @@ fn volume(session: &Session, args: &Mesh, from: Sampled, params: &ScanParams) ->
                 let body = MeshBody::new(placed.mesh).map_err(|e| Trouble::Meshing(e.into()))?;
                 sampled(&Part::Mesh(Box::new(body)), usual)?
             }
-            Source::Bricks { .. } => {
+            Source::Scan { scan: Scan::Bricks(_), .. } => {
                 let what = "a volume is made of a scan in one piece".into();
                 return Err(Trouble::Scan(CloudError::Store(StoreError(what)).into()));
             }
-            Source::Scan(scan, _) => {
+            Source::Scan { scan: Scan::Whole(scan), .. } => {
                 let samples = cloud::clean(&scan, &params.clean, o).map_err(|e| Trouble::Scan(e.into()))?;
                 sampled(&pipeline::field_of(&samples, params).0, Spacing::Voxel(pipeline::voxel_for(&samples)))?
             }
@@ -256,7 +256,12 @@ impl From<ScanError> for Trouble {
 }
 
 /// Reads whatever the input is, by its extension.
-fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Source, Input, Units), Failure> {
+fn read(
+    session: &Session,
+    args: &Mesh,
+    cells: Option<Spacing>,
+    observer: &dyn Observer,
+) -> Result<(Source, Input, Units), Failure> {
     let path = &args.input;
     if let Some(bounds) = &args.bounds {
         return formula(session, path, bounds);
@@ -307,21 +312,13 @@ fn read(session: &Session, args: &Mesh, cells: Option<Spacing>) -> Result<(Sourc
         };
         return Ok((Source::Grid(Box::new(grid)), input, units));
     }
-    let large = planish_io::points_told(path).is_some_and(|n| n > pipeline::BRICK_POINTS as u64);
-    if planish_io::is_scan(path) && large && !is_volume(args) {
-        let room = staged(args)?;
-        let folder = room.path("bricks");
-        std::fs::create_dir(&folder).map_err(|e| products::unwritable(&folder, &e))?;
-        let (bricks, far_off) = files::scan_in_bricks(path, &args.scan, &folder)?;
-        let units = session.units_of(path);
-        let input = super::clean::points_facts(path, (bricks.points(), bricks.bounds().diagonal()), units);
-        return Ok((Source::Bricks { bricks, far_off, _room: room }, input, units));
-    }
     if planish_io::is_scan(path) {
-        let (scan, far_off) = files::scan_body(path, &args.scan)?;
+        // A volume is made in one piece.
+        let room = if is_volume(args) { None } else { Some(staged(args)?) };
+        let (scan, far_off) = Scan::read(path, &args.scan, room.as_ref(), observer)?;
         let units = session.units_of(path);
-        let input = super::clean::scan_facts(path, &scan, units);
-        return Ok((Source::Scan(scan, far_off), input, units));
+        let input = super::clean::scan_facts(path, scan.size(), units);
+        return Ok((Source::Scan { scan, far_off, _room: room }, input, units));
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     if !files::is_model(path) && MeshFormat::ALL.iter().all(|f| f.extension() != extension) {

@@ -5,6 +5,7 @@
 //!    the halo is the neighbour's
 //! 3. [`Sides`]: bricks see the same surface in their halos, so these tell how the pieces of one are turned against those of the
 //!    next; then bodies have their outside as in one piece
+//! 4. [`bring`]: the points of a brick on the surface of the samples of all around
 //!
 //! Points and samples lie in a [`BrickStore`]: in memory, or in files.
 //!
@@ -16,10 +17,11 @@ mod store;
 
 pub use partition::{Brick, Partition};
 pub use sides::Sides;
-pub use store::{BrickStore, CloudStore, StoreError, points_of};
+pub use store::{BrickStore, CloudStore, StoreError, bounds_of, points_of};
 
 use super::local::nest::MOST_NESTED;
-use super::{Cell, CleanParams, Cloud, CloudError, FEWEST_POINTS, Quadric, Samples, clean};
+use super::stand::Stand;
+use super::{Brought, Cell, CleanParams, Cloud, CloudError, FEWEST_POINTS, PointScale, Quadric, Samples, clean};
 use crate::geom::{Aabb, KdTree};
 use crate::observe::{Observer, Part};
 use glam::DVec3;
@@ -61,19 +63,6 @@ pub fn halo(store: &dyn BrickStore, params: &CleanParams, observer: &dyn Observe
         Some(e) if widest == 0.0 => Err(e),
         _ => Ok(HALO_SUPPORTS * widest),
     }
-}
-
-/// A sample as its neighbours in other bricks see it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Stand {
-    center: DVec3,
-    normal: DVec3,
-    area: f64,
-    radius: f64,
-    /// Part of a plate or a gap that was found as such.
-    plate: bool,
-    /// Body of the brick that it belongs to.
-    piece: u32,
 }
 
 /// A cell without the room for sheets that it has not.
@@ -127,7 +116,7 @@ impl BrickStands {
     /// Centre, and outward normal times area, of the samples in the brick.
     /// * `signs` - as of [`BrickCells::reaching`]
     pub fn dipoles(&self, signs: &[f64]) -> impl Iterator<Item = (DVec3, DVec3)> {
-        self.own.iter().map(|s| (s.center, signs[s.piece as usize] * s.area * s.normal))
+        self.own.iter().map(|s| (s.center, signs[s.segment as usize] * s.area * s.normal))
     }
 }
 
@@ -198,14 +187,7 @@ impl BrickSamples {
         let mut stands = BrickStands::default();
         let mut confidence = 0.0;
         for s in &samples.samples {
-            let stand = Stand {
-                center: s.center,
-                normal: s.normal,
-                area: s.area,
-                radius: s.radius,
-                plate: s.plate,
-                piece: s.segment,
-            };
+            let stand = Stand::of(s);
             if brick.holds(s.center) {
                 stands.own.push(stand);
                 confidence += s.confidence;
@@ -238,6 +220,34 @@ impl BrickSamples {
         };
         BrickSamples { facts, stands, cells: kept }
     }
+}
+
+/// Brings the points of a brick to the surface of the samples of all bricks around.
+/// * `halo` - as of [`halo`]
+/// # Errors
+/// [`CloudError`] if cancelled, or if points or samples cannot be read.
+pub(crate) fn bring(
+    store: &dyn BrickStore,
+    brick: usize,
+    (sides, halo): (&Sides, f64),
+    scale: &PointScale,
+    observer: &dyn Observer,
+) -> Result<(Cloud, Brought), CloudError> {
+    let cloud = store.points_in(brick)?;
+    let Aabb { min, max } = store.bricks()[brick].bounds;
+    let around = Aabb { min: min - halo, max: max + halo };
+    let (mut stands, mut cells) = (Vec::new(), Vec::new());
+    for k in 0..store.bricks().len() {
+        let facts = store.facts(k)?;
+        if facts.samples > 0 && facts.bounds.meets(&around) {
+            stands.extend(sides.turned(k, &store.stands(k)?.own).filter(|s| around.contains(s.center)));
+        }
+        if store.bricks()[k].reach(facts.widest).meets(&around) {
+            store.cells(k)?.reaching(&around, &sides.signs[k], &mut cells);
+        }
+    }
+    let brought = Brought::new(&cloud, stands, &cells, scale, observer)?;
+    Ok((cloud, brought))
 }
 
 /// Does the file tell of the outside?

@@ -4,11 +4,12 @@
 //! its own: whether the normals of the two agree is a vote of their bodies. The votes are solved as those of samples are
 //! ([X03] §7, [`super::super::orient`]); then bodies get their outside from a thinned set of all samples.
 
-use super::{BrickFacts, BrickStore, Stand, StoreError};
+use super::{BrickFacts, BrickStore, StoreError};
 use crate::cloud::Quadric;
 use crate::cloud::local::fitted::Fit;
 use crate::cloud::orient::link::{Vote, components};
 use crate::cloud::orient::{Hints, contracted, outward};
+use crate::cloud::stand::Stand;
 use crate::geom::KdTree;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -30,6 +31,8 @@ const MOST_ASKED: usize = 1 << 17;
 pub struct Sides {
     /// For each brick and piece of it 1, or -1 if it is inside out.
     pub signs: Vec<Vec<f64>>,
+    /// And the body that it belongs to, by falling area.
+    pub segments: Vec<Vec<u32>>,
     /// Whether the largest body is closed.
     pub closed: bool,
     /// Number of bodies.
@@ -54,7 +57,7 @@ impl Sides {
             *sums.entry((i.min(j), i.max(j))).or_insert(0.0) += agree;
         }
         for b in (0..count).filter(|&b| facts[b].told) {
-            store.stands(b)?.own.iter().for_each(|s| *sums.entry((first[b] + s.piece, told)).or_insert(0.0) += 1.0);
+            store.stands(b)?.own.iter().for_each(|s| *sums.entry((first[b] + s.segment, told)).or_insert(0.0) += 1.0);
         }
         let vote = |((a, b), sum): (&(u32, u32), &f64)| Vote {
             a: *a,
@@ -73,11 +76,29 @@ impl Sides {
         let asked = Asked::new(store, &facts, &first)?;
         let (closed, inside_out) = outside(&asked, &body, &sign);
         sign.iter_mut().zip(&body).filter(|(_, b)| inside_out[**b as usize]).for_each(|(s, _)| *s = -*s);
-        let signs = first.windows(2).map(|w| sign[w[0] as usize..w[1] as usize].to_vec()).collect();
-        let mut bodies: Vec<u32> = body[..told as usize].to_vec();
-        bodies.sort_unstable();
-        bodies.dedup();
-        Ok(Sides { signs, closed, bodies: bodies.len() })
+        let mut areas: BTreeMap<u32, f64> = BTreeMap::new();
+        for (area, body) in asked.areas.iter().zip(&body) {
+            *areas.entry(*body).or_insert(0.0) += area;
+        }
+        let mut bodies: Vec<(u32, f64)> = areas.into_iter().collect();
+        bodies.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let place: BTreeMap<u32, u32> = bodies.iter().zip(0..).map(|(b, k)| (b.0, k)).collect();
+        let of_bricks = |w: &[u32]| w[0] as usize..w[1] as usize;
+        Ok(Sides {
+            signs: first.windows(2).map(|w| sign[of_bricks(w)].to_vec()).collect(),
+            segments: first.windows(2).map(|w| body[of_bricks(w)].iter().map(|b| place[b]).collect()).collect(),
+            closed,
+            bodies: bodies.len(),
+        })
+    }
+
+    /// Samples of a brick with their outside, and the body of the scan that they belong to.
+    pub(super) fn turned(&self, brick: usize, stands: &[Stand]) -> impl Iterator<Item = Stand> {
+        stands.iter().map(move |s| Stand {
+            normal: self.signs[brick][s.segment as usize] * s.normal,
+            segment: self.segments[brick][s.segment as usize],
+            ..*s
+        })
     }
 }
 
@@ -103,7 +124,7 @@ fn meetings(
                     && t.normal.dot(s.normal).abs() > SAME_PLACE_COSINE
             });
             if let Some(t) = same.min_by(|t, u| aside(t).total_cmp(&aside(u))) {
-                found.push((first[a] + s.piece, first[b] + t.piece, t.normal.dot(s.normal).signum()));
+                found.push((first[a] + s.segment, first[b] + t.segment, t.normal.dot(s.normal).signum()));
             }
         }
     }
@@ -115,6 +136,8 @@ struct Asked {
     /// Every `step`-th of all, with its piece.
     stands: Vec<(Stand, usize)>,
     step: usize,
+    /// Area of the samples of each piece.
+    areas: Vec<f64>,
 }
 
 impl Asked {
@@ -123,20 +146,22 @@ impl Asked {
         let step = count.div_ceil(MOST_ASKED).max(1);
         let mut stands = Vec::new();
         let mut before = 0usize;
+        let mut areas = vec![0.0; first[facts.len()] as usize];
         for (b, from) in (0..facts.len()).zip(first) {
             let own = &store.stands(b)?.own;
             let skipped = before.next_multiple_of(step) - before;
-            stands.extend(own.iter().skip(skipped).step_by(step).map(|s| (*s, (from + s.piece) as usize)));
+            stands.extend(own.iter().skip(skipped).step_by(step).map(|s| (*s, (from + s.segment) as usize)));
+            own.iter().for_each(|s| areas[(from + s.segment) as usize] += s.area);
             before += own.len();
         }
-        Ok(Asked { stands, step })
+        Ok(Asked { stands, step, areas })
     }
 }
 
 /// Whether the largest body is closed, and for each body, by its label, whether it is inside out.
 fn outside(asked: &Asked, body: &[u32], sign: &[f64]) -> (bool, Vec<bool>) {
     let told = body[body.len() - 1];
-    let Asked { stands: asked, step } = asked;
+    let Asked { stands: asked, step, .. } = asked;
     let fits: Vec<Fit> = asked.iter().map(|(s, _)| as_fit(s)).collect();
     let areas: Vec<f64> = asked.iter().map(|(s, _)| *step as f64 * s.area).collect();
     let before: Vec<f64> = asked.iter().map(|(_, piece)| sign[*piece]).collect();

@@ -2,6 +2,7 @@
 
 use super::{Brick, BrickCells, BrickFacts, BrickSamples, BrickStands, Partition};
 use crate::cloud::Cloud;
+use crate::geom::Aabb;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// What was kept of a scan cannot be had: a disk that is full, a folder that is gone.
@@ -20,6 +21,10 @@ pub trait BrickStore: Sync {
     /// # Errors
     /// If they cannot be read.
     fn around(&self, brick: usize, halo: f64) -> Result<Cloud, StoreError>;
+    /// The points of a brick with all that their file tells of them.
+    /// # Errors
+    /// If they cannot be read.
+    fn points_in(&self, brick: usize) -> Result<Cloud, StoreError>;
     /// Keeps the samples of a brick, in the place of those that were kept before.
     /// # Errors
     /// If they cannot be written.
@@ -43,6 +48,11 @@ pub trait BrickStore: Sync {
 /// Number of points in bricks.
 pub fn points_of(bricks: &[Brick]) -> usize {
     bricks.last().map_or(0, |b| b.range.end)
+}
+
+/// Box of the points in bricks.
+pub fn bounds_of(bricks: &[Brick]) -> Aabb {
+    Aabb::of(bricks.iter().flat_map(|b| [&b.bounds.min, &b.bounds.max]))
 }
 
 /// A scan in memory.
@@ -83,6 +93,10 @@ impl BrickStore for CloudStore<'_> {
 
     fn around(&self, brick: usize, halo: f64) -> Result<Cloud, StoreError> {
         Ok(self.cloud.select(&self.partition.around(&self.cloud.points, brick, halo)))
+    }
+
+    fn points_in(&self, brick: usize) -> Result<Cloud, StoreError> {
+        self.around(brick, 0.0)
     }
 
     fn keep(&self, brick: usize, samples: BrickSamples) -> Result<(), StoreError> {

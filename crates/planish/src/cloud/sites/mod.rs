@@ -67,10 +67,11 @@ pub(crate) fn in_pieces<T: Send>(
     let mut all = Vec::with_capacity(count);
     // Large pieces keep the threads busy, small ones keep the observer informed.
     let piece = POINTS_PER_CHUNK * rayon::current_num_threads().max(1) * 2;
+    let watched = |scratch: &mut Scratch, k: usize| observer.check().map(|()| work(scratch, k));
     while all.len() < count {
-        observer.check()?;
         let range = all.len()..(all.len() + piece).min(count);
-        all.par_extend(range.into_par_iter().with_min_len(16).map_init(Scratch::default, &work));
+        let made = range.into_par_iter().with_min_len(16).map_init(Scratch::default, watched);
+        all.append(&mut made.collect::<Result<Vec<T>, Cancelled>>()?);
         observer.progress(span.0 + (span.1 - span.0) * all.len() as f64 / count as f64);
     }
     Ok(all)

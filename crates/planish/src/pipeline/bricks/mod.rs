@@ -6,6 +6,7 @@
 //! 3. the mesh of each brick, some cells beyond it, on one lattice: the field there is that of the cells of all bricks that
 //!    reach it, so neighbours extract the same triangles
 //! 4. each brick keeps the triangles whose middles it holds; what was one before is one again ([`weld`](self))
+//! 5. the points of each brick on the surface ([`project_bricks`])
 //!
 //! Bricks follow from the points: memory and threads decide how many are worked at once, and the mesh is the same.
 //! See `docs/methods/bricks.md`.
@@ -14,9 +15,11 @@ mod weld;
 
 use super::scan::{self, MEASURED_POINTS, ScanError, ScanFacts, ScanMeshed, ScanParams};
 use crate::cloud::bricks::{
-    Brick, BrickFacts, BrickSamples, BrickStore, CloudStore, Sides, StoreError, halo, points_of,
+    Brick, BrickFacts, BrickSamples, BrickStore, CloudStore, Sides, StoreError, bounds_of, bring, halo, points_of,
 };
-use crate::cloud::{Cell, CleanParams, Cloud, CloudError, Dipoles, Samples};
+use crate::cloud::{
+    Brought, Cell, CleanParams, Cleaned, Cloud, CloudError, Dipoles, Gathered, PointFacts, PointScale, Samples,
+};
 use crate::contour::{self, ContourCounts, ContourError, Extracted, Meshed, MeshingError};
 use crate::field::{FieldScale, Lattice, SampleField, Spacing, Thin};
 use crate::geom::Aabb;
@@ -59,20 +62,69 @@ pub fn mesh_bricks(
     params: &ScanParams,
     observer: &dyn Observer,
 ) -> Result<ScanMeshed, ScanError> {
-    let at_once = bricks_at_once(store, params.memory)?;
-    let part = |from: f64, to: f64| Part::new(observer, from, to - from);
-    let halo = halo(store, &params.clean, &part(0.0, 0.03))?;
-    let count = store.bricks().len();
-    let cleaned = |k: usize, o: &dyn Observer| Ok(clean_brick(store, k, halo, &params.clean, o)?);
-    in_groups(count, at_once, &part(0.03, 0.6), cleaned, |()| {})?;
-    let plan = BrickPlan::new(store, halo, params)?;
-    observer.check()?;
-    let mut welding = BrickWelder::new(&plan);
+    let plan = clean_bricks(store, params, &Part::new(observer, 0.0, 0.62))?;
+    mesh_planned(store, &plan, params, &Part::new(observer, 0.62, 0.38))
+}
+
+/// As [`mesh_bricks`], for bricks that are clean.
+/// # Errors
+/// [`ScanError`].
+pub fn mesh_planned(
+    store: &dyn BrickStore,
+    plan: &BrickPlan,
+    params: &ScanParams,
+    observer: &dyn Observer,
+) -> Result<ScanMeshed, ScanError> {
+    let mut welding = BrickWelder::new(plan);
     let meshed = |k: usize, o: &dyn Observer| plan.mesh(store, k, params, o);
-    in_groups(count, at_once, &part(0.62, 0.97), meshed, |made| welding.add(made))?;
+    in_groups(store, params, &Part::new(observer, 0.0, 0.92), meshed, |made| {
+        welding.add(made);
+        Ok(())
+    })?;
     let made = welding.finish()?;
     observer.progress(1.0);
     Ok(made)
+}
+
+/// Cleans all bricks, and settles what one cannot know.
+/// # Errors
+/// [`ScanError`].
+pub fn clean_bricks(
+    store: &dyn BrickStore,
+    params: &ScanParams,
+    observer: &dyn Observer,
+) -> Result<BrickPlan, ScanError> {
+    bricks_at_once(store, params.memory)?;
+    let halo = halo(store, &params.clean, &Part::new(observer, 0.0, 0.05))?;
+    let cleaned = |k: usize, o: &dyn Observer| Ok(clean_brick(store, k, halo, &params.clean, o)?);
+    in_groups(store, params, &Part::new(observer, 0.05, 0.94), cleaned, |()| Ok(()))?;
+    let plan = BrickPlan::new(store, halo, params)?;
+    observer.check()?;
+    observer.progress(1.0);
+    Ok(plan)
+}
+
+/// What takes the points of a scan, brick by brick: as they came, and as they are on the surface.
+pub type TakePoints<'a> = dyn FnMut(&Cloud, Cleaned) -> Result<(), StoreError> + 'a;
+
+/// Brings the points of a scan in bricks to its surface.
+/// * `plan` - as of [`clean_bricks`]
+/// # Errors
+/// [`ScanError`], or what `take` says.
+pub fn project_bricks(
+    store: &dyn BrickStore,
+    plan: &BrickPlan,
+    params: &ScanParams,
+    take: &mut TakePoints,
+    observer: &dyn Observer,
+) -> Result<PointFacts, ScanError> {
+    let mut gathered = Gathered::new(plan.facts.spacing, &params.points);
+    let brought = |k: usize, o: &dyn Observer| plan.brought(store, k, params, o);
+    in_groups(store, params, observer, brought, |(cloud, brought)| {
+        let cleaned = gathered.add(&cloud, brought);
+        take(&cloud, cleaned).map_err(|e| ScanError::Cloud(e.into()))
+    })?;
+    Ok(gathered.finish())
 }
 
 /// Cleans a brick and keeps its samples.
@@ -105,14 +157,15 @@ fn bricks_at_once(store: &dyn BrickStore, memory: u64) -> Result<usize, ScanErro
     Ok(((memory - kept) / one.max(1)).min(rayon::current_num_threads() as u64).max(1) as usize)
 }
 
-/// Runs `work` over `0..count`, so many at a time, and gives what it made to `take`, in order.
+/// Runs `work` over all bricks, as many at a time as memory allows, and gives what it made to `take`, in order.
 fn in_groups<T: Send>(
-    count: usize,
-    at_once: usize,
+    store: &dyn BrickStore,
+    params: &ScanParams,
     observer: &dyn Observer,
     work: impl Fn(usize, &dyn Observer) -> Result<T, ScanError> + Sync,
-    mut take: impl FnMut(T),
+    mut take: impl FnMut(T) -> Result<(), ScanError>,
 ) -> Result<(), ScanError> {
+    let (count, at_once) = (store.bricks().len(), bricks_at_once(store, params.memory)?);
     for from in (0..count).step_by(at_once) {
         observer.check()?;
         let done = from as f64 / count as f64;
@@ -120,7 +173,7 @@ fn in_groups<T: Send>(
         let one = |k: usize| work(k, &Part::new(observer, done, 0.0));
         let group = (from..(from + at_once).min(count)).into_par_iter().with_max_len(1);
         for made in group.map(one).collect::<Vec<_>>() {
-            take(made?);
+            take(made?)?;
         }
     }
     observer.progress(1.0);
@@ -139,8 +192,9 @@ pub struct BrickPlan {
     lattice: Lattice,
     closed: bool,
     closing: Option<Arc<Dipoles>>,
-    /// Width of what the points of a brick are sought in, world units.
-    halo: f64,
+    /// Width of the border that the fits of a brick reach into, and of the one that its mesh does, world units.
+    fit_halo: f64,
+    mesh_halo: f64,
 }
 
 /// The mesh of a brick; nothing where no surface passes it.
@@ -179,9 +233,47 @@ impl BrickPlan {
         let around = Aabb { min: bounds.min - 0.5 * widest, max: bounds.max + 0.5 * widest };
         let spacing = params.cells.unwrap_or_else(|| Spacing::Voxel(facts.voxel()));
         let lattice = exact(&Lattice::around(&around, spacing).map_err(MeshingError::from)?);
-        let halo = halo.max(MESH_HALO as f64 * lattice.step.x);
+        let mesh_halo = halo.max(MESH_HALO as f64 * lattice.step.x);
         let reach = bricks.iter().zip(&each).map(|(b, f)| b.reach(f.widest)).collect();
-        Ok(BrickPlan { bricks, reach, sides, facts, scale, lattice, closed, closing, halo })
+        Ok(BrickPlan { bricks, reach, sides, facts, scale, lattice, closed, closing, fit_halo: halo, mesh_halo })
+    }
+
+    /// What is known of all bricks together.
+    pub fn facts(&self) -> &ScanFacts {
+        &self.facts
+    }
+
+    /// Number of bricks.
+    pub fn bricks(&self) -> usize {
+        self.bricks.len()
+    }
+
+    /// The points of a brick on the surface, with what is known of them alone.
+    /// # Errors
+    /// [`ScanError`].
+    pub fn project(
+        &self,
+        store: &dyn BrickStore,
+        k: usize,
+        params: &ScanParams,
+        observer: &dyn Observer,
+    ) -> Result<Cleaned, ScanError> {
+        let (cloud, brought) = self.brought(store, k, params, observer)?;
+        let mut gathered = Gathered::new(self.facts.spacing, &params.points);
+        let cleaned = gathered.add(&cloud, brought);
+        Ok(Cleaned { facts: gathered.finish(), ..cleaned })
+    }
+
+    fn brought(
+        &self,
+        store: &dyn BrickStore,
+        k: usize,
+        params: &ScanParams,
+        observer: &dyn Observer,
+    ) -> Result<(Cloud, Brought), ScanError> {
+        let ScanFacts { noise, spacing, diagonal, .. } = self.facts;
+        let scale = PointScale { noise, spacing, diagonal, outlier: params.clean.outlier };
+        Ok(bring(store, k, (&self.sides, self.fit_halo), &scale, observer)?)
     }
 
     /// The mesh of a brick.
@@ -222,7 +314,7 @@ impl BrickPlan {
             Err(e) => return Err(e.into()),
         };
         drop((field, cells));
-        let near = store.around(k, self.halo).map_err(CloudError::from)?.points;
+        let near = store.around(k, self.mesh_halo).map_err(CloudError::from)?.points;
         let lids = scan::complete(&mut meshed, &self.facts, (&near, self.closed), params, observer)?;
         let own: Vec<DVec3> = near.into_iter().filter(|p| self.bricks[k].holds(*p)).collect();
         let step = points_of(&self.bricks).div_ceil(MEASURED_POINTS).max(1);
@@ -279,7 +371,7 @@ fn facts_of(bricks: &[Brick], each: &[BrickFacts], sides: &Sides) -> ScanFacts {
         spacing: share(0.5, &|f| f.spacing),
         normal_noise_deg: share(0.5, &|f| f.normal_noise_deg),
         gap: share(0.05, &|f| f.gap),
-        diagonal: bounds(bricks.iter().map(|b| b.bounds)).diagonal(),
+        diagonal: bounds_of(bricks).diagonal(),
     }
 }
 
