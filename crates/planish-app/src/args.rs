@@ -405,7 +405,7 @@ const MEMORY_SHARE: f64 = 0.75;
 /// What a machine has if nobody knows.
 const MEMORY_GUESS: u64 = 8 << 30;
 
-fn default_memory() -> u64 {
+pub fn default_memory() -> u64 {
     let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
     let total =
         text.lines().find_map(|l| l.strip_prefix("MemTotal:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());

@@ -83,20 +83,19 @@ impl Scan {
     ) -> Result<(Scan, Option<Warning>), Failure> {
         let options = planish_io::ScanOptions { columns: options.columns.clone(), classes: options.classes.clone() };
         let wrong = |e: planish_io::ReadError| Failure::input(path, e);
-        let large = planish_io::points_told(path).is_some_and(|n| n > BRICK_POINTS as u64);
-        match room.filter(|_| large) {
-            Some(room) => {
-                let folder = room.path("bricks");
-                std::fs::create_dir(&folder).map_err(|e| products::unwritable(&folder, &e))?;
-                let bricks = BrickFolder::create(path, &options, &folder, BRICK_POINTS, observer).map_err(wrong)?;
+        let is_large = |_: &&Staged| planish_io::points_told(path).is_some_and(|n| n > BRICK_POINTS as u64);
+        if let Some(room) = room.filter(is_large) {
+            let folder = room.path("bricks");
+            std::fs::create_dir(&folder).map_err(|e| products::unwritable(&folder, &e))?;
+            let bricks = BrickFolder::create(path, &options, &folder, BRICK_POINTS, observer).map_err(wrong)?;
+            // A text has lines without a point.
+            if bricks.points() > BRICK_POINTS as u64 {
                 let left_out = bricks.left_out();
-                Ok((Scan::Bricks(bricks), far_off(left_out)))
-            }
-            None => {
-                let (cloud, left_out) = planish_io::read_body(path, &options).map_err(wrong)?;
-                Ok((Scan::Whole(cloud), far_off(left_out as u64)))
+                return Ok((Scan::Bricks(bricks), far_off(left_out)));
             }
         }
+        let (cloud, left_out) = planish_io::read_body(path, &options).map_err(wrong)?;
+        Ok((Scan::Whole(cloud), far_off(left_out as u64)))
     }
 
     /// What brings its points back to their place.

@@ -49,7 +49,7 @@ const SLIDER: [&str; 2] = ["Surfaces", "Displaced"];
 
 /// Points of a scan as they came: as many as a picture of it shows.
 pub struct Raw {
-    /// Every so-manieth is shown.
+    /// One of so many points of the surface is shown; of outliers all, up to [`DOTS`].
     step: usize,
     points: Vec<DVec3>,
     strays: Vec<DVec3>,
@@ -69,8 +69,10 @@ impl Raw {
     pub fn add(&mut self, points: &[DVec3], strays: &[bool]) {
         for (p, &off) in points.iter().zip(strays) {
             let count = &mut self.count[usize::from(off)];
-            if count.is_multiple_of(self.step) {
-                if off { &mut self.strays } else { &mut self.points }.push(*p);
+            if off && *count < DOTS {
+                self.strays.push(*p);
+            } else if !off && count.is_multiple_of(self.step) {
+                self.points.push(*p);
             }
             *count += 1;
         }

@@ -224,8 +224,9 @@ pub fn abandon_and_exit(status: u8) -> ! {
                 break;
             }
         }
-        place.unmake();
     }
+    // Folders that were made for one may hold what another had.
+    registered.iter().for_each(Place::unmake);
     std::process::exit(status as i32)
 }
 

@@ -115,10 +115,10 @@ impl PyBricks {
         py.detach(open).map_err(|e| told(py, &e))
     }
 
-    /// Parts the points of a scan into bricks in a folder. PLY with binary points, LAS, LAZ and E57 are read piece by piece: memory
+    /// Parts the points of a scan into bricks in a folder. PLY with binary points, LAS, LAZ, E57 and texts are read piece by piece: memory
     /// does not grow with the scan. Raises FileError, CloudError.
     ///
-    /// * scan: the file, or an iterable of `Cloud`s that are its pieces (`neighbours.from_parquet`): all with normals or none
+    /// * scan: the file, or an iterable of `Cloud`s that are its pieces (`neighbours.from_parquet`): all with the same attributes
     /// * folder: made if it is not there, refused unless it is empty
     /// * most: points of a brick; other bricks give a mesh that differs by less than the noise
     /// * columns, classes: as of `read`
@@ -157,25 +157,29 @@ impl PyBricks {
         };
         empty().map_err(|e| told(py, &e))?;
         let options = ScanOptions { columns, classes: classes.unwrap_or_default() };
-        let made = match scan.extract::<PathBuf>() {
-            Ok(file) => {
-                let create = |o: &dyn Both| match BrickFolder::create(&file, &options, &folder, most, o.one()) {
-                    Err(ReadError::Cancelled(c)) => Err(c),
-                    made => Ok(made),
-                };
-                watch::run(py, "points", progress, create)?.map_err(|e| told_of(py, &file, &e))?
-            }
-            Err(_) => {
-                let gathered = gathered(scan, &folder)?;
-                watch::run(py, "points", progress, |o| BrickFolder::of_gathered(gathered, most, o.one()))?
-            }
+        let make = || {
+            let made = match scan.extract::<PathBuf>() {
+                Ok(file) => {
+                    let create = |o: &dyn Both| match BrickFolder::create(&file, &options, &folder, most, o.one()) {
+                        Err(ReadError::Cancelled(c)) => Err(c),
+                        made => Ok(made),
+                    };
+                    watch::run(py, "points", progress, create)?.map_err(|e| told_of(py, &file, &e))?
+                }
+                Err(_) => {
+                    let gathered = gathered(scan, &folder)?;
+                    watch::run(py, "points", progress, |o| BrickFolder::of_gathered(gathered, most, o.one()))?
+                }
+            };
+            watch::run(py, "bricks", progress, |o| {
+                let halo = halo(&made, &params.clean, o.one())?;
+                let recipe = Recipe { params: params.clone(), halo };
+                made.write(RECIPE, &recipe).map_err(of_store)?;
+                Ok::<PyBricks, ScanError>(PyBricks { folder: made.clone(), recipe, plan: OnceLock::new() })
+            })
         };
-        watch::run(py, "bricks", progress, |o| {
-            let halo = halo(&made, &params.clean, o.one())?;
-            let recipe = Recipe { params: params.clone(), halo };
-            made.write(RECIPE, &recipe).map_err(of_store)?;
-            Ok::<PyBricks, ScanError>(PyBricks { folder: made.clone(), recipe, plan: OnceLock::new() })
-        })
+        // Nothing stays that another try would refuse.
+        make().inspect_err(|_| BrickFolder::discard(&folder))
     }
 
     fn __len__(&self) -> usize {

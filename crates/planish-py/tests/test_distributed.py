@@ -189,6 +189,10 @@ def test_bricks_tell_what_is_wrong_with_folders_and_files(scan: Path, tmp_path: 
     (tmp_path / "full" / "mine").write_text("mine")
     with pytest.raises(planish.CloudError, match="is not empty"):
         planish.Bricks.create(scan, tmp_path / "full")
+    (tmp_path / "torn.xyz").write_text("0 0 0\n" * 1000 + "1 1\n")
+    for _ in range(2):  # what failed leaves nothing that a second try would refuse
+        with pytest.raises(planish.FileError, match="line 1001"):
+            planish.Bricks.create(tmp_path / "torn.xyz", tmp_path / "torn")
     with pytest.raises(TypeError, match="voxels"):
         planish.Bricks.create(scan, tmp_path / "other", voxels=3)  # type: ignore[call-arg]
     bricks = planish.Bricks.create(scan, tmp_path / "bricks", most=4_000)

@@ -1,7 +1,7 @@
 //! `planish clean`: a scan to denoised, oriented points with flags.
 
 use super::{Session, commit_report, write_failure};
-use crate::args::{Clean, Policy};
+use crate::args::{Clean, Policy, default_memory};
 use crate::failure::{Failure, Status};
 use crate::files::{self, PointsFile, Scan};
 use crate::outputs;
@@ -36,8 +36,12 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
     let staged = Staged::file(&args.output)?;
     let lines = args.lines.as_deref().map(Staged::file).transpose()?;
     let own_report = session.stage_report()?;
-    let params =
-        ScanParams { clean: args.clean.params(None)?, points: args.project.params(None)?, ..ScanParams::default() };
+    let params = ScanParams {
+        clean: args.clean.params(None)?,
+        points: args.project.params(None)?,
+        memory: default_memory(),
+        ..ScanParams::default()
+    };
     let room = Staged::file(&args.output)?;
     let ((scan, far_off), read) = session.watched("read", |o| Scan::read(&args.scan, &args.options, Some(&room), o))?;
     let units = session.units_of(&args.scan);

@@ -55,7 +55,12 @@ fn anew(session: &Session, args: &Fit) -> Result<(Report, Model, Option<Reach>),
         up: Up::default(),
         truth: None,
     };
-    let from = From { input: placed.input(network), shift: placed.shift, warning: placed.warning(units.symbol()) };
+    let from = From {
+        input: placed.input(network),
+        size: (0, 0.0),
+        shift: placed.shift,
+        warning: placed.warning(units.symbol()),
+    };
     let Made { report, model, reach, .. } = fitted(session, &job, from, vec![read], None)?;
     Ok((report, model, reach))
 }

@@ -11,7 +11,7 @@ use crate::products::Staged;
 use crate::summary::Summary;
 use crate::tolerance::Tolerance;
 use planish::DVec3;
-use planish::cloud::bricks::{self, StoreError};
+use planish::cloud::bricks::StoreError;
 use planish::cloud::{Cleaned, Cloud};
 use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{HistoryEntry, Model, Units};
@@ -52,7 +52,8 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
             Scan::Whole(cloud) => Input::Scan(cloud),
             Scan::Bricks(bricks) => Input::Bricks(bricks),
         };
-        return produce(session, job, From { input: of_scan, shift: scan.shift(), warning }, staged, vec![read]);
+        let from = From { input: of_scan, size: scan.size(), shift: scan.shift(), warning };
+        return produce(session, job, from, staged, vec![read]);
     }
     args.meshing.refuse("use `planish mesh` first")?;
     if let Some(flag) = args.points.first_given() {
@@ -60,7 +61,12 @@ pub fn run(session: &Session, args: &Run) -> Result<Status, Failure> {
     }
     let (placed, read) = session.step("read", || Placed::read(input))?;
     let network = own_network(args.network.as_deref(), &placed.mesh, &args.stages, &args.seams)?;
-    let from = From { input: placed.input(network), shift: placed.shift, warning: placed.warning(units.symbol()) };
+    let from = From {
+        input: placed.input(network),
+        size: (0, 0.0),
+        shift: placed.shift,
+        warning: placed.warning(units.symbol()),
+    };
     produce(session, job, from, staged, vec![read])
 }
 
@@ -83,6 +89,8 @@ pub fn own_network(
 pub struct From<'a> {
     /// The input, near the origin.
     pub input: Input<'a>,
+    /// Of a scan the number of points, and the diagonal of their box.
+    pub size: (u64, f64),
     /// What brings it back to its place.
     pub shift: DVec3,
     /// What is to be told of it.
@@ -90,18 +98,10 @@ pub struct From<'a> {
 }
 
 impl<'a> From<'a> {
-    /// Number of points of a scan.
-    fn points(&self) -> u64 {
-        match &self.input {
-            Input::Scan(cloud) => cloud.points.len() as u64,
-            Input::Bricks(store) => bricks::points_of(store.bricks()) as u64,
-            Input::Mesh { .. } => 0,
-        }
-    }
-
     /// A scan.
     pub fn scan(scan: &'a planish::cloud::Cloud) -> From<'a> {
-        From { input: Input::Scan(scan), shift: scan.shift, warning: None }
+        let size = (scan.points.len() as u64, scan.bounds().diagonal());
+        From { input: Input::Scan(scan), size, shift: scan.shift, warning: None }
     }
 }
 
@@ -150,9 +150,9 @@ pub fn produce(
     before: Vec<StageRecord>,
 ) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
-    let mut points = match from.points() {
-        0 => None,
-        total => Some(Points::new(&staged.path(POINTS), total, job.units)?),
+    let mut points = match from.input {
+        Input::Mesh { .. } => None,
+        _ => Some(Points::new(&staged.path(POINTS), from.size.0, job.units)?),
     };
     let Made { mut report, model, reach } = fitted(session, &job, from, before, points.as_mut())?;
     report.warnings.extend(placed::moved(model.shift, "preview.glb lies"));
@@ -223,16 +223,9 @@ pub fn fitted(
     before: Vec<StageRecord>,
     mut points: Option<&mut Points>,
 ) -> Result<Made, Failure> {
-    let (units, From { input, shift, warning }) = (job.units, from);
+    let (units, From { input, size, shift, warning }) = (job.units, from);
     let facts = match &input {
-        Input::Scan(scan) => {
-            super::clean::scan_facts(job.path, (scan.points.len() as u64, scan.bounds().diagonal()), units)
-        }
-        Input::Bricks(store) => {
-            let bricks = store.bricks();
-            let size = (bricks::points_of(bricks) as u64, bricks::bounds_of(bricks).diagonal());
-            super::clean::scan_facts(job.path, size, units)
-        }
+        Input::Scan(_) | Input::Bricks(_) => super::clean::scan_facts(job.path, size, units),
         Input::Mesh { mesh, .. } => files::mesh_facts(job.path, mesh, units),
     };
     let guessed = session.guessed_units(job.path, facts.diagonal, shift != DVec3::ZERO).filter(|_| job.truth.is_none());

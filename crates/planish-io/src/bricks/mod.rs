@@ -8,7 +8,7 @@
 
 mod part;
 
-use crate::scan::{Ending, ScanOptions, Take, pieces};
+use crate::scan::{Ending, ScanOptions, Take, pieces, scale_colors};
 use crate::{ReadError, atomic};
 use glam::DVec3;
 pub use part::Gathered;
@@ -25,7 +25,8 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Parts of at most so many points are parted in memory: records, places and order take some 300 MB, less than a brick at work.
+/// Parts of at most so many points without other attributes are parted in memory, of fewer with them: records, places and order take some
+/// 300 MB, less than a brick at work.
 const AT_ONCE: u64 = 1 << 22;
 /// The file that tells which bricks there are.
 const MANIFEST: &str = "bricks";
@@ -49,9 +50,9 @@ struct Manifest {
     has_normals: bool,
     /// Name and width of what else the file tells of its points.
     columns: Vec<(String, usize)>,
-    /// Columns that the format has room for and no point of the file has, and what the numbers of others are to be multiplied by.
+    /// Columns that the format has room for and no point of the file has.
     bare: Vec<String>,
-    scales: Vec<(String, f64)>,
+    color_scale: Option<f64>,
     /// Points of the file, numbers or not, without those left out.
     points: u64,
     /// Points that were too far off to be of the scan.
@@ -67,7 +68,7 @@ impl Manifest {
 
 impl BrickFolder {
     /// Parts a scan into bricks of at most `most` points, those of [`planish::cloud::bricks::Partition::new`], in a folder. PLY with
-    /// binary points, LAS, LAZ and E57 are read piece by piece, other formats as a whole.
+    /// binary points, LAS, LAZ, E57 and texts are read piece by piece, other formats as a whole.
     /// * `folder` - there, and empty
     /// # Errors
     /// As of [`crate::read_body`], or if the folder cannot be written.
@@ -95,7 +96,7 @@ impl BrickFolder {
         };
         let mut gathered = part::gather(&mut source, folder, observer)?;
         gathered.manifest.bare = ending.bare.into_iter().map(str::to_owned).collect();
-        gathered.manifest.scales = ending.scales.into_iter().map(|(name, scale)| (name.to_owned(), scale)).collect();
+        gathered.manifest.color_scale = ending.color_scale;
         BrickFolder::parted(gathered, most, observer)
     }
 
@@ -119,6 +120,13 @@ impl BrickFolder {
         let made = BrickFolder { folder, manifest };
         made.write(MANIFEST, &made.manifest).map_err(|e| part::lost(&made.folder, std::io::Error::other(e)))?;
         Ok(made)
+    }
+
+    /// Removes what parting a scan leaves in a folder.
+    pub fn discard(folder: &Path) {
+        let is_part = |name: &str| name == MANIFEST || ["part", "body", "points-"].iter().any(|p| name.starts_with(p));
+        let names = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        names.filter(|e| is_part(&e.file_name().to_string_lossy())).for_each(|e| _ = std::fs::remove_file(e.path()));
     }
 
     /// A folder that was made before, by this process or another one.
@@ -243,11 +251,10 @@ impl BrickStore for BrickFolder {
             if self.manifest.bare.contains(name) {
                 continue;
             }
-            let scale = self.manifest.scales.iter().find(|s| s.0 == *name).map_or(1.0, |s| s.1);
-            let values = found.iter().flat_map(|r| &numbers[all * r.1 + from..][..*width]);
-            let values = values.map(|&x| Ending::scaled(scale, x)).collect();
+            let values = found.iter().flat_map(|r| &numbers[all * r.1 + from..][..*width]).copied().collect();
             cloud.attributes.push(Attribute { name: name.clone(), width: *width, values });
         }
+        scale_colors(&mut cloud.attributes, self.manifest.color_scale);
         Ok(cloud)
     }
 

@@ -155,6 +155,10 @@ pub(super) fn gather(source: &mut Source, folder: &Path, observer: &dyn Observer
     let mut count = 0u64;
     source(&mut |piece: Cloud| {
         observer.check()?;
+        if piece.points.is_empty() {
+            manifest.scanners.clone_from(&piece.scanners);
+            return Ok(());
+        }
         let normals = piece.attribute("normal", 3).map(|a| &a.values);
         let others: Vec<&Attribute> = piece.attributes.iter().filter(|a| !is_normal(a)).collect();
         let all = match &mut all {
@@ -164,6 +168,13 @@ pub(super) fn gather(source: &mut Source, folder: &Path, observer: &dyn Observer
                 all.insert(Sheaf::new(folder.join("part"), manifest.more()).map_err(lost)?)
             }
         };
+        if !others.iter().map(|a| (&a.name, a.width)).eq(manifest.columns.iter().map(|c| (&c.0, c.1))) {
+            return Err(ReadError::Header {
+                what: "a piece tells other things of its points than the first one".into(),
+                place: crate::Place::Byte(0),
+                hint: "give all pieces the same attributes",
+            });
+        }
         manifest.has_normals |= normals.is_some();
         manifest.scanners.clone_from(&piece.scanners);
         for (i, &point) in piece.points.iter().enumerate() {
@@ -174,10 +185,8 @@ pub(super) fn gather(source: &mut Source, folder: &Path, observer: &dyn Observer
                 let seen_by =
                     piece.seen_by.get(i).copied().unwrap_or(if piece.scanners.len() == 1 { 0 } else { u32::MAX });
                 rest.clear();
-                for (name, width) in &manifest.columns {
-                    // A piece without what the first one has says nothing of it.
-                    let values = piece.attribute(name, *width).map(|a| &a.values[i * width..][..*width]);
-                    (0..*width).for_each(|k| rest.extend(values.map_or(0.0, |v| v[k]).to_le_bytes()));
+                for a in &others {
+                    a.values[i * a.width..][..a.width].iter().for_each(|x| rest.extend(x.to_le_bytes()));
                 }
                 all.push(&Record { index, point, normal, seen_by }, &rest).map_err(lost)?;
             }
@@ -264,6 +273,7 @@ fn divide(part: Part, room: Room, aabb: Aabb, bricks: &mut Vec<Brick>) -> io::Re
     let size = part.bounds.size();
     let axis = (0..3).fold(0, |best, a| if size[a] > size[best] { a } else { best });
     let (brick, at_once) = room.most;
+    let at_once = at_once * RECORD as u64 / (RECORD + part.more) as u64;
     if part.count <= at_once.max(brick as u64) || !is_positive(size[axis]) {
         return write(part, room, aabb, bricks);
     }

@@ -104,11 +104,7 @@ fn read_in_place(path: &Path, options: &ScanOptions) -> Result<Cloud, ReadError>
         return Err(ReadError::TooLarge { what: "points", count, limit, place: Place::Byte(0) });
     }
     cloud.attributes.retain(|a| !ending.bare.contains(&a.name.as_str()));
-    for a in &mut cloud.attributes {
-        if let Some((_, scale)) = ending.scales.iter().find(|s| s.0 == a.name && s.1 != 1.0) {
-            a.values.iter_mut().for_each(|x| *x = Ending::scaled(*scale, *x));
-        }
-    }
+    scale_colors(&mut cloud.attributes, ending.color_scale);
     if cloud.scanners.is_empty() {
         cloud.seen_by.clear();
     }
@@ -126,14 +122,16 @@ const PIECE: usize = 1 << 16;
 pub(crate) struct Ending {
     /// Those that the format has room for and no point of the file has.
     pub bare: Vec<&'static str>,
-    /// What their numbers are to be multiplied by.
-    pub scales: Vec<(&'static str, f64)>,
+    /// What the three numbers of a colour are to be multiplied by, if they are not as they should be.
+    pub color_scale: Option<f64>,
 }
 
-impl Ending {
-    /// What a number of an attribute is.
-    pub fn scaled(scale: f64, x: f32) -> f32 {
-        (f64::from(x) * scale) as f32
+/// Brings the numbers of colours to what they should be.
+/// * `scale` - as of [`Ending`]
+pub(crate) fn scale_colors(attributes: &mut [Attribute], scale: Option<f64>) {
+    let Some(scale) = scale else { return };
+    for a in attributes.iter_mut().filter(|a| a.name == "color" && a.width == 3) {
+        a.values.iter_mut().for_each(|x| *x = (f64::from(*x) * scale) as f32);
     }
 }
 

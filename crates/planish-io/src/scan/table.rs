@@ -70,8 +70,10 @@ fn real(word: &[u8], decimal_comma: bool) -> Option<f64> {
     }
 }
 
-/// Bytes that are read at once, up to the end of a line: more than the thousand lines that columns are guessed from.
-const BLOCK: usize = 1 << 23;
+/// Bytes that are read at once, up to the end of a line.
+const BLOCK: usize = 1 << 21;
+/// Rows that columns are guessed from.
+const GUESSED_FROM: usize = 1000;
 
 /// Reads points piece by piece. `columns` names them; without it a header line does, else their number and range.
 pub(super) fn pieces(
@@ -84,37 +86,47 @@ pub(super) fn pieces(
 }
 
 fn in_blocks(mut file: impl Read, mut reader: Reader, size: usize, take: &mut Take) -> Result<Ending, ReadError> {
-    let mut block = Vec::new();
+    let (mut block, mut rows) = (Vec::new(), Vec::new());
     let mut is_last = false;
     while !is_last {
+        let before = block.len();
         let more = (&mut file).take(size as u64).read_to_end(&mut block)?;
         is_last = more < size;
-        let end = if is_last { block.len() } else { block.iter().rposition(|&b| b == b'\n').map_or(0, |k| k + 1) };
-        let rows = reader.rows(&block[..end])?;
-        if !rows.is_empty() {
-            take(reader.cloud(&rows)?)?;
-        }
+        // What was read before has no end of a line, but for a \r as its last byte, which a \n may follow.
+        let from = before.saturating_sub(1);
+        let is_end =
+            |k: usize| block[k] == b'\n' || (block[k] == b'\r' && k + 1 < block.len() && block[k + 1] != b'\n');
+        let end = if is_last { block.len() } else { (from..block.len()).rfind(|&k| is_end(k)).map_or(0, |k| k + 1) };
+        rows.append(&mut reader.rows(&block[..end])?);
         block.drain(..end);
+        let is_known = is_last || reader.names.is_some() || rows.len() >= GUESSED_FROM * reader.width;
+        if !rows.is_empty() && is_known {
+            take(reader.cloud(&rows)?)?;
+            rows.clear();
+        }
     }
     if reader.count == 0 {
         return Err(ReadError::NoPoints);
     }
     // Colours are bytes or pairs of them if they do not fit into what is less.
-    let scale = match reader.brightest {
-        most if most > 255.0 => 1.0 / 65535.0,
-        most if most > 1.0 => 1.0 / 255.0,
-        _ => 1.0,
+    let color_scale = match reader.brightest {
+        most if most > 255.0 => Some(1.0 / 65535.0),
+        most if most > 1.0 => Some(1.0 / 255.0),
+        _ => None,
     };
-    Ok(Ending { bare: Vec::new(), scales: vec![("color", scale)] })
+    Ok(Ending { bare: Vec::new(), color_scale })
 }
 
 /// How many points a file has at most: its lines.
 pub(super) fn told(mut file: impl Read) -> io::Result<u64> {
-    let (mut block, mut count) = (vec![0; BLOCK], 1);
+    let (mut block, mut ends) = (vec![0; BLOCK], [0, 0]);
     loop {
-        match file.read(&mut block)? {
-            0 => return Ok(count),
-            n => count += block[..n].iter().filter(|&&b| b == b'\n').count() as u64,
+        let read = file.read(&mut block)?;
+        if read == 0 {
+            return Ok(1 + ends[0].max(ends[1]));
+        }
+        for (count, end) in ends.iter_mut().zip(*b"\n\r") {
+            *count += block[..read].iter().filter(|&&b| b == end).count() as u64;
         }
     }
 }
@@ -287,7 +299,7 @@ fn canonical(name: &str) -> &str {
 fn guess(rows: &[f64], width: usize, extension: &str) -> Vec<String> {
     let mut names: Vec<String> = ["x", "y", "z"].map(String::from).into();
     let triple = |at: usize, test: &dyn Fn([f64; 3]) -> bool| {
-        at + 3 <= width && rows.chunks(width).take(1000).all(|r| test([r[at], r[at + 1], r[at + 2]]))
+        at + 3 <= width && rows.chunks(width).take(GUESSED_FROM).all(|r| test([r[at], r[at + 1], r[at + 2]]))
     };
     while names.len() < width {
         let at = names.len();
@@ -390,15 +402,18 @@ mod tests {
                 crate::scan::append(&mut cloud, piece);
                 Ok(())
             })?;
-            Ok::<_, ReadError>((cloud, ending.scales))
+            Ok::<_, ReadError>((cloud, ending.color_scale))
         };
         let whole = read(&text, BLOCK).unwrap();
-        assert_eq!((whole.0.points.len(), &whole.1), (300, &vec![("color", 1.0 / 255.0)]));
+        assert_eq!((whole.0.points.len(), whole.1), (300, Some(1.0 / 255.0)));
         for size in [7, 64, 1000] {
-            assert_eq!(read(&text, size).unwrap(), whole);
+            for ends in ["\r\n", "\n", "\r"] {
+                assert_eq!(read(&text.replace("\r\n", "\n").replace('\n', ends), size).unwrap(), whole);
+            }
         }
+        assert_eq!([&text, &text.replace("\r\n", "\r")].map(|t| told(t.as_bytes()).unwrap()), [303, 301]);
         let wrong = text.replace("150 300 0.5 150 7 9", "150 300 0.5 x 7 9");
-        let told = |size: usize| read(&wrong, size).unwrap_err().to_string();
-        assert!(told(64) == told(BLOCK) && told(64).contains("line 153"), "{}", told(64));
+        let why = |size: usize| read(&wrong, size).unwrap_err().to_string();
+        assert!(why(64) == why(BLOCK) && why(64).contains("line 153"), "{}", why(64));
     }
 }

@@ -1,7 +1,7 @@
 //! Scans written piece by piece. Of PLY one piece is in memory at a time; other formats are written as a whole at the end.
 
 use super::{WRITTEN_SCANS, append, check, lower, write_scan_in};
-use crate::{WriteError, atomic, ply};
+use crate::{Place, WriteError, atomic, ply};
 use glam::DVec3;
 use planish::Units;
 use planish::cloud::Cloud;
@@ -91,6 +91,10 @@ impl ScanWriter {
 
 impl Waiting {
     fn add(&mut self, piece: &Cloud) -> Result<(), WriteError> {
+        if !piece.attributes.iter().map(|a| (&a.name, a.width)).eq(self.columns.iter().map(|c| (&c.0, c.1))) {
+            let what = "a piece of the scan has other attributes than the first one".into();
+            return Err(WriteError::Inconsistent { what, place: Place::Vertex(self.count) });
+        }
         let world: Vec<DVec3> = piece.points.iter().map(|&p| p + piece.shift).collect();
         self.rows.see(&world, &piece.attributes)?;
         for (v, p) in world.iter().enumerate() {

@@ -44,7 +44,8 @@ pub fn repair(mesh: &TriMesh, observer: &dyn Observer) -> Result<(TriMesh, Repai
     make_manifold(mesh, &mut triangles, &mut source, &mut done, observer)?;
     observer.progress(0.3);
     super::slivers::remove(mesh, &mut triangles, &source, &mut done, observer)?;
-    done.closed_handles = super::handles::close(mesh, &mut triangles, &mut source, observer)?;
+    let handles = super::handles::close(mesh, &mut triangles, &mut source, observer)?;
+    done.closed_handles = handles.count;
     if done.closed_handles > 0 {
         super::slivers::remove(mesh, &mut triangles, &source, &mut done, observer)?;
     }
@@ -53,7 +54,10 @@ pub fn repair(mesh: &TriMesh, observer: &dyn Observer) -> Result<(TriMesh, Repai
     let mut used = vec![false; mesh.points.len()];
     mesh.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
     done.unreferenced_vertices = used.iter().filter(|&&u| !u).count();
-    let mut mended = gather(mesh, &triangles, &source);
+    let (mut mended, id) = gather(mesh, &triangles, &source);
+    if handles.count > 0 {
+        handles.part(&mut mended, &id, observer)?;
+    }
     let longest = TINY_LOOP * mended.bounds().diagonal();
     let mut tags = FeatureTags::from_edges(mended.points.len(), []);
     done.closed_holes = super::close_holes(&mut mended, &mut tags, longest, observer)?;
@@ -68,7 +72,7 @@ pub fn weld(mesh: &TriMesh) -> (TriMesh, usize) {
     let triangles: Vec<[u32; 3]> =
         mesh.triangles.iter().map(|t| t.map(|v| first[v as usize])).filter(|t| !repeats(t)).collect();
     let source: Vec<u32> = (0..mesh.points.len() as u32).collect();
-    (gather(mesh, &triangles, &source), merged)
+    (gather(mesh, &triangles, &source).0, merged)
 }
 
 /// Gives every fan of triangles around a vertex a vertex of its own: surfaces that touch in a point come apart. Returns the
@@ -376,8 +380,8 @@ fn detach_bad(triangles: &mut [[u32; 3]], source: &mut Vec<u32>, done: &mut Repa
     done.split_vertices += one_vertex_per_fan(triangles, &mate, source);
 }
 
-/// The mesh of `triangles` over the vertices they use, in rising order, attributes included.
-fn gather(mesh: &TriMesh, triangles: &[[u32; 3]], source: &[u32]) -> TriMesh {
+/// The mesh of `triangles` over the vertices they use, in rising order, attributes included, and the number of each vertex in it.
+fn gather(mesh: &TriMesh, triangles: &[[u32; 3]], source: &[u32]) -> (TriMesh, Vec<u32>) {
     let mut id = vec![NONE; source.len()];
     triangles.iter().flatten().for_each(|&v| id[v as usize] = 0);
     let mut from = Vec::new();
@@ -385,7 +389,7 @@ fn gather(mesh: &TriMesh, triangles: &[[u32; 3]], source: &[u32]) -> TriMesh {
         *id = from.len() as u32;
         from.push(source[v] as usize);
     }
-    TriMesh {
+    let gathered = TriMesh {
         points: from.iter().map(|&v| mesh.points[v]).collect(),
         triangles: triangles.iter().map(|t| t.map(|v| id[v as usize])).collect(),
         attributes: mesh
@@ -399,5 +403,6 @@ fn gather(mesh: &TriMesh, triangles: &[[u32; 3]], source: &[u32]) -> TriMesh {
                 values: from.iter().flat_map(|&v| a.values[v * a.width..(v + 1) * a.width].iter().copied()).collect(),
             })
             .collect(),
-    }
+    };
+    (gathered, id)
 }

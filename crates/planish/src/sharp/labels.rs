@@ -148,7 +148,7 @@ impl Energy<'_> {
         (0..2).map(|k| (off[k] / self.usual[k]).powi(2).min(MOST_SQUARED) / 2.0).sum()
     }
 
-    /// The same for all of its points, in steps; without a sheet more than with any.
+    /// What all points of a face cost with a sheet, in steps; without one, more than with any.
     fn cost(&self, f: u32, sheet: Option<&Surface>) -> i64 {
         let of = |sheet| (NAT_STEPS * self.points[f as usize] * self.misfit(f, sheet)).round() as i64;
         sheet.map_or(i64::MAX / 1_000_000, of)
