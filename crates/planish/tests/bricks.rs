@@ -176,10 +176,10 @@ fn thinned_points_of_bricks_keep_their_distance_across_cuts_and_bodies_are_numbe
     let points: Vec<DVec3> = pieces.iter().flat_map(|p| p.cloud.points.clone()).collect();
     let near = |i: usize, j: usize| points[i].distance(points[j]) < spacing;
     assert!((0..points.len()).all(|i| (0..i).all(|j| !near(i, j))));
-    // Between the loosest and the densest that no point can be added to: circles of one and of half a spacing.
-    let area = 4.0 * std::f64::consts::PI * 1.25;
-    let most = area / (spacing * spacing * 0.75f64.sqrt());
-    assert!(facts.kept as f64 > 0.5 * most && (facts.kept as f64) < most, "{} of {most}", facts.kept);
+    // Circles of one spacing around all points cover the surface; those of half a spacing do not overlap.
+    let area = 4.0 * std::f64::consts::PI * 1.25 / (spacing * spacing);
+    let [least, most] = [area / std::f64::consts::PI, area / 0.75f64.sqrt()];
+    assert!((least..most).contains(&(facts.kept as f64)), "{} of {least} to {most}", facts.kept);
     for piece in &pieces {
         let segment = &piece.cloud.attribute("segment", 1).unwrap().values;
         assert!(segment.iter().zip(&piece.cloud.points).all(|(&s, p)| (s == 0.0) == (p.x > 1.5)));

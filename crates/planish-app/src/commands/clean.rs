@@ -49,12 +49,7 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
     let mut report = Report::new("clean", scan_facts(&args.scan, (points, diagonal), units));
     report.warnings.extend(far_off);
     report.warnings.extend(session.guessed_units(&args.scan, diagonal, scan.shift() != DVec3::ZERO));
-    let store: Option<Box<dyn BrickStore + '_>> = match &scan {
-        Scan::Whole(cloud) if cloud.points.len() <= BRICK_POINTS => None,
-        Scan::Whole(cloud) => Some(Box::new(CloudStore::new(cloud, BRICK_POINTS))),
-        Scan::Bricks(bricks) => Some(Box::new(bricks.clone())),
-    };
-    let (made, fit) = session.bars.step("samples", |o| surface(&scan, store.as_deref(), &params, o));
+    let (made, fit) = session.bars.step("samples", |o| surface(&scan, &params, o));
     let surface = ended(args, made)?;
     let wrong = |path: &Path, e: WriteError| write_failure(&args.scan, path, e);
     let file = PointsFile::create(&staged.file_path(), units).map_err(|e| wrong(&args.output, e))?;
@@ -68,7 +63,7 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
         }
         Surface::Bricks(store, plan) => {
             let mut take = |_: &Cloud, cleaned: Cleaned| kept.take(cleaned.cloud);
-            pipeline::project_bricks(*store, plan, &params, &mut take, o)
+            pipeline::project_bricks(&**store, plan, &params, &mut take, o)
         }
     });
     if let Some(e) = kept.file.failure() {
@@ -115,7 +110,7 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
 /// What points are brought to.
 enum Surface<'a> {
     Samples(&'a Cloud, Box<Samples>),
-    Bricks(&'a dyn BrickStore, Box<BrickPlan>),
+    Bricks(Box<dyn BrickStore + 'a>, Box<BrickPlan>),
 }
 
 impl Surface<'_> {
@@ -127,21 +122,17 @@ impl Surface<'_> {
     }
 }
 
-/// The samples of a scan.
-/// * `store` - the scan in bricks, if it is large
-fn surface<'a>(
-    scan: &'a Scan,
-    store: Option<&'a dyn BrickStore>,
-    params: &ScanParams,
-    observer: &dyn Observer,
-) -> Result<Surface<'a>, ScanError> {
-    match (scan, store) {
-        (Scan::Whole(cloud), None) => {
-            Ok(Surface::Samples(cloud, Box::new(cloud::clean(cloud, &params.clean, observer)?)))
+/// The samples of a scan, in bricks if it is large.
+fn surface<'a>(scan: &'a Scan, params: &ScanParams, observer: &dyn Observer) -> Result<Surface<'a>, ScanError> {
+    let store: Box<dyn BrickStore> = match scan {
+        Scan::Whole(cloud) if cloud.points.len() <= BRICK_POINTS => {
+            return Ok(Surface::Samples(cloud, Box::new(cloud::clean(cloud, &params.clean, observer)?)));
         }
-        (Scan::Bricks(bricks), None) => surface(scan, Some(bricks), params, observer),
-        (_, Some(store)) => Ok(Surface::Bricks(store, Box::new(pipeline::clean_bricks(store, params, observer)?))),
-    }
+        Scan::Whole(cloud) => Box::new(CloudStore::new(cloud, BRICK_POINTS)),
+        Scan::Bricks(bricks) => Box::new(bricks.clone()),
+    };
+    let plan = pipeline::clean_bricks(&*store, params, observer)?;
+    Ok(Surface::Bricks(store, Box::new(plan)))
 }
 
 /// What became of a step, or why there is nothing.

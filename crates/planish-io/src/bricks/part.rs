@@ -26,8 +26,8 @@ pub(super) struct Record {
 
 /// Bytes of a record, without the other attributes of its point: these follow it, four bytes for each number.
 const RECORD: usize = 44;
-/// Records between two looks at the observer.
-const LOOK: usize = 1 << 16;
+/// Records between two looks at the observer: chosen, some 3 MB of a file.
+const RECORDS_PER_LOOK: usize = 1 << 16;
 /// Bytes read or written at once.
 const BUFFER: usize = 1 << 20;
 
@@ -77,7 +77,7 @@ pub(super) fn records(
         if file.fill_buf()?.is_empty() {
             break;
         }
-        if k.is_multiple_of(LOOK) {
+        if k.is_multiple_of(RECORDS_PER_LOOK) {
             observer.check().map_err(io::Error::other)?;
         }
         file.read_exact(&mut bytes)?;

@@ -66,6 +66,13 @@ impl Rows {
         Rows { exact: true, columns: attributes.map(|(name, width)| Column::new(name, width)).collect() }
     }
 
+    /// The same with all numbers as they are: nothing has to be seen.
+    pub fn wide<'a>(attributes: impl Iterator<Item = (&'a str, usize)>) -> Rows {
+        let mut rows = Rows { exact: false, ..Rows::new(attributes) };
+        rows.columns.iter_mut().for_each(|c| c.bytes = false);
+        rows
+    }
+
     /// Looks at vertices that are to be written.
     /// # Errors
     /// [`WriteError::Inconsistent`] for an attribute with other than its numbers for each.

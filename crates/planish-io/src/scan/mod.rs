@@ -203,11 +203,7 @@ pub fn write_scan(path: impl AsRef<Path>, cloud: &Cloud) -> Result<(), WriteErro
 /// As [`write_scan`].
 pub fn write_scan_in(path: impl AsRef<Path>, cloud: &Cloud, units: Units) -> Result<(), WriteError> {
     let path = path.as_ref();
-    let extension = lower(path);
-    if !WRITTEN_SCANS.contains(&extension.as_str()) {
-        let known = WRITTEN_SCANS.map(|e| format!(".{e}")).join(", ");
-        return Err(WriteError::UnknownExtension { extension, known });
-    }
+    let extension = written_extension(path)?;
     if cloud.points.is_empty() {
         return Err(WriteError::Nothing("the scan has no points"));
     }
@@ -219,6 +215,16 @@ pub fn write_scan_in(path: impl AsRef<Path>, cloud: &Cloud, units: Units) -> Res
         "e57" => atomic::write_at(path, |at| e57::write(at, &world, cloud, units.metres())),
         _ => atomic::write(path, |out| table::write(out, &world, cloud)),
     }
+}
+
+/// The extension of a scan that can be written.
+fn written_extension(path: &Path) -> Result<String, WriteError> {
+    let extension = lower(path);
+    if WRITTEN_SCANS.contains(&extension.as_str()) {
+        return Ok(extension);
+    }
+    let known = WRITTEN_SCANS.map(|e| format!(".{e}")).join(", ");
+    Err(WriteError::UnknownExtension { extension, known })
 }
 
 /// Refuses what no format can hold.

@@ -70,8 +70,8 @@ fn real(word: &[u8], decimal_comma: bool) -> Option<f64> {
     }
 }
 
-/// Bytes that are read at once, up to the end of a line.
-const BLOCK: usize = 1 << 21;
+/// Bytes that are read at once, up to the end of a line: chosen, some 50 000 points.
+const BLOCK_BYTES: usize = 1 << 21;
 /// Rows that columns are guessed from.
 const GUESSED_FROM: usize = 1000;
 
@@ -82,7 +82,7 @@ pub(super) fn pieces(
     columns: Option<&str>,
     take: &mut Take,
 ) -> Result<Ending, ReadError> {
-    in_blocks(file, Reader::new(extension, columns)?, BLOCK, take)
+    in_blocks(file, Reader::new(extension, columns)?, BLOCK_BYTES, take)
 }
 
 fn in_blocks(mut file: impl Read, mut reader: Reader, size: usize, take: &mut Take) -> Result<Ending, ReadError> {
@@ -119,7 +119,7 @@ fn in_blocks(mut file: impl Read, mut reader: Reader, size: usize, take: &mut Ta
 
 /// How many points a file has at most: its lines.
 pub(super) fn told(mut file: impl Read) -> io::Result<u64> {
-    let (mut block, mut ends) = (vec![0; BLOCK], [0, 0]);
+    let (mut block, mut ends) = (vec![0; BLOCK_BYTES], [0, 0]);
     loop {
         let read = file.read(&mut block)?;
         if read == 0 {
@@ -404,7 +404,7 @@ mod tests {
             })?;
             Ok::<_, ReadError>((cloud, ending.color_scale))
         };
-        let whole = read(&text, BLOCK).unwrap();
+        let whole = read(&text, BLOCK_BYTES).unwrap();
         assert_eq!((whole.0.points.len(), whole.1), (300, Some(1.0 / 255.0)));
         for size in [7, 64, 1000] {
             for ends in ["\r\n", "\n", "\r"] {
@@ -414,6 +414,6 @@ mod tests {
         assert_eq!([&text, &text.replace("\r\n", "\r")].map(|t| told(t.as_bytes()).unwrap()), [303, 301]);
         let wrong = text.replace("150 300 0.5 150 7 9", "150 300 0.5 x 7 9");
         let why = |size: usize| read(&wrong, size).unwrap_err().to_string();
-        assert!(why(64) == why(BLOCK) && why(64).contains("line 153"), "{}", why(64));
+        assert!(why(64) == why(BLOCK_BYTES) && why(64).contains("line 153"), "{}", why(64));
     }
 }

@@ -1,6 +1,6 @@
 //! Scans written piece by piece. Of PLY one piece is in memory at a time; other formats are written as a whole at the end.
 
-use super::{WRITTEN_SCANS, append, check, lower, write_scan_in};
+use super::{PIECE, append, check, lower, write_scan_in, written_extension};
 use crate::{Place, WriteError, atomic, ply};
 use glam::DVec3;
 use planish::Units;
@@ -9,9 +9,6 @@ use planish::mesh::Attribute;
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
-
-/// Points that are read back at once.
-const PIECE: usize = 1 << 14;
 
 /// A scan on its way to a file, which appears at the end, with the same bytes as of [`super::write_scan_in`].
 pub struct ScanWriter {
@@ -41,11 +38,7 @@ impl ScanWriter {
     /// # Errors
     /// [`WriteError::UnknownExtension`].
     pub fn create(path: &Path, units: Units) -> Result<ScanWriter, WriteError> {
-        let extension = lower(path);
-        if !WRITTEN_SCANS.contains(&extension.as_str()) {
-            let known = WRITTEN_SCANS.map(|e| format!(".{e}")).join(", ");
-            return Err(WriteError::UnknownExtension { extension, known });
-        }
+        written_extension(path)?;
         Ok(ScanWriter { path: path.to_path_buf(), units, body: Body::Empty })
     }
 
@@ -97,16 +90,11 @@ impl Waiting {
         }
         let world: Vec<DVec3> = piece.points.iter().map(|&p| p + piece.shift).collect();
         self.rows.see(&world, &piece.attributes)?;
-        for (v, p) in world.iter().enumerate() {
-            for x in p.to_array() {
-                self.file.write_all(&x.to_le_bytes())?;
-            }
-            for a in &piece.attributes {
-                for x in &a.values[v * a.width..][..a.width] {
-                    self.file.write_all(&x.to_le_bytes())?;
-                }
-            }
-        }
+        ply::Rows::wide(self.columns.iter().map(|c| (&c.0[..], c.1))).write(
+            &mut self.file,
+            &world,
+            &piece.attributes,
+        )?;
         self.count += world.len();
         Ok(())
     }

@@ -28,8 +28,9 @@ const TIGHTENED: usize = 3;
 /// The triangulation is cubic in the number of vertices of a loop.
 const MOST_VERTICES: usize = 96;
 
-/// Shares of the way to their neighbours that the vertices of cut loops go, the best one first.
-const BACK: [f64; 4] = [0.5, 0.25, 0.1, 0.02];
+/// Shares of the way to their neighbours that the vertices of cut loops go, the best one first. Chosen: half the way leaves both
+/// sides about an edge apart; the others are for where surfaces are close.
+const BACK_SHARES: [f64; 4] = [0.5, 0.25, 0.1, 0.02];
 
 /// Handles that were cut.
 #[derive(Default)]
@@ -65,7 +66,7 @@ impl Handles {
             }
         };
         let mut best = (usize::MAX, 0.0);
-        for share in BACK {
+        for share in BACK_SHARES {
             place(mesh, share);
             let moved = |t: u32| mesh.triangles[t as usize].iter().any(|&v| on_loop[v as usize]);
             let crossings = intersections_of(mesh, moved, observer)?.len();
