@@ -8,19 +8,19 @@
 //!
 //! Where a step cannot do its work the next gentler one is tried ([`Attempt`]); what was left out is told.
 
+use super::complex::Complex;
 use super::embed::{self, EmbedError};
-use super::fair;
 use super::fitness::{self, Cover};
 use super::integers::{self, IntegerMap, QuantizeError, Scale};
 use super::map::{self, Charts, Effort};
 use super::proxy::{self, Proxy, Sizing};
 use super::recut::Bench;
-use super::{LayoutParams, Piece, SETTLING_PER_SMOOTHING, TYPICAL_PATCHES, improve};
+use super::{LayoutParams, Piece, SETTLING_PER_SMOOTHING, TYPICAL_PATCHES, finish, improve};
 use crate::mesh::TriMesh;
 use crate::network::Network;
 use crate::network::field::{self, FieldParams};
 use crate::observe::{Cancelled, Observer, counted};
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
@@ -42,12 +42,8 @@ const PAIR_TO_SIDE: f64 = 0.5;
 /// Rounds of making the proxy finer where cones are tight; each halves its edges there.
 const REFINEMENTS: usize = 2;
 
-/// Rounds of making it finer where there was no room for whole numbers or squares.
+/// Rounds of making it finer where there was no room for whole numbers.
 const FINER_ROUNDS: usize = 1;
-
-/// Every integer point of a map needs a vertex. Where too few can get there edges are to be this long in unit squares: four
-/// vertices for one square. Chosen.
-const EDGE_TO_SQUARE: f64 = 0.5;
 
 /// One way to a map.
 struct Attempt {
@@ -151,7 +147,7 @@ pub(super) enum AlignError {
         /// Faces and vertices.
         faults: usize,
     },
-    /// Triangles of the proxy leave no way to whole numbers, or no vertex for a corner of patches.
+    /// Triangles of the proxy leave no way to whole numbers.
     #[error("its patches have no room in {}", counted(.places.len(), "place", "places"))]
     Cramped {
         /// Where, and how long edges may be there.
@@ -206,8 +202,10 @@ pub(super) struct Laid {
     pub cones: usize,
     /// Mean angle between the patches' isolines and the field, degrees.
     pub deviation_deg: f64,
-    /// What it is worth.
+    /// What it is worth, on the proxy.
     pub worth: Worth,
+    /// The same on the mesh.
+    on_mesh: Worth,
     /// True if no number in question is good and this is none of the lines' doing: another map would hardly be better.
     is_far: bool,
 }
@@ -219,13 +217,16 @@ impl Laid {
     }
 }
 
-/// What a network is worth: the number that was asked for first, then how well grids cover it.
+/// What a network is worth: the number that was asked for first, then how well grids cover it, then how coarse it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Worth {
+    patches: usize,
     /// Logarithm of the ratio of its patches to the number asked for, 0 if near enough or if none was.
     missed: f64,
     /// Part of the patches that a grid covers well.
     good_part: f64,
+    /// True if that is large enough.
+    is_good: bool,
 }
 
 impl Worth {
@@ -234,12 +235,12 @@ impl Worth {
             Some(asked) if !count_is_near(patches, asked) => (patches as f64 / asked as f64).ln().abs(),
             _ => 0.0,
         };
-        Worth { missed, good_part }
+        Worth { patches, missed, good_part, is_good: fitness::is_good(good_part) }
     }
 
     /// True if there is no need to look for another.
     pub fn is_enough(self) -> bool {
-        self.missed == 0.0 && fitness::is_good(self.good_part)
+        self.missed == 0.0 && self.is_good
     }
 
     /// True for the number that was asked for.
@@ -250,6 +251,20 @@ impl Worth {
     /// True if this is worth more.
     pub fn exceeds(self, other: Worth) -> bool {
         self.missed < other.missed || (self.missed == other.missed && self.good_part > other.good_part)
+    }
+
+    /// True if this, along the form as the other is, is taken rather than that: for it is good, or of two good ones the coarser.
+    /// Of two others it is the one worth more, or the coarser where no more parts them than chance: good parts of so many
+    /// patches have a standard deviation.
+    fn is_better(self, other: Worth) -> bool {
+        let variance = |worth: Worth| worth.good_part * (1.0 - worth.good_part) / worth.patches.max(1) as f64;
+        let by = (self.good_part - other.good_part).abs();
+        let is_chance = self.missed == other.missed && by < (variance(self) + variance(other)).sqrt();
+        match (self.is_enough(), other.is_enough()) {
+            (false, false) if !is_chance => self.exceeds(other),
+            (one, two) if one == two => self.patches < other.patches,
+            (is_enough, _) => is_enough,
+        }
     }
 }
 
@@ -296,12 +311,14 @@ pub(super) fn lay(
             observer.progress(0.3);
             let (laid, trouble) = aligned.choose(params, observer)?;
             if let Some(laid) = laid
-                && best.as_ref().is_none_or(|best| laid.worth.exceeds(best.worth))
+                && best.as_ref().is_none_or(|best| laid.on_mesh.is_better(best.on_mesh))
             {
                 best = Some(laid);
             }
-            if best.as_ref().is_some_and(|best| params.coarsest || best.is_final()) {
-                return best.ok_or(why);
+            // A coarser one may be good as well.
+            let is_open = trouble.is_some() && asked(params).is_none();
+            if best.as_ref().is_some_and(|best| params.coarsest || best.is_final() && !is_open) {
+                break;
             }
             let Some(trouble) = trouble else { break };
             why = trouble;
@@ -313,33 +330,26 @@ pub(super) fn lay(
                 break;
             }
         }
+        if best.as_ref().is_some_and(|best| params.coarsest || best.is_final()) {
+            break;
+        }
     }
     best.ok_or(why)
 }
 
 /// A layout on the proxy.
-struct Draft<'a> {
-    bench: Bench<'a>,
+struct Draft {
+    proxy: Rc<Proxy>,
+    complex: Complex,
     worth: Worth,
     /// Of its cells before rows that no grid needs went.
     covers: Vec<Cover>,
     deviation_deg: f64,
 }
 
-impl Draft<'_> {
-    /// True if this is taken rather than the other: for it is good, or of two good ones the coarser, or of others worth more.
-    fn is_better(&self, other: &Draft) -> bool {
-        match (self.worth.is_enough(), other.worth.is_enough()) {
-            (true, true) => self.covers.len() < other.covers.len(),
-            (false, false) => self.worth.exceeds(other.worth),
-            (is_enough, _) => is_enough,
-        }
-    }
-}
-
 impl Aligned {
     /// The network of fewest squares that is good, of the numbers in question, else the best; and what was in the way of
-    /// others.
+    /// others that would be preferred.
     ///
     /// Where the first is not good the largest number comes next: if that is not good either those between hardly ever are.
     fn choose(
@@ -357,7 +367,8 @@ impl Aligned {
         };
         let (first, largest) = (scales.front().copied(), scales.iter().copied().max());
         let count = scales.len();
-        let (mut best, mut trouble, mut is_far): (Option<Draft>, Option<AlignError>, bool) = (None, None, false);
+        let (mut best, mut trouble, mut is_far): (Option<Draft>, Option<(Scale, AlignError)>, bool) =
+            (None, None, false);
         while let Some(scale) = scales.pop_front() {
             observer.progress(0.9 - 0.6 * (scales.len() + 1) as f64 / count as f64);
             match self.quantized(scale, observer).and_then(|whole| self.draft(&whole, params, observer)) {
@@ -369,8 +380,9 @@ impl Aligned {
                     } else if best.is_none() && draft.worth.is_kept() && !is_enough {
                         scales.make_contiguous().sort_by_key(|&scale| (Some(scale) != largest, scale));
                     }
-                    if best.as_ref().is_none_or(|best| draft.is_better(best)) {
+                    if best.as_ref().is_none_or(|best| draft.worth.is_better(best.worth)) {
                         best = Some(draft);
+                        trouble = trouble.filter(|(other, _)| !is_enough || *other < scale);
                     }
                     // Below a good largest number there may be others.
                     if is_enough != is_largest {
@@ -378,17 +390,18 @@ impl Aligned {
                     }
                 }
                 Err(AlignError::Cancelled(cancelled)) => return Err(cancelled),
-                Err(e) => trouble = Some(e),
+                Err(e) => trouble = Some((scale, e)),
             }
             if self.charts.effort.is_spent() {
                 break;
             }
             // What has no room for two numbers of squares has none for more.
-            if Some(scale) != first && best.is_none() && trouble.as_ref().is_some_and(|e| !e.places().is_empty()) {
+            if Some(scale) != first && best.is_none() && trouble.as_ref().is_some_and(|(_, e)| !e.places().is_empty()) {
                 break;
             }
         }
-        let laid = match best.map(|draft| self.laid(draft, is_far, observer)) {
+        let mut trouble = trouble.map(|(_, e)| e);
+        let laid = match best.map(|draft| self.laid(draft, is_far, params, observer)) {
             Some(Err(AlignError::Cancelled(cancelled))) => return Err(cancelled),
             Some(Err(e)) => {
                 trouble = Some(e);
@@ -427,21 +440,14 @@ impl Aligned {
     }
 
     /// The layout on the proxy whose cells are the unit squares, settled as `params` say: what the map squeezes is spread.
-    fn draft(
-        &self,
-        whole: &IntegerMap,
-        params: &LayoutParams,
-        observer: &dyn Observer,
-    ) -> Result<Draft<'_>, AlignError> {
+    fn draft(&self, whole: &IntegerMap, params: &LayoutParams, observer: &dyn Observer) -> Result<Draft, AlignError> {
         let Proxy { mesh, adjacency, lines, .. } = &*self.proxy;
         let from = &self.mapped.map.uv;
         let mapped = map::smooth_integers(mesh, adjacency, lines, &self.charts, (from, &whole.uv), observer)?;
         let mapped = mapped.map_err(|faces| AlignError::Cramped { places: self.halved(&faces) })?;
         self.unfolded(&mapped)?;
-        let complex = embed::embed(mesh, adjacency, lines, &mapped.map).map_err(|e| match e {
-            EmbedError::Crowded { faces } => AlignError::Cramped { places: self.coarse(&faces, &mapped.map.uv) },
-            e => e.into(),
-        })?;
+        let (proxy, complex) = embed::embed_on(&self.proxy, &mapped.map)?;
+        let Proxy { mesh, adjacency, .. } = &*proxy;
         let mut bench = Bench::new(mesh, adjacency, complex).ok_or(AlignError::Misplaced)?;
         let rounds = SETTLING_PER_SMOOTHING * params.smoothing;
         let squares = bench.complex.live_cells().count();
@@ -460,8 +466,9 @@ impl Aligned {
             bench = Bench::new(mesh, adjacency, joined).ok_or(AlignError::Misplaced)?;
             improve::settle_along_lines(&mut bench, patches, rounds, observer).map_err(|_| Cancelled)?;
         }
-        let worth = Worth::new(bench.complex.live_cells().count(), asked(params), good_part);
-        Ok(Draft { bench, worth, covers, deviation_deg: mapped.deviation_deg })
+        let complex = bench.complex;
+        let worth = Worth::new(complex.live_cells().count(), asked(params), good_part);
+        Ok(Draft { proxy, complex, worth, covers, deviation_deg: mapped.deviation_deg })
     }
 
     /// # Errors
@@ -473,37 +480,31 @@ impl Aligned {
         }
     }
 
-    /// Where these faces of the proxy are, with edges that are short enough for the squares of a map.
-    fn coarse(&self, faces: &[u32], uv: &[[DVec2; 3]]) -> Vec<Wanted> {
-        let wanted = |f: u32| {
-            let squares = |k: usize| uv[f as usize][k].distance(uv[f as usize][(k + 1) % 3]);
-            let part =
-                |k: usize| self.proxy.mesh.edge_length(3 * f + k as u32) * f64::min(EDGE_TO_SQUARE / squares(k), 1.0);
-            (self.middle(f), (0..3).map(part).fold(f64::INFINITY, f64::min))
-        };
-        faces.iter().map(|&f| wanted(f)).collect()
-    }
-
     /// Where these faces of the proxy are, with half of their edges.
     fn halved(&self, faces: &[u32]) -> Vec<Wanted> {
-        let edges = |f: u32| (3 * f..3 * f + 3).map(|h| self.proxy.mesh.edge_length(h)).sum::<f64>();
-        faces.iter().map(|&f| (self.middle(f), edges(f) / 6.0)).collect()
-    }
-
-    fn middle(&self, face: u32) -> DVec3 {
-        self.proxy.mesh.corners(face as usize).into_iter().sum::<DVec3>() / 3.0
+        let mesh = &self.proxy.mesh;
+        let middle = |f: u32| mesh.corners(f as usize).into_iter().sum::<DVec3>() / 3.0;
+        let edges = |f: u32| (3 * f..3 * f + 3).map(|h| mesh.edge_length(h)).sum::<f64>();
+        faces.iter().map(|&f| (middle(f), edges(f) / 6.0)).collect()
     }
 
     /// A layout brought to the mesh.
-    fn laid(&self, draft: Draft, is_far: bool, observer: &dyn Observer) -> Result<Laid, AlignError> {
-        let complex = self.proxy.back(&draft.bench.complex).ok_or(AlignError::Misplaced)?;
-        let (fine, fine_adjacency) = self.proxy.fine();
+    fn laid(
+        &self,
+        draft: Draft,
+        is_far: bool,
+        params: &LayoutParams,
+        observer: &dyn Observer,
+    ) -> Result<Laid, AlignError> {
+        let Draft { proxy, complex, worth, deviation_deg, .. } = draft;
+        let complex = proxy.back(&complex).ok_or(AlignError::Misplaced)?;
+        let (fine, fine_adjacency) = proxy.fine();
         let mut bench = Bench::new(fine, fine_adjacency, complex).ok_or(AlignError::Misplaced)?;
         improve::straighten(&mut bench, observer).map_err(|_| Cancelled)?;
-        fair::fair(&mut bench);
+        finish(&mut bench, params, observer).map_err(|_| Cancelled)?;
         let cones = self.charts.index.iter().filter(|i| **i != 0).count();
-        let Draft { worth, deviation_deg, .. } = draft;
-        Ok(Laid { network: self.proxy.network(&bench.complex), cones, deviation_deg, worth, is_far })
+        let on_mesh = Worth { good_part: fitness::good_part(&fitness::covers(&bench)), ..worth };
+        Ok(Laid { network: proxy.network(&bench.complex), cones, deviation_deg, worth, on_mesh, is_far })
     }
 }
 
@@ -520,7 +521,7 @@ mod tests {
     fn a_network_of_the_number_asked_for_is_final_if_it_is_good_or_if_no_number_outweighs_its_bad_cells() {
         let is_final = |patches, good_part, is_far| {
             let worth = Worth::new(patches, Some(60), good_part);
-            Laid { network: Network::default(), cones: 0, deviation_deg: 0.0, worth, is_far }.is_final()
+            Laid { network: Network::default(), cones: 0, deviation_deg: 0.0, worth, on_mesh: worth, is_far }.is_final()
         };
         assert!(is_final(60, 0.95, false) && is_final(60, 0.4, true));
         assert!(!is_final(60, 0.85, false) && !is_final(110, 0.4, true));
@@ -537,6 +538,10 @@ mod tests {
                 && worth(48, 1.0).is_kept()
                 && !worth(73, 1.0).is_kept()
         );
+        // What differs by less than a standard deviation is the same, and the coarser one is taken; of two good ones, too.
+        let any = |patches, good_part| Worth::new(patches, None, good_part);
+        assert!(any(171, 0.851).is_better(any(219, 0.857)) && !any(219, 0.857).is_better(any(171, 0.851)));
+        assert!(any(219, 0.857).is_better(any(124, 0.758)) && any(60, 0.91).is_better(any(90, 1.0)));
         // Where no number is asked for, any has it.
         assert!(Worth::new(317, None, 0.9).exceeds(Worth::new(60, None, 0.8)));
     }

@@ -5,10 +5,11 @@
 
 use super::partition::polygon::{self, Sectors, VALENCE_COST};
 use super::recut::{Bench, Change, Union, outline_with_cells};
-use super::shape::{Shape, Trace};
+use super::shape::{Shape, Trace, ground_cost};
 use super::slide::Slide;
 use crate::geom::polyline;
 use crate::network::disk::Met;
+use crate::network::imprint::Place;
 use glam::{DVec2, DVec3};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -18,6 +19,18 @@ const COUNT_COST: f64 = 2.0;
 
 /// Steps of a node to a better place, as parts of the way along its arcs.
 const NODE_STEPS: [f64; 2] = [0.35, 0.12];
+
+/// A node is on flat ground if the surface is flat this far around it, in sides of a cell: half as far as directions of curves
+/// are taken.
+const GROUND_TO_SIDE: f64 = 0.1;
+
+/// Whether it counts how flat the ground around a node is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Footing {
+    Counts,
+    /// As on coarse meshes: their edges are longer than that.
+    Ignored,
+}
 
 /// What the layout is measured by.
 pub(super) struct Scale<'a> {
@@ -85,14 +98,22 @@ impl<'a> Scale<'a> {
     }
 
     /// What drawing the lines and spokes of `change` gains, its node, unless pinned, where it gains most.
-    pub fn redrawn(&self, change: &Change) -> Option<Gain> {
+    pub fn redrawn(&self, change: &Change, footing: Footing) -> Option<Gain> {
         let around = outline_with_cells(&self.bench.complex, change)?;
         let mut fill = Fill::new(self, change, &around)?;
         let n = around.len();
+        let mut before = self.cost_of(change);
         let mut least = fill.cost(&change.lines, &change.spokes);
         let mut change = change.clone();
         if !change.spokes.is_empty() && change.pin.is_none() {
             let mut best = *fill.vertex.get(n)?;
+            let radius = GROUND_TO_SIDE * (fill.area() / change.cells.len() as f64).sqrt();
+            let ground = |fill: &Fill, v: u32| match footing {
+                Footing::Counts => ground_cost(fill.flatness(v, radius)),
+                Footing::Ignored => 0.0,
+            };
+            before += ground(&fill, fill.vertex_of(change.center?)?);
+            least = least.map(|least| least + ground(&fill, best));
             let free = self.bench.embedding.free_vertices(&fill.union.disk);
             for step in NODE_STEPS {
                 loop {
@@ -106,9 +127,8 @@ impl<'a> Scale<'a> {
                             continue;
                         }
                         fill.move_node(v);
-                        if let Some(cost) =
-                            fill.cost(&change.lines, &change.spokes).filter(|&c| least.is_none_or(|l| c < l))
-                        {
+                        let cost = fill.cost(&change.lines, &change.spokes).map(|cost| cost + ground(&fill, v));
+                        if let Some(cost) = cost.filter(|&c| least.is_none_or(|l| c < l)) {
                             (least, found) = (Some(cost), v);
                         }
                     }
@@ -120,7 +140,7 @@ impl<'a> Scale<'a> {
             }
             change.pin = Some(fill.union.disk.vertices[best as usize]);
         }
-        Some((self.cost_of(&change) - least?, change))
+        Some((before - least?, change))
     }
 
     /// The place of its line where the cells of a slide cost least, and what they then cost less; `None` if that is where it is.
@@ -175,6 +195,15 @@ impl<'a> Scale<'a> {
 /// Lines between corners of an outline, and the corners joined to a node inside.
 type Filling = (Vec<(usize, usize)>, Vec<usize>);
 
+/// A triangle of a union.
+struct Facet {
+    /// Its middle in the map.
+    uv: DVec2,
+    middle: DVec3,
+    /// Its normal, as long as its area.
+    area: DVec3,
+}
+
 /// The union of a change, in which fillings are measured. Corners are numbered as in the outline; one past the last
 /// is the node inside.
 struct Fill<'a> {
@@ -183,8 +212,7 @@ struct Fill<'a> {
     union: Union,
     /// Vertex of the disk of each corner; the node inside comes last.
     vertex: Vec<u32>,
-    /// Middle in the map and area vector of every triangle.
-    triangles: Vec<(DVec2, DVec3)>,
+    triangles: Vec<Facet>,
     traces: RefCell<BTreeMap<(usize, usize), Option<Trace>>>,
     costs: RefCell<BTreeMap<[usize; 4], f64>>,
 }
@@ -195,15 +223,12 @@ impl<'a> Fill<'a> {
         let union = embedding.map(&scale.bench.complex, change)?;
         let mut vertex: Vec<u32> = union.corners.iter().map(|&i| union.disk.boundary[i]).collect();
         vertex.extend(embedding.place_inside(&union, change.pin));
-        let triangles = union
-            .disk
-            .triangles
-            .iter()
-            .map(|t| {
-                let [a, b, c] = t.map(|v| embedding.position(&union, v));
-                (t.iter().map(|&v| union.uv[v as usize]).sum::<DVec2>() / 3.0, (b - a).cross(c - a) / 2.0)
-            })
-            .collect();
+        let facet = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|v| embedding.position(&union, v));
+            let uv = t.iter().map(|&v| union.uv[v as usize]).sum::<DVec2>() / 3.0;
+            Facet { uv, middle: (a + b + c) / 3.0, area: (b - a).cross(c - a) / 2.0 }
+        };
+        let triangles = union.disk.triangles.iter().map(facet).collect();
         if change.pin.is_some() && vertex.len() == around.len() {
             return None;
         }
@@ -222,6 +247,29 @@ impl<'a> Fill<'a> {
         self.union.corners[corner] = place;
         self.vertex[corner] = self.union.disk.boundary[place];
         self.forget(corner);
+    }
+
+    /// The vertex of the disk where a node of the complex stands.
+    fn vertex_of(&self, node: u32) -> Option<u32> {
+        let bench = self.scale.bench;
+        let place = Place::Vertex(bench.complex.nodes[node as usize].vertex);
+        let is_there = |v: &u32| bench.embedding.cut.origin[*v as usize] == place;
+        self.union.disk.vertices.iter().position(is_there).map(|v| v as u32)
+    }
+
+    fn area(&self) -> f64 {
+        self.triangles.iter().map(|t| t.area.length()).sum()
+    }
+
+    /// Length of the sum of all normals, by area, as a part of the area: of the triangles at a vertex, and of those within a
+    /// distance of it.
+    fn flatness(&self, v: u32, distance: f64) -> f64 {
+        let (at, corners) = (self.position(v), &self.union.disk.triangles);
+        let near = self.triangles.iter().zip(corners);
+        let near = near.filter(|(own, t)| own.middle.distance_squared(at) < distance * distance || t.contains(&v));
+        let (sum, area) =
+            near.fold((DVec3::ZERO, 0.0), |(sum, all), (own, _)| (sum + own.area, all + own.area.length()));
+        sum.length() / area.max(f64::MIN_POSITIVE)
     }
 
     /// Forgets what was measured with a corner.
@@ -343,14 +391,14 @@ impl<'a> Fill<'a> {
             let wedge = if reflex { at_node.iter().any(|&c| left(c, p)) } else { at_node.iter().all(|&c| left(c, p)) };
             wedge && others.iter().all(|&c| left(c, p))
         };
-        let area = self.triangles.iter().filter(|t| inside(t.0)).map(|t| t.1.length()).sum();
+        let area = self.triangles.iter().filter(|t| inside(t.uv)).map(|t| t.area.length()).sum();
         let normals = quad.map(|i| {
             let (mut own, mut all) = (DVec3::ZERO, DVec3::ZERO);
             for h in self.union.disk.adjacency.fan(self.vertex[i]) {
-                let (middle, vector) = self.triangles[h as usize / 3];
-                all += vector;
-                if inside(middle) {
-                    own += vector;
+                let Facet { uv, area, .. } = self.triangles[h as usize / 3];
+                all += area;
+                if inside(uv) {
+                    own += area;
                 }
             }
             if own == DVec3::ZERO { all.normalize_or_zero() } else { own.normalize_or_zero() }

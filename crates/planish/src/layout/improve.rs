@@ -6,7 +6,8 @@
 
 use super::LayoutError;
 use super::complex::{Complex, Node};
-use super::fill::{Gain, Scale};
+use super::fill::{Footing, Gain, Scale};
+use super::fitness;
 use super::partition::polygon;
 use super::recut::{Bench, Change, outline};
 use super::slide::{self, Slide};
@@ -79,7 +80,14 @@ pub(super) fn improve(bench: &mut Bench, patches: usize, observer: &dyn Observer
         let mut touched = nodes_of(&bench.complex, &chosen);
         bench.apply(&chosen);
         touched.resize(bench.complex.nodes.len(), true);
-        fresh = settle_some(bench, patches, SETTLING_AROUND_CHANGES, touched.clone(), &mut drawn, observer)?;
+        fresh = settle_some(
+            bench,
+            (patches, Footing::Ignored),
+            SETTLING_AROUND_CHANGES,
+            touched.clone(),
+            &mut drawn,
+            observer,
+        )?;
         fresh.iter_mut().zip(touched).for_each(|(fresh, touched)| *fresh |= touched);
     }
     Ok(())
@@ -94,7 +102,7 @@ pub(super) fn settle(
     observer: &dyn Observer,
 ) -> Result<(), LayoutError> {
     let fresh = vec![true; bench.complex.nodes.len()];
-    settle_some(bench, patches, rounds, fresh, &mut Known::new(), observer).map(|_| ())
+    settle_some(bench, (patches, Footing::Ignored), rounds, fresh, &mut Known::new(), observer).map(|_| ())
 }
 
 /// The same, and nodes inside lines slide along these.
@@ -106,7 +114,7 @@ pub(super) fn settle_along_lines(
 ) -> Result<(), LayoutError> {
     let (mut fresh, mut known) = (vec![true; bench.complex.nodes.len()], Known::new());
     for _ in 0..rounds {
-        let mut drawn = settle_some(bench, patches, 1, fresh.clone(), &mut known, observer)?;
+        let mut drawn = settle_some(bench, (patches, Footing::Ignored), 1, fresh.clone(), &mut known, observer)?;
         fresh.iter_mut().zip(&drawn).for_each(|(fresh, drawn)| *fresh |= drawn);
         for half in slide(bench, patches, &fresh).into_iter().flat_map(|cell| bench.complex.loop_of(cell)) {
             drawn[bench.complex.from(*half) as usize] = true;
@@ -119,10 +127,20 @@ pub(super) fn settle_along_lines(
     Ok(())
 }
 
+/// As [`settle`] around the cells that a grid would not cover well, and corners come on flat ground.
+pub(super) fn settle_uncovered(bench: &mut Bench, rounds: usize, observer: &dyn Observer) -> Result<(), LayoutError> {
+    let mut fresh = vec![false; bench.complex.nodes.len()];
+    let cells: Vec<u32> = bench.complex.live_cells().collect();
+    for (&c, _) in cells.iter().zip(fitness::covers(bench)).filter(|(_, cover)| !cover.is_good()) {
+        bench.complex.loop_of(c).iter().for_each(|&half| fresh[bench.complex.from(half) as usize] = true);
+    }
+    settle_some(bench, (cells.len(), Footing::Counts), rounds, fresh, &mut Known::new(), observer).map(|_| ())
+}
+
 /// As [`settle`] around the nodes in `fresh`. Returns the nodes of cells that were drawn anew.
 fn settle_some(
     bench: &mut Bench,
-    patches: usize,
+    (patches, footing): (usize, Footing),
     rounds: usize,
     mut fresh: Vec<bool>,
     known: &mut Known,
@@ -137,7 +155,8 @@ fn settle_some(
         let unions: Vec<Change> = arcs.chain(stars).collect();
         let scale = Scale::new(bench, patches);
         let cells = |change: &Change| change.cells.clone();
-        let chosen = choose(bench, unions, LEAST_SETTLING, &fresh, known, |union| scale.redrawn(union), cells);
+        let redrawn = |union: &Change| scale.redrawn(union, footing);
+        let chosen = choose(bench, unions, LEAST_SETTLING, &fresh, known, redrawn, cells);
         if chosen.is_empty() {
             break;
         }
@@ -272,6 +291,7 @@ mod tests {
     use crate::mesh::Adjacency;
     use crate::observe::Silent;
     use crate::synthetic::shapes;
+    use glam::DVec3;
 
     #[test]
     fn a_curve_across_a_sheet_twice_as_long_as_wide_slides_from_an_eighth_of_its_length_to_the_middle() {
@@ -294,5 +314,32 @@ mod tests {
         assert!(ends(&bench).iter().all(|x| (x - 0.25).abs() < 1e-9), "{:?}", ends(&bench));
         settle_along_lines(&mut bench, 2, 24, &Silent).unwrap();
         assert!(ends(&bench).iter().all(|x| (x - 1.0).abs() < 0.11), "{:?}", ends(&bench));
+    }
+
+    #[test]
+    fn a_corner_of_four_cells_leaves_a_wall_where_its_ground_counts_and_stays_on_it_where_it_does_not() {
+        // Two flat halves, with a wall of .1 up to x = .5 + .02.
+        let place = |u: f64, v: f64| DVec3::new(u, v, ((u - 0.48) / 0.04).clamp(0.0, 1.0) * 0.1);
+        let mesh = shapes::sheet(51, 51, false, false, place);
+        let adjacency = Adjacency::new(&mesh);
+        let quarter = |f: usize| {
+            let middle = mesh.corners(f).into_iter().sum::<DVec3>() / 3.0;
+            2 * u32::from(middle.x > 0.5) + u32::from(middle.y > 0.5)
+        };
+        let label: Vec<u32> = (0..mesh.triangles.len()).map(quarter).collect();
+        let corner: Vec<bool> =
+            mesh.points.iter().map(|p| [0.0, 1.0].contains(&p.x) && [0.0, 1.0].contains(&p.y)).collect();
+        let lines = vec![false; adjacency.opposite.len()];
+        let off = |footing: Footing| {
+            let complex = outline::outline(&Ground::new(&mesh, &adjacency, &lines), &label, 4, &corner);
+            let mut bench = Bench::new(&mesh, &adjacency, complex).expect("four cells");
+            let fresh = vec![true; bench.complex.nodes.len()];
+            settle_some(&mut bench, (4, footing), 24, fresh, &mut Known::new(), &Silent).unwrap();
+            let inner = bench.complex.stars().into_iter().find(|star| star_change(&bench.complex, star).is_some());
+            let node = bench.complex.from(inner.expect("a corner inside")[0]);
+            (mesh.points[bench.complex.nodes[node as usize].vertex as usize].x - 0.5).abs()
+        };
+        let [counts, ignored] = [Footing::Counts, Footing::Ignored].map(off);
+        assert!(ignored < 0.021 && counts > 0.06, "{counts} {ignored}");
     }
 }

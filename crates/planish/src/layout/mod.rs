@@ -73,6 +73,9 @@ const FORCED: f64 = 0.85;
 /// Rounds of settling for each round of smoothing asked for: a round redraws disjoint unions only.
 const SETTLING_PER_SMOOTHING: usize = 8;
 
+/// The last settling is for patches of this part of the size: meshes for it are that much finer. Chosen.
+const FINISH_TO_SIDE: f64 = 0.25;
+
 /// Patches of a typical layout; default ones of the measured meshes have 33 to 285. The scale of directions goes by their side, and
 /// pieces of less area than one are small.
 const TYPICAL_PATCHES: f64 = 100.0;
@@ -353,13 +356,13 @@ fn partitioned(
                 // Features may force more patches than asked for; shape is not given up for the number.
                 let forced = bench.shapes().iter().flatten().filter(|s| s.area > CROWDED * side * side).count();
                 let patches = params.patches.max((FORCED * forced as f64) as usize);
-                if let Some(improved) = improve_coarsely(&bench, side, patches, params, observer)? {
-                    bench = improved;
+                let good = |bench: &mut Bench| make_good(bench, side, patches, params, observer);
+                if coarsely(&mut bench, side, observer, good)? {
                     improve::straighten(&mut bench, observer)?;
                 } else {
-                    make_good(&mut bench, side, patches, params, observer)?;
+                    good(&mut bench)?;
                 }
-                fair::fair(&mut bench);
+                finish(&mut bench, params, observer)?;
                 observer.progress(1.0);
                 return Ok((
                     network(&work, &work_adjacency, &bench.complex),
@@ -372,24 +375,38 @@ fn partitioned(
     Err(LayoutError::Stuck { faces: mesh.triangles.len() })
 }
 
-/// Improves the complex of `bench` on a coarser mesh, where a change costs less. `None` if that mesh would not be much
-/// smaller or the way back fails.
-fn improve_coarsely<'a>(
-    bench: &Bench<'a>,
+/// Does `work` on a coarser mesh, for patches with sides of about `side`, where a change costs less. False, and nothing
+/// changes, if that mesh would not be much smaller or the way back fails.
+fn coarsely(
+    bench: &mut Bench,
     side: f64,
-    patches: usize,
-    params: &LayoutParams,
     observer: &dyn Observer,
-) -> Result<Option<Bench<'a>>, LayoutError> {
+    work: impl FnOnce(&mut Bench) -> Result<(), LayoutError>,
+) -> Result<bool, LayoutError> {
     let Some(mut coarse) = coarse::coarsen(bench.mesh, bench.adjacency, &bench.complex, side, observer) else {
-        return Ok(None);
+        return Ok(false);
     };
     let adjacency = Adjacency::new(&coarse.mesh);
     let complex = std::mem::take(&mut coarse.complex);
-    let Some(mut on_coarse) = Bench::new(&coarse.mesh, &adjacency, complex) else { return Ok(None) };
-    make_good(&mut on_coarse, side, patches, params, observer)?;
+    let Some(mut on_coarse) = Bench::new(&coarse.mesh, &adjacency, complex) else { return Ok(false) };
+    work(&mut on_coarse)?;
     let complex = coarse.refined(bench.mesh, bench.adjacency, &on_coarse.complex);
-    Ok(complex.and_then(|complex| Bench::new(bench.mesh, bench.adjacency, complex)))
+    let back = complex.and_then(|complex| Bench::new(bench.mesh, bench.adjacency, complex));
+    Ok(back.map(|back| *bench = back).is_some())
+}
+
+/// The last steps on the mesh itself: patches that a grid would not cover well are drawn anew with their corners on flat ground,
+/// and curves become fair.
+fn finish(bench: &mut Bench, params: &LayoutParams, observer: &dyn Observer) -> Result<(), LayoutError> {
+    let rounds = SETTLING_PER_SMOOTHING * params.smoothing;
+    let area: f64 = (0..bench.mesh.triangles.len()).map(|f| bench.mesh.area(f)).sum();
+    let side = (area / bench.complex.live_cells().count().max(1) as f64).sqrt();
+    let settle = |bench: &mut Bench| improve::settle_uncovered(bench, rounds, observer);
+    if !coarsely(bench, FINISH_TO_SIDE * side, observer, settle)? {
+        settle(bench)?;
+    }
+    fair::fair(bench);
+    Ok(())
 }
 
 /// Relaxes the cells and improves their connectivity, towards `patches` of them with sides of about `side`.

@@ -4,6 +4,7 @@
 
 use crate::geom::polyline;
 use glam::DVec3;
+use std::f64::consts::FRAC_PI_2;
 
 /// The direction of a curve at its end is taken at this part of its length: beyond the faces, before its bends.
 const HEAD: f64 = 0.2;
@@ -57,6 +58,12 @@ pub(super) struct Shape {
 fn angle_cost(angle: f64) -> f64 {
     let off = (angle.to_degrees() - 90.0).abs();
     (off / 45.0).powi(2) + ((off - STEEP_DEG).max(0.0) / 15.0).powi(2)
+}
+
+/// What ground of some flatness ([`super::fitness`]) around a node costs: as much as corners that are off square by the angle that
+/// its normals have, in the mean, to their mean.
+pub(super) fn ground_cost(flatness: f64) -> f64 {
+    angle_cost(FRAC_PI_2 - flatness.clamp(-1.0, 1.0).acos())
 }
 
 impl Shape {
@@ -131,5 +138,13 @@ mod tests {
         }
         let flat = quad([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.0, 1.0]], 1.0);
         assert!(flat.cost(1.0) > 3.0, "{}", flat.cost(1.0));
+    }
+
+    #[test]
+    fn ground_costs_what_corners_do_that_are_as_far_off_square_as_its_normals_are_off_their_mean() {
+        for off_deg in [0.0_f64, 20.0, 45.0, 60.0] {
+            assert!((ground_cost(off_deg.to_radians().cos()) - angle_cost((90.0 + off_deg).to_radians())).abs() < 1e-9);
+        }
+        assert!((ground_cost(0.5_f64.sqrt()) - 1.0).abs() < 1e-9);
     }
 }

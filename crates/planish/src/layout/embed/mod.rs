@@ -15,6 +15,7 @@ mod trace;
 
 use crate::layout::complex::{Arc, Complex, Node};
 use crate::layout::map::SeamlessMap;
+use crate::layout::proxy::Proxy;
 use crate::layout::recut::keep_apart;
 use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::CurveKind;
@@ -22,11 +23,16 @@ use crate::network::imprint::Place;
 use crate::observe::counted;
 use lattice::{Freedom, Lattice, UNIT, cross, is_whole, minus};
 use std::collections::HashMap;
+use std::rc::Rc;
 use trace::{Met, Port};
 
 /// Curves that cross one edge keep at least this distance from each other and from its ends, as a fraction of the edge
 /// (less where many cross).
 const CROSSINGS_APART: f64 = 0.02;
+
+/// Every integer point of a map needs a vertex. Where too few can get there edges are to be this long in unit squares: four
+/// vertices for one square. Chosen.
+const EDGE_TO_SQUARE: f64 = 0.5;
 
 /// Why the squares of a map cannot be drawn on its mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -106,6 +112,29 @@ pub(super) fn embed(
     let half = arcs(&lattice, &node, &ports, &mut complex)?;
     cells(&lattice, &ports, &half, &mut complex)?;
     Ok(complex)
+}
+
+/// [`embed`] on a proxy that gets back as many vertices as the squares need.
+/// # Errors
+/// [`EmbedError`], of `proxy` as it is.
+pub(super) fn embed_on(proxy: &Rc<Proxy>, map: &SeamlessMap) -> Result<(Rc<Proxy>, Complex), EmbedError> {
+    let drawn = |proxy: &Proxy, map: &SeamlessMap| embed(&proxy.mesh, &proxy.adjacency, &proxy.lines, map);
+    let fault = match drawn(proxy, map) {
+        Ok(complex) => return Ok((Rc::clone(proxy), complex)),
+        Err(fault) => fault,
+    };
+    let mut left = fault.clone();
+    let mut finer: Option<(Proxy, SeamlessMap)> = None;
+    while let EmbedError::Crowded { faces } = &left {
+        let (proxy, map) = finer.as_ref().map_or((&**proxy, map), |(proxy, map)| (proxy, map));
+        let Some((proxy, map)) = proxy.regained(faces, map, EDGE_TO_SQUARE) else { break };
+        match drawn(&proxy, &map) {
+            Ok(complex) => return Ok((Rc::new(proxy), complex)),
+            Err(fault) => left = fault,
+        }
+        finer = Some((proxy, map));
+    }
+    Err(fault)
 }
 
 /// Follows the grid from every port once; returns for each port of each node the half-arc that leaves there.

@@ -105,15 +105,18 @@ fn box_map(mesh: &TriMesh, adjacency: &Adjacency, squares: f64) -> SeamlessMap {
 }
 
 #[test]
-fn squares_drawn_on_a_proxy_of_3_000_triangles_are_disks_of_the_fine_box_with_its_12_lines_whole() {
+fn squares_drawn_on_proxies_that_get_vertices_back_where_they_need_them_are_disks_of_the_fine_box_with_its_12_lines_whole()
+ {
     let mesh = shapes::cuboid(DVec3::new(1.0, 2.0, 3.0), 58);
     let sharp = sharp_edges(&mesh, &Adjacency::new(&mesh), 40.0);
     assert!(mesh.triangles.len() > 40_000);
-    let proxy = proxy(&mesh, &sharp, &[], &Sizing::even(&mesh, 3_000), &Silent).expect("a proxy");
-    assert!((2_900..3_001).contains(&proxy.mesh.triangles.len()), "{}", proxy.mesh.triangles.len());
-    for squares in [1.0, 2.0] {
-        let map = box_map(&proxy.mesh, &proxy.adjacency, squares);
-        let complex = embed(&proxy.mesh, &proxy.adjacency, &proxy.lines, &map).expect("a complex");
+    // The last proxy has fewer vertices than there are corners.
+    for (triangles, squares) in [(3_000, 1.0), (3_000, 2.0), (300, 3.0)] {
+        let coarse = proxy(&mesh, &sharp, &[], &Sizing::even(&mesh, triangles), &Silent).map(Rc::new).expect("a proxy");
+        assert!((29 * triangles / 30..=triangles).contains(&coarse.mesh.triangles.len()));
+        let map = box_map(&coarse.mesh, &coarse.adjacency, squares);
+        let (proxy, complex) = embed_on(&coarse, &map).expect("a complex");
+        assert_eq!(Rc::ptr_eq(&proxy, &coarse), triangles == 3_000);
         let sides = 22 * (squares * squares) as usize;
         assert_eq!((complex.cells.len(), kinds(&complex)[1]), (sides, 24 * squares as usize));
         let (fine, adjacency) = proxy.fine();
@@ -137,22 +140,27 @@ fn squares_drawn_on_a_proxy_of_3_000_triangles_are_disks_of_the_fine_box_with_it
 
 #[test]
 fn squares_drawn_on_a_proxy_of_a_sheet_come_back_with_its_whole_boundary() {
-    let mesh = shapes::rectangle(1.0, 1.0, 60, 60);
-    let proxy = proxy(&mesh, &vec![false; 3 * mesh.triangles.len()], &[], &Sizing::even(&mesh, 1_000), &Silent)
-        .expect("a proxy");
-    let map = SeamlessMap {
-        uv: (0..proxy.mesh.triangles.len()).map(|f| proxy.mesh.corners(f).map(|p| p.truncate() * 4.0)).collect(),
-        jump: vec![0; proxy.lines.len()],
-    };
-    let complex = embed(&proxy.mesh, &proxy.adjacency, &proxy.lines, &map).expect("a complex");
-    assert_eq!((complex.nodes.len(), kinds(&complex), complex.cells.len()), (25, [24, 0, 16], 16));
-    let back = proxy.back(&complex).expect("a way back");
-    let (fine, adjacency) = proxy.fine();
-    let boundary = back.live_arcs().filter(|&a| back.arc(2 * a).kind == CurveKind::Boundary);
-    let vertices: usize = boundary.map(|a| back.arc(2 * a).chain.len() - 1).sum();
-    assert_eq!(vertices, adjacency.opposite.iter().filter(|&&o| o == NONE).count());
-    assert!(Bench::new(fine, adjacency, back.clone()).is_some());
-    assert_eq!(imprint(&mesh, &proxy.network(&back), &Silent).map(|p| p.len()), Ok(16));
+    // The last sheet has fewer vertices than there are corners even when it is refined.
+    for (cells, triangles, squares) in [(60, 1_000, 4), (60, 40, 6), (4, 40, 20)] {
+        let mesh = shapes::rectangle(1.0, 1.0, cells, cells);
+        let none = vec![false; 3 * mesh.triangles.len()];
+        let coarse = proxy(&mesh, &none, &[], &Sizing::even(&mesh, triangles), &Silent).map(Rc::new).expect("a proxy");
+        let chart = |f: usize| coarse.mesh.corners(f).map(|p| p.truncate() * squares as f64);
+        let uv = (0..coarse.mesh.triangles.len()).map(chart).collect();
+        let map = SeamlessMap { uv, jump: vec![0; coarse.lines.len()] };
+        let (proxy, complex) = embed_on(&coarse, &map).expect("a complex");
+        assert_eq!(Rc::ptr_eq(&proxy, &coarse), triangles == 1_000);
+        let cells = squares * squares;
+        assert_eq!(complex.nodes.len(), (squares + 1) * (squares + 1));
+        assert_eq!((kinds(&complex), complex.cells.len()), ([2 * cells - 2 * squares, 0, 4 * squares], cells));
+        let back = proxy.back(&complex).expect("a way back");
+        let (fine, adjacency) = proxy.fine();
+        let boundary = back.live_arcs().filter(|&a| back.arc(2 * a).kind == CurveKind::Boundary);
+        let vertices: usize = boundary.map(|a| back.arc(2 * a).chain.len() - 1).sum();
+        assert_eq!(vertices, adjacency.opposite.iter().filter(|&&o| o == NONE).count());
+        assert!(Bench::new(fine, adjacency, back.clone()).is_some());
+        assert_eq!(imprint(&mesh, &proxy.network(&back), &Silent).map(|p| p.len()), Ok(cells));
+    }
 }
 
 #[test]

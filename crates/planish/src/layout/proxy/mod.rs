@@ -9,10 +9,12 @@
 pub(super) mod coarse;
 mod melt;
 pub(super) mod refine;
+mod regain;
 mod strands;
 
 use self::melt::Melt;
 use self::refine::Refined;
+use self::regain::History;
 use self::strands::{Step, Strands};
 use crate::layout::complex::Complex;
 use crate::layout::{carry, network};
@@ -20,7 +22,10 @@ use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::Network;
 use crate::observe::Observer;
 use glam::DVec3;
+use std::cell::OnceCell;
+use std::collections::HashSet;
 use std::f64::consts::SQRT_2;
+use std::rc::Rc;
 
 /// Longest edge of the refined mesh in edges of the proxy: short enough to choose from.
 const FINE: f64 = 0.6;
@@ -51,9 +56,12 @@ pub(super) struct Proxy {
     /// For each half-edge whether it lies on a sharp line; not those of the boundary.
     pub lines: Vec<bool>,
     /// The refined input, which the proxy is made from by `steps`.
-    work: Refined,
-    work_adjacency: Adjacency,
-    steps: Vec<Step>,
+    work: Rc<Refined>,
+    work_adjacency: Rc<Adjacency>,
+    steps: Rc<Vec<Step>>,
+    history: Rc<OnceCell<History>>,
+    /// Numbers of the steps that were taken back ([`Proxy::regained`]).
+    taken_back: HashSet<u32>,
     /// For each vertex and face of the proxy that of the refined input.
     vertex: Vec<u32>,
     face: Vec<u32>,
@@ -152,11 +160,13 @@ pub(super) fn proxy(
     let triangles = face.iter().map(|&f| melt.triangles[f as usize].map(|v| number[v as usize])).collect();
     let tagged: Vec<bool> =
         face.iter().flat_map(|&f| (0..3).map(move |k| 3 * f + k)).map(|h| melt.tagged[h as usize]).collect();
-    let steps = std::mem::take(&mut melt.steps);
+    let steps = Rc::new(std::mem::take(&mut melt.steps));
     let mesh = TriMesh::new(points, triangles);
     let adjacency = Adjacency::new(&mesh);
     let lines = tagged.iter().zip(&adjacency.opposite).map(|(&tag, &o)| tag && o != NONE).collect();
-    Some(Proxy { mesh, adjacency, lines, work, work_adjacency, steps, vertex, face })
+    let (work, work_adjacency) = (Rc::new(work), Rc::new(work_adjacency));
+    let (history, taken_back) = (Rc::default(), HashSet::new());
+    Some(Proxy { mesh, adjacency, lines, work, work_adjacency, steps, history, taken_back, vertex, face })
 }
 
 impl Proxy {
@@ -170,8 +180,10 @@ impl Proxy {
     pub fn back(&self, complex: &Complex) -> Option<Complex> {
         let names = (&self.vertex[..], &self.face[..]);
         let mut strands = Strands::new((&self.mesh, &self.adjacency), complex, names, self.work.mesh.triangles.len())?;
-        for step in self.steps.iter().rev() {
-            strands.undo(step, &self.work.mesh.points);
+        for (i, step) in self.steps.iter().enumerate().rev() {
+            if !self.taken_back.contains(&(i as u32)) {
+                strands.undo(step, &self.work.mesh.points);
+            }
         }
         let mut complex = complex.clone();
         complex.nodes.iter_mut().for_each(|n| n.vertex = self.vertex[n.vertex as usize]);

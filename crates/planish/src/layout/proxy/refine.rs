@@ -20,6 +20,7 @@ const MAX_TURN_SWEEPS: usize = 32;
 const TURN_BELOW: f64 = -1e-3;
 
 /// The refined mesh with the way back.
+#[derive(Clone)]
 pub(in crate::layout) struct Refined {
     pub mesh: TriMesh,
     /// For each triangle the input face, and its corners as barycentric coordinates of that face.
@@ -193,6 +194,24 @@ impl Refined {
         Refined {
             mesh: TriMesh::new(mesh.points.clone(), mesh.triangles.clone()),
             parent: (0..mesh.triangles.len() as u32).map(|f| (f, unit)).collect(),
+        }
+    }
+
+    /// Splits the edge of these half-edges, one of the boundary or two that are opposite to each other, at its middle. Each of
+    /// their faces keeps the part at the start of its half-edge; the other parts come after all faces there are.
+    pub fn split_edge(&mut self, halves: &[u32]) {
+        let [a, b] = [halves[0], next(halves[0])].map(|h| self.mesh.origin(h));
+        let middle = self.mesh.points.len() as u32;
+        self.mesh.points.push(self.mesh.points[a as usize].midpoint(self.mesh.points[b as usize]));
+        for &h in halves {
+            let (f, k) = (h as usize / 3, h as usize % 3);
+            let end = (k + 1) % 3;
+            let (mut names, (face, mut places)) = (self.mesh.triangles[f], self.parent[f]);
+            let half = std::array::from_fn(|i| (places[k][i] + places[end][i]) / 2.0);
+            (self.mesh.triangles[f][end], self.parent[f].1[end]) = (middle, half);
+            (names[k], places[k]) = (middle, half);
+            self.mesh.triangles.push(names);
+            self.parent.push((face, places));
         }
     }
 
