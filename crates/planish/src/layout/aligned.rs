@@ -159,6 +159,12 @@ pub(super) enum AlignError {
         /// How many they would be.
         found: usize,
     },
+    /// The same, by its corners alone: another map would have no fewer.
+    #[error("the corners of its sharp edges and boundaries ask for {least} patches along its form at least")]
+    Crowded {
+        /// How many they ask for.
+        least: usize,
+    },
     /// The whole numbers.
     #[error("{0}")]
     Quantize(#[from] QuantizeError),
@@ -322,7 +328,7 @@ pub(super) fn lay(
             }
             let Some(trouble) = trouble else { break };
             why = trouble;
-            if effort.is_spent() {
+            if effort.is_spent() || matches!(why, AlignError::Crowded { .. }) {
                 return best.ok_or(why);
             }
             // Where no number had room, or none that had is the one asked for, finer edges hardly ever help.
@@ -414,7 +420,7 @@ impl Aligned {
 
     /// The scales in question, in the order in which they are tried.
     /// # Errors
-    /// [`AlignError`], among others `Count`.
+    /// [`AlignError`], among others `Count` and `Crowded`.
     fn scales(&self, params: &LayoutParams, observer: &dyn Observer) -> Result<Vec<Scale>, AlignError> {
         if let Some(asked) = asked(params) {
             return Ok(NEAR_ASKED.map(|near| Scale::Squares(((near * asked as f64).round() as usize).max(1))).to_vec());
@@ -422,8 +428,14 @@ impl Aligned {
         if params.coarsest {
             return Ok(vec![Scale::Coarsest]);
         }
+        let Proxy { mesh, adjacency, lines, .. } = &*self.proxy;
+        let is_many = |squares: usize| squares as f64 > MOST_UNASKED;
+        let least = integers::least_squares(mesh, adjacency, &self.mapped.map, lines);
+        if is_many(least) {
+            return Err(AlignError::Crowded { least });
+        }
         let least = self.quantized(Scale::Coarsest, observer)?.squares;
-        if least as f64 > MOST_UNASKED {
+        if is_many(least) {
             return Err(AlignError::Count { found: least });
         }
         let numbers = GROWTH.map(|n| n * least as f64).into_iter().filter(|n| *n <= MOST_UNASKED);

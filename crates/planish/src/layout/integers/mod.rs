@@ -17,7 +17,7 @@ mod walks;
 
 use crate::geom::is_positive;
 use crate::layout::map::SeamlessMap;
-use crate::mesh::{Adjacency, NONE, TriMesh};
+use crate::mesh::{Adjacency, NONE, TriMesh, previous};
 use crate::observe::{Cancelled, Observer};
 use flat::Flat;
 use glam::DVec2;
@@ -115,6 +115,23 @@ pub(super) fn quantize(
     let uv = charts::place(mesh, adjacency, map, shapes, &kept, &line).ok_or(QuantizeError::Torn)?;
     let squares = whole.squares() as usize;
     Ok(IntegerMap { uv, kept: (0..kept.len() as u32).filter(|&v| kept[v as usize]).collect(), squares })
+}
+
+/// The least number of squares that a map can have, by Euler's formula: each corner of lines is a vertex of theirs, and quads
+/// with `i` vertices inside and `b` on boundaries number `i + b/2` less the Euler number.
+/// * `lines` - as in [`quantize`]
+pub(super) fn least_squares(mesh: &TriMesh, adjacency: &Adjacency, map: &SeamlessMap, lines: &[bool]) -> usize {
+    let flat = Flat::new(mesh, adjacency, map, lines);
+    let twice = |(v, is_kept): (usize, bool)| match flat.fan(v as u32) {
+        fan if !is_kept || !fan.iter().any(|&h| flat.line[h as usize]) => 0,
+        fan if fan.iter().any(|&h| flat.opposite[previous(h) as usize] == NONE) => 1,
+        _ => 2,
+    };
+    let sum: i64 = thin::corners(&flat).into_iter().enumerate().map(twice).sum();
+    let edges = adjacency.opposite.iter().enumerate().filter(|(h, o)| **o == NONE || (*h as u32) < **o).count();
+    let used = adjacency.outgoing.iter().filter(|h| **h != NONE).count();
+    let euler = used as i64 - edges as i64 + mesh.triangles.len() as i64;
+    ((sum + 1) / 2 - euler).max(0) as usize
 }
 
 /// The parts that each face has of the area of the surface and of the map.

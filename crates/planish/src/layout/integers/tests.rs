@@ -90,6 +90,16 @@ fn a_plate_with_a_square_hole_keeps_16_corners_and_has_its_32_squares() {
 }
 
 #[test]
+fn corners_of_lines_ask_for_the_6_squares_of_a_cube_16_of_32_of_a_plate_with_a_hole_and_2_of_3_of_an_l() {
+    let least = |made: &Charted| least_squares(&made.mesh, &made.adjacency, &made.map, &made.lines);
+    let ring: Vec<[i32; 3]> = cuboid([3, 3, 1]).into_iter().filter(|v| *v != [1, 1, 0]).collect();
+    assert_eq!(least(&solid(&cuboid([1, 1, 1]), 8).shaken(1)), 6);
+    assert_eq!(least(&solid(&ring, 8).shaken(1)), 16);
+    assert_eq!(least(&flat(&[[0, 0], [1, 0], [0, 1]], 8).shaken(2)), 2);
+    assert_eq!(least(&torus(3, 2, 8)), 0);
+}
+
+#[test]
 fn components_are_counted_together_and_one_without_a_cone_is_kept_too() {
     let made = solid(&cuboid([1, 1, 1]), 6).beside(&torus(3, 2, 6)).beside(&flat(&[[0, 0], [1, 0]], 6));
     let found = squares_of(&made, &made.lines, Scale::Coarsest);
