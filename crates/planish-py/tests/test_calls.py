@@ -72,7 +72,7 @@ except KeyboardInterrupt:
 """
 
 
-@pytest.mark.parametrize(("call", "after"), [("fit", "0.2"), ("fit", "0.8"), ("fit", "2.5"), ("bricks", "0.2"), ("bricks", "0.7")])
+@pytest.mark.parametrize(("call", "after"), [("fit", "0.2"), ("fit", "0.8"), ("fit", "2.5"), ("bricks", "0.2"), ("bricks", "1.1")])
 def test_ctrl_c_stops_a_call_within_200_ms(call: str, after: str) -> None:
     # The machine may be busy with other work: on one thread, the time that the process has computed is what it takes alone.
     least = 9.9

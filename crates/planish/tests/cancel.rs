@@ -5,7 +5,10 @@
 //! does not ask is late in all.
 #![allow(clippy::print_stdout)]
 
-use planish::cloud::bricks::CloudStore;
+use glam::DVec3;
+use planish::cloud::bricks::{CloudStore, Partition};
+use planish::geom::Aabb;
+use planish::geom::random::unit;
 use planish::layout::Known;
 use planish::mesh::{CompareParams, DecimateParams, DecimateTarget, SmoothParams, TriMesh, compare, decimate, smooth};
 use planish::observe::{Cancelled, Observer};
@@ -55,7 +58,7 @@ fn stops<T, E: Error + 'static>(name: &str, stage: impl Fn(&Until) -> Result<T, 
     let full = start.elapsed().as_secs_f64();
     let mut worst: f64 = 0.0;
     for moment in 0..MOMENTS {
-        let share = planish::geom::random::unit(7, moment);
+        let share = unit(7, moment);
         let late = || {
             let until = Instant::now() + Duration::from_secs_f64(share * full);
             let result = stage(&Until(until));
@@ -84,6 +87,10 @@ fn stops<T, E: Error + 'static>(name: &str, stage: impl Fn(&Until) -> Result<T, 
 /// A part with sharp edges and relief.
 fn part(triangles: usize) -> TriMesh {
     synthetic::demo(0, triangles)
+}
+
+fn random_points(count: u64) -> Vec<DVec3> {
+    (0..count).map(|i| DVec3::from_array([0, 1, 2].map(|k| unit(5, 3 * i + k)))).collect()
 }
 
 /// A model of a part, with the grids of which stages go on.
@@ -130,6 +137,13 @@ fn extraction_ends_within_200_ms() {
     let mesh = part(100_000);
     let sampling = contour::Sampling { spacing: planish::field::Spacing::Resolution(129), memory: 4 << 30 };
     stops("contour", |o| contour::from_mesh(&mesh, sampling, &Default::default(), o));
+}
+
+#[test]
+fn parting_of_points_into_bricks_ends_within_200_ms() {
+    let points = random_points(4_000_000);
+    let aabb = Aabb::of(&points);
+    stops("bricks", |o| Partition::within(&points, 100_000, aabb, o));
 }
 
 #[test]

@@ -11,15 +11,42 @@ mod measure;
 mod table;
 
 use measure::{Figures, NOISES, PARTS, SEEDS};
+use std::sync::{Condvar, LazyLock, Mutex, PoisonError};
+use std::thread;
+
+/// Cores that no run has taken. Runs of all rows share them: the last row would keep one busy and the others waiting.
+static FREE: LazyLock<Mutex<usize>> =
+    LazyLock::new(|| Mutex::new(thread::available_parallelism().map_or(1, usize::from)));
+static FREED: Condvar = Condvar::new();
+
+/// A core of a run, free again when this goes.
+struct Core;
+
+impl Core {
+    fn take() -> Core {
+        let free = FREE.lock().unwrap_or_else(PoisonError::into_inner);
+        *FREED.wait_while(free, |free| *free == 0).unwrap_or_else(PoisonError::into_inner) -= 1;
+        Core
+    }
+}
+
+impl Drop for Core {
+    fn drop(&mut self) {
+        *FREE.lock().unwrap_or_else(PoisonError::into_inner) += 1;
+        FREED.notify_one();
+    }
+}
 
 fn guard(part: &str, percent: f64) {
-    let runs: Vec<Figures> = SEEDS
-        .iter()
-        .map(|&seed| {
-            let found = measure::measure(&measure::scan(part, percent, seed));
-            found.unwrap_or_else(|e| panic!("{part}, noise {percent} %, seed {seed}: {e}"))
-        })
-        .collect();
+    let run = |seed: u64| {
+        let _core = Core::take();
+        let found = measure::measure(&measure::scan(part, percent, seed));
+        found.unwrap_or_else(|e| panic!("{part}, noise {percent} %, seed {seed}: {e}"))
+    };
+    let runs: Vec<Figures> = thread::scope(|scope| {
+        let started = SEEDS.map(|seed| scope.spawn(move || run(seed)));
+        started.map(|one| one.join().unwrap_or_else(|fault| std::panic::resume_unwind(fault))).into()
+    });
     let row = measure::row_name(part, percent);
     if std::env::var("PLANISH_FIGURES").is_ok_and(|word| word == "write") {
         table::write(&row, &runs);

@@ -318,13 +318,16 @@ fn write(part: Part, room: Room, aabb: Aabb, bricks: &mut Vec<Brick>) -> io::Res
     })?;
     std::fs::remove_file(&part.path)?;
     let points: Vec<DVec3> = held.iter().map(|r| r.point).collect();
-    let partition = Partition::within(&points, room.most.0, aabb);
+    let parted = Partition::within(&points, room.most.0, aabb, room.observer);
+    let partition = parted.map_err(io::Error::other)?;
     let from = planish::cloud::bricks::points_of(bricks);
     for brick in partition.bricks {
-        room.observer.check().map_err(io::Error::other)?;
         let mut out = Sheaf::new(points_file(room.folder, bricks.len()), part.more)?;
         let rest = |i: usize| &rests[part.more * i..][..part.more];
-        partition.order[brick.range.clone()].iter().try_for_each(|&i| out.push(&held[i as usize], rest(i as usize)))?;
+        for some in partition.order[brick.range.clone()].chunks(RECORDS_PER_LOOK) {
+            room.observer.check().map_err(io::Error::other)?;
+            some.iter().try_for_each(|&i| out.push(&held[i as usize], rest(i as usize)))?;
+        }
         out.close()?;
         bricks.push(Brick { range: from + brick.range.start..from + brick.range.end, ..brick });
     }

@@ -4,6 +4,7 @@
 //! The bricks follow from the points alone, so that what is made of them does not depend on the machine.
 
 use crate::geom::{Aabb, is_positive};
+use crate::observe::{Cancelled, Observer, Silent};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -48,15 +49,18 @@ pub struct Partition {
 impl Partition {
     /// Parts the finite ones of `points` into bricks of at most `most`, but for points that lie in one place.
     pub fn new(points: &[DVec3], most: usize) -> Partition {
-        Partition::within(points, most, Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY })
+        let everywhere = Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY };
+        Partition::within(points, most, everywhere, &Silent).expect("it is silent")
     }
 
     /// As [`Partition::new`], for bricks that fill a box.
-    pub fn within(points: &[DVec3], most: usize, aabb: Aabb) -> Partition {
+    /// # Errors
+    /// [`Cancelled`] by the observer.
+    pub fn within(points: &[DVec3], most: usize, aabb: Aabb, observer: &dyn Observer) -> Result<Partition, Cancelled> {
         let mut order: Vec<u32> = (0..points.len() as u32).filter(|&i| points[i as usize].is_finite()).collect();
         let mut bricks = Vec::new();
-        divide(points, &mut order, 0, aabb, most.max(1), &mut bricks);
-        Partition { bricks, order }
+        divide(Parted { points, most: most.max(1), observer }, &mut order, 0, aabb, &mut bricks)?;
+        Ok(Partition { bricks, order })
     }
 
     /// The points in a brick or within `halo` of it, as ascending indices.
@@ -76,29 +80,58 @@ impl Partition {
     }
 }
 
-fn divide(points: &[DVec3], order: &mut [u32], from: usize, aabb: Aabb, most: usize, bricks: &mut Vec<Brick>) {
-    let bounds = Aabb::of(order.iter().map(|&i| &points[i as usize]));
+/// What is parted, and into bricks of how many points at most.
+#[derive(Clone, Copy)]
+struct Parted<'a> {
+    points: &'a [DVec3],
+    most: usize,
+    observer: &'a dyn Observer,
+}
+
+/// The median of some places: what lies on the cut is beyond it. Where all below lies on it, too, the next place.
+fn cut(mut places: Vec<f64>, least: f64) -> f64 {
+    let middle = places.len() / 2;
+    let (_, &mut median, _) = places.select_nth_unstable_by(middle, f64::total_cmp);
+    match least < median {
+        true => median,
+        false => places.into_iter().filter(|&x| x > median).fold(f64::INFINITY, f64::min),
+    }
+}
+
+/// Brings those that are below to the front, and both sorts keep their order. Returns how many are below.
+fn part_stably(order: &mut [u32], is_below: impl Fn(u32) -> bool) -> usize {
+    let (below, above): (Vec<u32>, Vec<u32>) = order.iter().partition(|&&i| is_below(i));
+    order[..below.len()].copy_from_slice(&below);
+    order[below.len()..].copy_from_slice(&above);
+    below.len()
+}
+
+/// * `order` - indices of some of the points, ascending; they become ascending in each brick
+/// * `from` - how many are in the bricks before
+fn divide(
+    parted: Parted,
+    order: &mut [u32],
+    from: usize,
+    aabb: Aabb,
+    bricks: &mut Vec<Brick>,
+) -> Result<(), Cancelled> {
+    parted.observer.check()?;
+    let bounds = Aabb::of(order.iter().map(|&i| &parted.points[i as usize]));
     let size = bounds.size();
     let axis = (0..3).fold(0, |best, a| if size[a] > size[best] { a } else { best });
-    if order.len() <= most || !is_positive(size[axis]) {
+    if order.len() <= parted.most || !is_positive(size[axis]) {
         bricks.push(Brick { aabb, bounds, range: from..from + order.len() });
-        return;
+        return Ok(());
     }
-    let at = |i: u32| points[i as usize][axis];
-    let middle = order.len() / 2;
-    order.select_nth_unstable_by(middle, |&a, &b| at(a).total_cmp(&at(b)).then(a.cmp(&b)));
-    // What lies on the cut is beyond it; where all below does, the cut is one place on.
-    let mut cut = at(order[middle]);
-    if bounds.min[axis] >= cut {
-        cut = order.iter().map(|&i| at(i)).filter(|&x| x > cut).fold(f64::INFINITY, f64::min);
-    }
-    order.sort_unstable_by_key(|&i| (at(i) >= cut, i));
-    let split = order.partition_point(|&i| at(i) < cut);
-    let (low, high) = order.split_at_mut(split);
+    let at = |i: u32| parted.points[i as usize][axis];
+    let cut = cut(order.iter().map(|&i| at(i)).collect(), bounds.min[axis]);
+    parted.observer.check()?;
+    let split = part_stably(order, |i| at(i) < cut);
     let (mut below, mut above) = (aabb, aabb);
     (below.max[axis], above.min[axis]) = (cut, cut);
-    divide(points, low, from, below, most, bricks);
-    divide(points, high, from + split, above, most, bricks);
+    let (low, high) = order.split_at_mut(split);
+    divide(parted, low, from, below, bricks)?;
+    divide(parted, high, from + split, above, bricks)
 }
 
 #[cfg(test)]
