@@ -20,7 +20,7 @@ def cache_bytes():
 
 
 # Far above what a file of a few hundred bytes needs, far below what a lying header asks for. Each thread reserves address space,
-# which it does not use: where it multiplies matrices twice the third level cache, half a gigabyte on some machines.
+# which it does not use: where it multiplies matrices twice the third level cache, nearly a gigabyte on some machines.
 ADDRESS_SPACE = (1 << 30) + THREADS * 2 * cache_bytes()
 
 XYZ = "property float x\nproperty float y\nproperty float z\n"

@@ -161,7 +161,7 @@ pub(super) enum AlignError {
     },
     /// The same, by its corners alone: another map would have no fewer.
     #[error("the corners of its sharp edges and boundaries ask for {least} patches along its form at least")]
-    Crowded {
+    LeastCount {
         /// How many they ask for.
         least: usize,
     },
@@ -231,7 +231,7 @@ pub(super) struct Worth {
     missed: f64,
     /// Part of the patches that a grid covers well.
     good_part: f64,
-    /// True if that is large enough.
+    /// True if that is large enough on the proxy.
     is_good: bool,
 }
 
@@ -328,7 +328,7 @@ pub(super) fn lay(
             }
             let Some(trouble) = trouble else { break };
             why = trouble;
-            if effort.is_spent() || matches!(why, AlignError::Crowded { .. }) {
+            if effort.is_spent() || matches!(why, AlignError::LeastCount { .. }) {
                 return best.ok_or(why);
             }
             // Where no number had room, or none that had is the one asked for, finer edges hardly ever help.
@@ -420,7 +420,7 @@ impl Aligned {
 
     /// The scales in question, in the order in which they are tried.
     /// # Errors
-    /// [`AlignError`], among others `Count` and `Crowded`.
+    /// [`AlignError`], among others `Count` and `LeastCount`.
     fn scales(&self, params: &LayoutParams, observer: &dyn Observer) -> Result<Vec<Scale>, AlignError> {
         if let Some(asked) = asked(params) {
             return Ok(NEAR_ASKED.map(|near| Scale::Squares(((near * asked as f64).round() as usize).max(1))).to_vec());
@@ -432,7 +432,7 @@ impl Aligned {
         let is_many = |squares: usize| squares as f64 > MOST_UNASKED;
         let least = integers::least_squares(mesh, adjacency, &self.mapped.map, lines);
         if is_many(least) {
-            return Err(AlignError::Crowded { least });
+            return Err(AlignError::LeastCount { least });
         }
         let least = self.quantized(Scale::Coarsest, observer)?.squares;
         if is_many(least) {

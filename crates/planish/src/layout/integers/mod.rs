@@ -128,9 +128,10 @@ pub(super) fn least_squares(mesh: &TriMesh, adjacency: &Adjacency, map: &Seamles
         _ => 2,
     };
     let sum: i64 = thin::corners(&flat).into_iter().enumerate().map(twice).sum();
-    let edges = adjacency.opposite.iter().enumerate().filter(|(h, o)| **o == NONE || (*h as u32) < **o).count();
     let used = adjacency.outgoing.iter().filter(|h| **h != NONE).count();
-    let euler = used as i64 - edges as i64 + mesh.triangles.len() as i64;
+    let open = adjacency.opposite.iter().filter(|o| **o == NONE).count();
+    // There are `(3 faces + open) / 2` edges.
+    let euler = used as i64 - (mesh.triangles.len() + open) as i64 / 2;
     ((sum + 1) / 2 - euler).max(0) as usize
 }
 
