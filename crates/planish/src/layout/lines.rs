@@ -13,8 +13,12 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How far the mean normals reach, in mean edge lengths of the mesh.
-const NORMAL_REACH_EDGES: f64 = 4.0;
+/// How far the mean normals reach, in edges of the mesh around: weights fall to 0 there, so in the mean as far as all within
+/// four edges. Nor do they reach farther than the shortest line that counts is long.
+const NORMAL_REACH_EDGES: f64 = 16.0 / 3.0;
+
+/// Parts of faces are no longer than this part of the reach.
+const PART_TO_REACH: f64 = 0.25;
 
 /// The angle between the mean normals, against the angle asked for between the faces: the surfaces beside an
 /// edge may bend away from it.
@@ -36,15 +40,14 @@ pub(super) fn feature_lines(
     params: &LayoutParams,
     observer: &dyn Observer,
 ) -> Result<Vec<bool>, Cancelled> {
+    let shortest = params.feature_length * mesh.bounds().diagonal();
     if tagged.contains(&true) {
         let inner = |h: usize| adjacency.opposite[h] != NONE;
         let mut kept: Vec<bool> = tagged.iter().enumerate().map(|(h, &t)| t && inner(h)).collect();
-        drop_detail(mesh, adjacency, params.feature_length * mesh.bounds().diagonal(), &mut kept, observer)?;
+        drop_detail(mesh, adjacency, shortest, &mut kept, observer)?;
         return Ok(kept);
     }
     let sharp = sharp_edges(mesh, adjacency, params.sharp_angle_deg);
-    let edges: f64 = (0..sharp.len() as u32).map(|h| mesh.edge_length(h)).sum();
-    let reach = NORMAL_REACH_EDGES * edges / sharp.len().max(1) as f64;
     let least = (WIDE_ANGLE * params.sharp_angle_deg).to_radians().cos();
     let mut kept: Vec<bool> = (0..sharp.len() as u32)
         .into_par_iter()
@@ -53,6 +56,7 @@ pub(super) fn feature_lines(
             if !sharp[h as usize] || o < h {
                 return false;
             }
+            let reach = shortest.min(NORMAL_REACH_EDGES * edge_around(mesh, adjacency, h));
             let left = mean_normal(mesh, adjacency, &sharp, h, reach);
             let right = mean_normal(mesh, adjacency, &sharp, o, reach);
             left.dot(right) < least
@@ -63,36 +67,67 @@ pub(super) fn feature_lines(
             kept[adjacency.opposite[h] as usize] = true;
         }
     }
-    drop_detail(mesh, adjacency, params.feature_length * mesh.bounds().diagonal(), &mut kept, observer)?;
+    drop_detail(mesh, adjacency, shortest, &mut kept, observer)?;
     Ok(kept)
 }
 
-/// Mean unit normal of the surface to the left of sharp half-edge `h`, up to `reach` from its middle and to the
-/// next sharp edge.
+/// How long edges are around half-edge `h`, whatever the shape of the faces: as in equal-sided triangles with the mean area of those
+/// at its ends.
+fn edge_around(mesh: &TriMesh, adjacency: &Adjacency, h: u32) -> f64 {
+    let around = [mesh.origin(h), mesh.origin(next(h))].into_iter().flat_map(|v| adjacency.fan(v));
+    let (sum, count) = around.fold((0.0, 0.0), |(sum, count), g| (sum + mesh.area(g as usize / 3), count + 1.0));
+    (sum / count * 4.0 / 3.0_f64.sqrt()).sqrt()
+}
+
+/// Mean unit normal of the surface to the left of sharp half-edge `h`, up to the next sharp edge; of its face, if `reach` is 0.
+/// The weight of a place falls from the middle of the edge to 0 at `reach`.
 fn mean_normal(mesh: &TriMesh, adjacency: &Adjacency, sharp: &[bool], h: u32, reach: f64) -> DVec3 {
     let face = h / 3;
     let (a, b) = (mesh.points[mesh.origin(h) as usize], mesh.points[mesh.origin(next(h)) as usize]);
     let middle = a.midpoint(b);
     let inward = mesh.normal(face as usize).cross(b - a);
+    let weight = |p: DVec3| {
+        let out = p - middle;
+        if out.dot(inward) > 0.0 { (1.0 - out.length() / reach).max(0.0) } else { 0.0 }
+    };
     let mut seen = vec![face];
     let mut sum = DVec3::ZERO;
     let mut at = 0;
     while at < seen.len() {
         let f = seen[at];
         at += 1;
-        sum += mesh.area_vector(f as usize);
+        let part = mean_weight(mesh.corners(f as usize), middle, reach, &weight);
+        if part == 0.0 && f != face {
+            continue;
+        }
+        sum += mesh.area_vector(f as usize) * part;
         for g in 3 * f..3 * f + 3 {
             let o = adjacency.opposite[g as usize];
-            if o == NONE || sharp[g as usize] || seen.contains(&(o / 3)) {
-                continue;
-            }
-            let out = mesh.corners(o as usize / 3).into_iter().sum::<DVec3>() / 3.0 - middle;
-            if out.length() < reach && out.dot(inward) > 0.0 {
+            if o != NONE && !sharp[g as usize] && !seen.contains(&(o / 3)) {
                 seen.push(o / 3);
             }
         }
     }
-    sum.normalize_or_zero()
+    sum.try_normalize().unwrap_or_else(|| mesh.normal(face as usize))
+}
+
+/// Mean of a weight over a triangle, which is parted until it is small against the distance `reach` from `center`, beyond which
+/// the weight is 0.
+fn mean_weight(corners: [DVec3; 3], center: DVec3, reach: f64, weight: &impl Fn(DVec3) -> f64) -> f64 {
+    let lengths = [0, 1, 2].map(|k| corners[k].distance(corners[(k + 1) % 3]));
+    let longest = (0..3).max_by(|&i, &j| lengths[i].total_cmp(&lengths[j])).unwrap_or(0);
+    let mean = corners.into_iter().sum::<DVec3>() / 3.0;
+    if !(lengths[longest] > PART_TO_REACH * reach) || reach == 0.0 {
+        return weight(mean);
+    }
+    // No corner is farther from the mean than the longest side.
+    if mean.distance(center) > reach + lengths[longest] {
+        return 0.0;
+    }
+    let [p, q, r] = [0, 1, 2].map(|k| corners[(longest + k) % 3]);
+    let middle = p.midpoint(q);
+    let halves = [[p, middle, r], [middle, q, r]];
+    halves.into_iter().map(|half| mean_weight(half, center, reach, weight)).sum::<f64>() / 2.0
 }
 
 /// Bridges gaps of lines, and clears what is surface detail: lines with a loose end that are shorter than `shortest`, the
@@ -229,6 +264,15 @@ pub mod tests {
                 sharp[h as usize] |= (ends == (a, b) || ends == (b, a)) && adjacency.opposite[h as usize] != NONE;
             }
         }
+    }
+
+    #[test]
+    fn the_mean_weight_of_a_triangle_around_the_center_is_that_of_a_cone() {
+        // A cone of height 1 over the unit disk has a third of the volume of a cylinder.
+        let corners = [DVec3::new(-20.0, -10.0, 0.0), DVec3::new(20.0, -10.0, 0.0), DVec3::new(0.0, 30.0, 0.0)];
+        let area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).length() / 2.0;
+        let mean = mean_weight(corners, DVec3::ZERO, 1.0, &|p: DVec3| (1.0 - p.length()).max(0.0));
+        assert!((mean * area / (std::f64::consts::PI / 3.0) - 1.0).abs() < 0.02, "{}", mean * area);
     }
 
     #[test]

@@ -11,21 +11,23 @@ use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
-/// Greatest cost of a bridge over a gap, mean edges of the mesh: a sharp edge costs its length, a flat one twice that.
+/// Greatest cost of a bridge over a gap, edges of the line ([`End::edge`]): a sharp edge costs its length, a flat one twice that.
 const WIDEST_GAP: f64 = 8.0;
 /// Factor on the cost of a bridge to the middle of a line or to the boundary: a line may as well end in the open there.
 const SIDE_TARGET_FACTOR: f64 = 2.0;
 /// A line must be this many times as long as its bridge costs; nor does a bridge lead to a place on its own line nearer than that.
 const LINE_PER_GAP: f64 = 3.0;
-/// Length over which the direction of a line at its end is taken, mean edges.
+/// Length over which the direction of a line at its end is taken, edges of the line.
 const LAST: f64 = 4.0;
+/// So many of its last edges tell how long the edges of a line are.
+const LAST_EDGES: usize = 4;
 /// Cosine of the greatest angle (50 degrees) between a bridge and the direction in which its line ends; bridges shorter than
-/// `SHORTEST` mean edges may have any.
+/// `SHORTEST` edges of the line may have any.
 const AHEAD: f64 = 0.64;
 const SHORTEST: f64 = 1.5;
-/// A branch with a loose end shorter than this, mean edges, is a spur.
+/// A branch with a loose end shorter than this, edges of the line, is a spur.
 const SPUR: f64 = 1.5;
-/// A last edge shorter than this share of the mean edge tells no direction: noise turns it anywhere.
+/// A last edge shorter than this share of the edges of the line tells no direction: noise turns it anywhere.
 const STUB: f64 = 0.2;
 /// A line that comes back within this angle around a single face is a spike.
 const SPIKE_ANGLE: f64 = 80.0 / 180.0 * std::f64::consts::PI;
@@ -41,6 +43,9 @@ struct End {
     tail: Vec<(u32, f64)>,
     /// Where the line would go on; a unit vector.
     direction: DVec3,
+    /// Mean length of its last edges, at most that of all edges of the mesh: lines of machined parts are as fine as they bend,
+    /// whatever the faces beside.
+    edge: f64,
 }
 
 struct Bridge {
@@ -62,11 +67,11 @@ fn loose_ends(
     mesh: &TriMesh,
     adjacency: &Adjacency,
     sharp: &[bool],
-    edge: f64,
+    mean_edge: f64,
 ) -> (BTreeMap<u32, Vec<u32>>, BTreeMap<u32, End>) {
     let lines = lines_at(mesh, sharp);
     let loose = |v: &u32| lines[v].len() == 1 && !adjacency.is_boundary_vertex(*v);
-    let ends = lines.keys().copied().filter(loose).map(|v| (v, End::new(mesh, &lines, v, edge))).collect();
+    let ends = lines.keys().copied().filter(loose).map(|v| (v, End::new(mesh, &lines, v, mean_edge))).collect();
     (lines, ends)
 }
 
@@ -81,18 +86,18 @@ fn mark(mesh: &TriMesh, adjacency: &Adjacency, chain: &[u32], sharp: &mut [bool]
 }
 
 /// Clears spurs, the shortest at each fork first: without it the fork is one line again, and the other end of a gap may be led on
-/// to it. Clears last edges of loose ends that are far shorter than the mean edge, too.
-fn cut_spurs(mesh: &TriMesh, adjacency: &Adjacency, edge: f64, sharp: &mut [bool]) {
+/// to it. Clears last edges of loose ends that are far shorter than those before, too.
+fn cut_spurs(mesh: &TriMesh, adjacency: &Adjacency, mean_edge: f64, sharp: &mut [bool]) {
     loop {
-        let (lines, ends) = loose_ends(mesh, adjacency, sharp, edge);
+        let (lines, ends) = loose_ends(mesh, adjacency, sharp, mean_edge);
         let mut spurs: BTreeMap<u32, &End> = BTreeMap::new();
-        for end in ends.values().filter(|end| end.length() < SPUR * edge) {
+        for end in ends.values().filter(|end| end.length() < SPUR * end.edge) {
             let fork = end.tail[end.tail.len() - 1].0;
             if lines[&fork].len() > 2 && spurs.get(&fork).is_none_or(|known| end.length() < known.length()) {
                 spurs.insert(fork, end);
             }
         }
-        let stubs = ends.values().filter(|end| end.tail[1].1 < STUB * edge).map(|end| &end.tail[..2]);
+        let stubs = ends.values().filter(|end| end.tail[1].1 < STUB * end.edge).map(|end| &end.tail[..2]);
         let cut: Vec<&[(u32, f64)]> = spurs.values().map(|spur| &spur.tail[..]).chain(stubs).collect();
         if cut.is_empty() {
             return;
@@ -112,15 +117,15 @@ pub fn bridge_gaps(
     sharp: &mut [bool],
     observer: &dyn Observer,
 ) -> Result<usize, Cancelled> {
-    let edge = mesh.mean_edge();
-    cut_spurs(mesh, adjacency, edge, sharp);
+    let mean_edge = mesh.mean_edge();
+    cut_spurs(mesh, adjacency, mean_edge, sharp);
     let mut bridged = 0;
     loop {
-        let (lines, ends) = loose_ends(mesh, adjacency, sharp, edge);
+        let (lines, ends) = loose_ends(mesh, adjacency, sharp, mean_edge);
         let mut bridges: Vec<Bridge> = Vec::new();
         for &v in ends.keys() {
             observer.check()?;
-            bridges.extend(bridge(mesh, adjacency, &lines, &ends, v, edge));
+            bridges.extend(bridge(mesh, adjacency, &lines, &ends, v));
         }
         bridges.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.vertices.cmp(&b.vertices)));
         // One at each place and time: others may lead elsewhere after it.
@@ -134,26 +139,24 @@ pub fn bridge_gaps(
 }
 
 impl End {
-    fn new(mesh: &TriMesh, lines: &BTreeMap<u32, Vec<u32>>, v: u32, edge: f64) -> End {
+    fn new(mesh: &TriMesh, lines: &BTreeMap<u32, Vec<u32>>, v: u32, mean_edge: f64) -> End {
         let mut tail = vec![(v, 0.0)];
         let (mut h, mut along) = (lines[&v][0], 0.0);
-        let mut from = None;
         loop {
             along += mesh.edge_length(h);
             let to = mesh.origin(next(h));
             tail.push((to, along));
-            if from.is_none() && along >= LAST * edge {
-                from = Some(to);
-            }
             let on = lines[&to].iter().find(|&&g| mesh.origin(next(g)) != mesh.origin(h));
             match on {
-                Some(&g) if lines[&to].len() == 2 && along < LINE_PER_GAP * WIDEST_GAP * edge && to != v => h = g,
-                _ => {
-                    let at = |v: u32| mesh.points[v as usize];
-                    return End { direction: (at(v) - at(from.unwrap_or(to))).normalize_or_zero(), tail };
-                }
+                Some(&g) if lines[&to].len() == 2 && along < LINE_PER_GAP * WIDEST_GAP * mean_edge && to != v => h = g,
+                _ => break,
             }
         }
+        let last = LAST_EDGES.min(tail.len() - 1);
+        let edge = mean_edge.min(tail[last].1 / last as f64);
+        let from = tail.iter().find(|t| t.1 >= LAST * edge).unwrap_or(&tail[tail.len() - 1]).0;
+        let at = |v: u32| mesh.points[v as usize];
+        End { direction: (at(v) - at(from)).normalize_or_zero(), tail, edge }
     }
 
     /// Length of the line, as far as it matters.
@@ -161,8 +164,8 @@ impl End {
         self.tail.last().map_or(0.0, |t| t.1)
     }
 
-    fn leads_to(&self, way: DVec3, edge: f64) -> bool {
-        way.length() <= SHORTEST * edge || way.dot(self.direction) > AHEAD * way.length()
+    fn leads_to(&self, way: DVec3) -> bool {
+        way.length() <= SHORTEST * self.edge || way.dot(self.direction) > AHEAD * way.length()
     }
 }
 
@@ -173,11 +176,10 @@ fn bridge(
     lines: &BTreeMap<u32, Vec<u32>>,
     ends: &BTreeMap<u32, End>,
     v: u32,
-    edge: f64,
 ) -> Option<Bridge> {
     let end = &ends[&v];
     let at = |v: u32| mesh.points[v as usize];
-    let reach = (WIDEST_GAP * edge).min(end.length() / LINE_PER_GAP);
+    let reach = (WIDEST_GAP * end.edge).min(end.length() / LINE_PER_GAP);
     let mut search = Search::sparse();
     search.reach(v, 0.0, NONE);
     let mut best: Option<(f64, u32)> = None;
@@ -188,10 +190,10 @@ fn bridge(
         if w != v && (lines.contains_key(&w) || adjacency.is_boundary_vertex(w)) {
             let near = end.tail.iter().any(|t| t.0 == w && t.1 < LINE_PER_GAP * cost);
             let price = match ends.get(&w) {
-                Some(other) if other.leads_to(at(v) - at(w), edge) && LINE_PER_GAP * cost <= other.length() => cost,
+                Some(other) if other.leads_to(at(v) - at(w)) && LINE_PER_GAP * cost <= other.length() => cost,
                 _ => SIDE_TARGET_FACTOR * cost,
             };
-            if !near && price <= reach && end.leads_to(at(w) - at(v), edge) && best.is_none_or(|b| price < b.0) {
+            if !near && price <= reach && end.leads_to(at(w) - at(v)) && best.is_none_or(|b| price < b.0) {
                 best = Some((price, w));
             }
             continue;
@@ -396,6 +398,24 @@ mod tests {
         mesh.points[v] = before.lerp(last, 0.1);
         bridge_gaps(&mesh, &adjacency, &mut sharp, &crate::Silent).unwrap();
         assert_eq!(count(&sharp), 24);
+    }
+
+    #[test]
+    fn a_line_of_fine_edges_between_large_faces_keeps_its_loose_end() {
+        // Columns are ever closer: the first edges of a row are 10 000 times shorter than the last.
+        let mesh = shapes::sheet(20, 20, false, false, |u, v| DVec3::new(u.powi(3), v, 0.0));
+        let adjacency = Adjacency::new(&mesh);
+        let is_on_row = |v: u32| {
+            let p = mesh.points[v as usize];
+            (p.y - 0.5).abs() < 1e-9 && p.x > 1e-9
+        };
+        let halves = 0..adjacency.opposite.len() as u32;
+        let mut sharp: Vec<bool> =
+            halves.map(|h| is_on_row(mesh.origin(h)) && is_on_row(mesh.origin(next(h)))).collect();
+        let before = sharp.clone();
+        bridge_gaps(&mesh, &adjacency, &mut sharp, &crate::Silent).unwrap();
+        let lost = before.iter().zip(&sharp).filter(|(before, after)| **before && !**after).count() / 2;
+        assert_eq!((before.iter().filter(|s| **s).count() / 2, lost), (19, 0));
     }
 
     #[test]
