@@ -59,6 +59,7 @@ class _Compare(TypedDict, total=False):
 class _Layout(TypedDict, total=False):
     patches: int | None  # patches to aim at; 0 for as few as the form needs [0]
     coarsest: bool  # as few patches as the form allows, however they are shaped
+    even: bool  # patches of about one size, whatever the form
     sharp_angle_deg: float | None  # sharper edges become boundaries, degrees [40]
     feature_length: float | None  # shorter loose lines are detail, share of the diagonal [0.1]
     layout_smoothing: int | None  # rounds of making curves even [3]

@@ -117,7 +117,7 @@ fn mean_weight(corners: [DVec3; 3], center: DVec3, reach: f64, weight: &impl Fn(
     let lengths = [0, 1, 2].map(|k| corners[k].distance(corners[(k + 1) % 3]));
     let longest = (0..3).max_by(|&i, &j| lengths[i].total_cmp(&lengths[j])).unwrap_or(0);
     let mean = corners.into_iter().sum::<DVec3>() / 3.0;
-    if !(lengths[longest] > PART_TO_REACH * reach) || reach == 0.0 {
+    if lengths[longest] <= PART_TO_REACH * reach || reach == 0.0 {
         return weight(mean);
     }
     // No corner is farther from the mean than the longest side.

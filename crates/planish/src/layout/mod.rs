@@ -92,6 +92,8 @@ pub struct LayoutParams {
     pub patches: usize,
     /// As few patches as the form allows, however they are shaped.
     pub coarsest: bool,
+    /// Patches of about one size, whatever the form: where those along the form fold or wind.
+    pub even: bool,
     /// Edges whose faces meet at more than this angle are sharp and become patch boundaries.
     #[schemars(range(min = 1.0, max = 180.0), extend("unit" = "deg"))]
     pub sharp_angle_deg: f64,
@@ -106,7 +108,14 @@ pub struct LayoutParams {
 
 impl Default for LayoutParams {
     fn default() -> LayoutParams {
-        LayoutParams { patches: 0, coarsest: false, sharp_angle_deg: 40.0, feature_length: 0.1, smoothing: 3 }
+        LayoutParams {
+            patches: 0,
+            coarsest: false,
+            even: false,
+            sharp_angle_deg: 40.0,
+            feature_length: 0.1,
+            smoothing: 3,
+        }
     }
 }
 
@@ -166,10 +175,10 @@ pub enum Method {
         /// Mean angle between the isolines of the patches and the field, degrees.
         deviation_deg: f64,
     },
-    /// By a partition into even cells, improved one by one: where there is no usable map.
+    /// By a partition into even cells, improved one by one: where there is no usable map, or where that was asked for.
     Partition {
-        /// Why there is none.
-        why: String,
+        /// Why there is no usable map, if that is the reason.
+        why: Option<String>,
     },
 }
 
@@ -274,26 +283,27 @@ fn append(network: &mut Network, mut piece: Network, faces: &[u32]) {
     network.patches.append(&mut piece.patches);
 }
 
-/// The network of a piece along its form, or of a partition where that is worth more. A number of patches is asked for of the
-/// whole mesh.
+/// The network of a piece along its form, or of a partition where that is worth more or was asked for. A number of patches is
+/// asked for of the whole mesh.
 fn lay(piece: &Piece, params: &LayoutParams, observer: &dyn Observer) -> Result<(Network, Method), LayoutError> {
     let of_piece = |patches: usize| ((piece.share * patches as f64).round() as usize).max(1);
     let params = &match params.patches {
         0 => params.clone(),
         patches => LayoutParams { patches: of_piece(patches).min(most_patches(piece.mesh)), ..params.clone() },
     };
-    let along = aligned::lay(piece, params, observer);
+    let along = (!params.even).then(|| aligned::lay(piece, params, observer));
     let (along, why) = match along {
-        Ok(laid) if params.coarsest || laid.is_final() => return Ok(laid.into()),
-        Ok(laid) if laid.worth.is_kept() => {
-            (Some(laid), "patches along its form would be covered less well by grids".to_owned())
+        None => (None, None),
+        Some(Ok(laid)) if params.coarsest || laid.is_final() => return Ok(laid.into()),
+        Some(Ok(laid)) if laid.worth.is_kept() => {
+            (Some(laid), Some("patches along its form would be covered less well by grids".to_owned()))
         }
-        Ok(laid) => {
+        Some(Ok(laid)) => {
             let found = laid.network.patches.len();
-            (Some(laid), AlignError::Count { found }.to_string())
+            (Some(laid), Some(AlignError::Count { found }.to_string()))
         }
-        Err(AlignError::Cancelled(cancelled)) => return Err(cancelled.into()),
-        Err(why) => (None, why.to_string()),
+        Some(Err(AlignError::Cancelled(cancelled))) => return Err(cancelled.into()),
+        Some(Err(why)) => (None, Some(why.to_string())),
     };
     let asked = aligned::asked(params);
     let patches = match params.patches {
@@ -585,6 +595,19 @@ mod tests {
     use crate::network::imprint::imprint;
     use crate::synthetic::shapes;
     use glam::DVec3;
+
+    #[test]
+    fn a_ball_has_6_patches_along_its_form_and_60_to_240_even_ones_where_these_are_asked_for() {
+        let mesh = shapes::sphere(1.0, 4);
+        let laid = |even| {
+            let params = LayoutParams { even, ..LayoutParams::default() };
+            layout(&mesh, Known::default(), &params, &Silent).unwrap()
+        };
+        let [form, even] = [false, true].map(laid);
+        assert!(matches!(form.pieces[..], [(_, Method::Field { .. })]), "{:?}", form.pieces);
+        assert_eq!((form.network.patches.len(), even.pieces), (6, vec![(1.0, Method::Partition { why: None })]));
+        assert!((PARTITION_PATCHES / 2..2 * PARTITION_PATCHES).contains(&even.network.patches.len()));
+    }
 
     #[test]
     fn each_piece_of_a_mesh_gets_a_network_of_its_own_and_small_ones_get_one_together() {

@@ -262,7 +262,7 @@ pub(super) fn method_figures(pieces: &[(f64, Method)], quality: &mut Quality, wa
                 deviation += share * deviation_deg;
                 along += share;
             }
-            Method::Partition { why } => reasons.push(why),
+            Method::Partition { why } => reasons.extend(why),
         }
     }
     if along > 0.0 {
