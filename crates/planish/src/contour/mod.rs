@@ -177,20 +177,7 @@ pub fn extract(
     observer.progress(0.6);
     let patcher =
         Patcher { field, points: &points, limits: &limits, faces: &faces, refine: creases, base: field.first_names() };
-    let sheets: Option<Vec<Sheet>> = surveys
-        .par_iter()
-        .map(|survey| {
-            if observer.cancelled() {
-                return None;
-            }
-            let (mut sheet, mut scratch) = (Sheet::default(), Scratch::default());
-            for (cell, before) in survey.others.iter().filter(|(cell, _)| !merged(cell.at)) {
-                patcher.patch(cell, &mut scratch, &mut sheet);
-                sheet.before.push(*before);
-            }
-            Some(sheet)
-        })
-        .collect();
+    let sheets = sheets(&patcher, &surveys, merged, observer);
     let mut sheets = sheets.ok_or(Cancelled)?;
     let mut surveys = surveys;
     if let Some(octree) = &octree {
@@ -238,6 +225,24 @@ pub fn extract(
     extracted.tags.mark(&mut extracted.mesh);
     observer.progress(1.0);
     Ok(extracted)
+}
+
+/// What is cut out of the cells of each survey that are neither standard nor in a larger cell; `None` where the observer stops it.
+fn sheets(
+    patcher: &Patcher,
+    surveys: &[Survey],
+    is_merged: impl Fn([usize; 3]) -> bool + Sync,
+    observer: &dyn Observer,
+) -> Option<Vec<Sheet>> {
+    let of = |survey: &Survey| {
+        let (mut sheet, mut scratch) = (Sheet::default(), Scratch::default());
+        for (cell, before) in survey.others.iter().filter(|(cell, _)| !is_merged(cell.at)) {
+            patcher.patch(cell, &mut scratch, &mut sheet);
+            sheet.before.push(*before);
+        }
+        sheet
+    };
+    surveys.par_iter().map(|survey| (!observer.cancelled()).then(|| of(survey))).collect()
 }
 
 /// The cells that flat ones are merged to.

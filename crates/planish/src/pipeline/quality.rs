@@ -250,8 +250,9 @@ fn in_words(repairs: &Repairs) -> String {
     format!("The mesh was repaired: {}.", words.join(", "))
 }
 
-/// How the patches of each piece were laid, and what to do where they do not follow its form.
+/// How the patches of each piece were laid, and what to do where they do not follow its form, or follow it and fold.
 /// * `pieces` - with their parts of the area; none for a network that was not made here
+/// * `quality` - with the folds, where surfaces were made
 pub(super) fn method_figures(pieces: &[(f64, Method)], quality: &mut Quality, warnings: &mut Vec<Warning>) {
     let (mut cones, mut deviation, mut along) = (0, 0.0, 0.0);
     let mut reasons = Vec::new();
@@ -269,6 +270,10 @@ pub(super) fn method_figures(pieces: &[(f64, Method)], quality: &mut Quality, wa
         quality.insert("layout.cones".into(), Figure::Count(cones as u64));
         quality.insert("layout.deviation_deg".into(), Figure::Number(deviation / along));
         quality.insert("layout.along_form_share".into(), Figure::Number(along.min(1.0)));
+        if ["seam.folded", "grid.folds"].iter().any(|&key| quality.get(key).is_some_and(|n| *n != Figure::Count(0))) {
+            let text = "Patches along the form fold; patches of about one size may not.";
+            warnings.push(Warning::new("layout_folds", text, "").with_step("--even"));
+        }
     }
     // The largest piece comes first.
     let Some(why) = reasons.first() else { return };
@@ -524,4 +529,24 @@ fn few(names: &[String]) -> String {
     const SHOWN: usize = 8;
     let head = names[..names.len().min(SHOWN)].join(", ");
     if names.len() > SHOWN { format!("{head} and {} more", names.len() - SHOWN) } else { head }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn even_patches_are_advised_where_those_along_the_form_fold_and_nowhere_else() {
+        let field = Method::Field { cones: 8, deviation_deg: 3.0 };
+        let even = Method::Partition { why: None };
+        let steps = |method: &Method, folds: [u64; 2]| {
+            let keys = ["grid.folds", "seam.folded"].map(String::from);
+            let mut quality: Quality = keys.into_iter().zip(folds.map(Figure::Count)).collect();
+            let mut warnings = Vec::new();
+            method_figures(&[(1.0, method.clone())], &mut quality, &mut warnings);
+            warnings.into_iter().map(|w| w.step).collect::<Vec<String>>()
+        };
+        assert_eq!([steps(&field, [0, 1]), steps(&field, [3, 0])], [["--even"], ["--even"]]);
+        assert!(steps(&field, [0, 0]).is_empty() && steps(&even, [3, 1]).is_empty());
+    }
 }

@@ -402,7 +402,7 @@ mod tests {
 
     #[test]
     fn a_line_of_fine_edges_between_large_faces_keeps_its_loose_end() {
-        // Columns are ever closer: the first edges of a row are 10 000 times shorter than the last.
+        // Columns are ever closer: the first edge of the line is a hundred times shorter than the last.
         let mesh = shapes::sheet(20, 20, false, false, |u, v| DVec3::new(u.powi(3), v, 0.0));
         let adjacency = Adjacency::new(&mesh);
         let is_on_row = |v: u32| {
