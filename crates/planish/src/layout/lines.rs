@@ -8,7 +8,7 @@ use super::LayoutParams;
 use crate::mesh::sets::Sets;
 use crate::mesh::{Adjacency, NONE, TriMesh, next, sharp_edges};
 use crate::observe::{Cancelled, Observer};
-use crate::sharp::{bridge_gaps, cut_spikes};
+use crate::sharp::{Fineness, bridge_gaps, cut_spikes};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -44,7 +44,7 @@ pub(super) fn feature_lines(
     if tagged.contains(&true) {
         let inner = |h: usize| adjacency.opposite[h] != NONE;
         let mut kept: Vec<bool> = tagged.iter().enumerate().map(|(h, &t)| t && inner(h)).collect();
-        drop_detail(mesh, adjacency, shortest, &mut kept, observer)?;
+        drop_detail((mesh, adjacency), Fineness::OfMesh, shortest, &mut kept, observer)?;
         return Ok(kept);
     }
     let sharp = sharp_edges(mesh, adjacency, params.sharp_angle_deg);
@@ -67,7 +67,7 @@ pub(super) fn feature_lines(
             kept[adjacency.opposite[h] as usize] = true;
         }
     }
-    drop_detail(mesh, adjacency, shortest, &mut kept, observer)?;
+    drop_detail((mesh, adjacency), Fineness::OfLine, shortest, &mut kept, observer)?;
     Ok(kept)
 }
 
@@ -134,15 +134,15 @@ fn mean_weight(corners: [DVec3; 3], center: DVec3, reach: f64, weight: &impl Fn(
 /// lines around regions smaller than a circle of half that length around, spikes a quarter of it around, and connected
 /// lines shorter than half of it together.
 fn drop_detail(
-    mesh: &TriMesh,
-    adjacency: &Adjacency,
+    (mesh, adjacency): (&TriMesh, &Adjacency),
+    fineness: Fineness,
     shortest: f64,
     sharp: &mut [bool],
     observer: &dyn Observer,
 ) -> Result<(), Cancelled> {
     let around = CLOSED_SHARE * shortest;
     let smallest = around * around / (4.0 * std::f64::consts::PI);
-    bridge_gaps(mesh, adjacency, sharp, observer)?;
+    bridge_gaps(mesh, adjacency, fineness, sharp, observer)?;
     observer.check()?;
     cut_spikes(mesh, adjacency, SPIKE_SHARE * shortest, sharp);
     while drop_loose(mesh, adjacency, shortest, sharp) | drop_regions(mesh, adjacency, smallest, sharp) {}
@@ -292,7 +292,7 @@ pub mod tests {
         ] {
             let mut sharp = vec![false; adjacency.opposite.len()];
             mark(&mesh, &adjacency, &mut sharp, &places);
-            drop_detail(&mesh, &adjacency, shortest, &mut sharp, &crate::Silent).unwrap();
+            drop_detail((&mesh, &adjacency), Fineness::OfLine, shortest, &mut sharp, &crate::Silent).unwrap();
             assert_eq!(sharp.iter().filter(|&&s| s).count() / 2, kept, "{places:?}");
         }
     }

@@ -11,23 +11,23 @@ use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
-/// Greatest cost of a bridge over a gap, edges of the line ([`End::edge`]): a sharp edge costs its length, a flat one twice that.
+/// Greatest cost of a bridge over a gap, edges ([`Fineness`]): a sharp edge costs its length, a flat one twice that.
 const WIDEST_GAP: f64 = 8.0;
 /// Factor on the cost of a bridge to the middle of a line or to the boundary: a line may as well end in the open there.
 const SIDE_TARGET_FACTOR: f64 = 2.0;
 /// A line must be this many times as long as its bridge costs; nor does a bridge lead to a place on its own line nearer than that.
 const LINE_PER_GAP: f64 = 3.0;
-/// Length over which the direction of a line at its end is taken, edges of the line.
+/// Length over which the direction of a line at its end is taken, edges.
 const LAST: f64 = 4.0;
 /// So many of its last edges tell how long the edges of a line are.
 const LAST_EDGES: usize = 4;
 /// Cosine of the greatest angle (50 degrees) between a bridge and the direction in which its line ends; bridges shorter than
-/// `SHORTEST` edges of the line may have any.
+/// `SHORTEST` edges may have any.
 const AHEAD: f64 = 0.64;
 const SHORTEST: f64 = 1.5;
-/// A branch with a loose end shorter than this, edges of the line, is a spur.
+/// A branch with a loose end shorter than this, edges, is a spur.
 const SPUR: f64 = 1.5;
-/// A last edge shorter than this share of the edges of the line tells no direction: noise turns it anywhere.
+/// A last edge shorter than this share of an edge tells no direction: noise turns it anywhere.
 const STUB: f64 = 0.2;
 /// A line that comes back within this angle around a single face is a spike.
 const SPIKE_ANGLE: f64 = 80.0 / 180.0 * std::f64::consts::PI;
@@ -37,14 +37,23 @@ const SPIKE_ANGLE: f64 = 80.0 / 180.0 * std::f64::consts::PI;
 const JOG: usize = 3;
 const JOG_COST: f64 = 0.35;
 
+/// How long edges are at the end of a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fineness {
+    /// As in the mean of the mesh: meshes of scans are even.
+    OfMesh,
+    /// As the last edges of the line, and no longer than in the mean of the mesh: in meshes of CAD programs lines are as fine as they
+    /// bend, whatever the faces beside.
+    OfLine,
+}
+
 /// The last part of a line with a loose end.
 struct End {
     /// Its vertices from the end on, with their distances along the line.
     tail: Vec<(u32, f64)>,
     /// Where the line would go on; a unit vector.
     direction: DVec3,
-    /// Mean length of its last edges, at most that of all edges of the mesh: lines of machined parts are as fine as they bend,
-    /// whatever the faces beside.
+    /// How long edges are there.
     edge: f64,
 }
 
@@ -67,11 +76,12 @@ fn loose_ends(
     mesh: &TriMesh,
     adjacency: &Adjacency,
     sharp: &[bool],
-    mean_edge: f64,
+    (fineness, mean_edge): (Fineness, f64),
 ) -> (BTreeMap<u32, Vec<u32>>, BTreeMap<u32, End>) {
     let lines = lines_at(mesh, sharp);
     let loose = |v: &u32| lines[v].len() == 1 && !adjacency.is_boundary_vertex(*v);
-    let ends = lines.keys().copied().filter(loose).map(|v| (v, End::new(mesh, &lines, v, mean_edge))).collect();
+    let ends =
+        lines.keys().copied().filter(loose).map(|v| (v, End::new(mesh, &lines, v, (fineness, mean_edge)))).collect();
     (lines, ends)
 }
 
@@ -86,10 +96,10 @@ fn mark(mesh: &TriMesh, adjacency: &Adjacency, chain: &[u32], sharp: &mut [bool]
 }
 
 /// Clears spurs, the shortest at each fork first: without it the fork is one line again, and the other end of a gap may be led on
-/// to it. Clears last edges of loose ends that are far shorter than those before, too.
-fn cut_spurs(mesh: &TriMesh, adjacency: &Adjacency, mean_edge: f64, sharp: &mut [bool]) {
+/// to it. Clears last edges of loose ends that are next to nothing, too.
+fn cut_spurs(mesh: &TriMesh, adjacency: &Adjacency, edges: (Fineness, f64), sharp: &mut [bool]) {
     loop {
-        let (lines, ends) = loose_ends(mesh, adjacency, sharp, mean_edge);
+        let (lines, ends) = loose_ends(mesh, adjacency, sharp, edges);
         let mut spurs: BTreeMap<u32, &End> = BTreeMap::new();
         for end in ends.values().filter(|end| end.length() < SPUR * end.edge) {
             let fork = end.tail[end.tail.len() - 1].0;
@@ -114,14 +124,15 @@ fn cut_spurs(mesh: &TriMesh, adjacency: &Adjacency, mean_edge: f64, sharp: &mut 
 pub fn bridge_gaps(
     mesh: &TriMesh,
     adjacency: &Adjacency,
+    fineness: Fineness,
     sharp: &mut [bool],
     observer: &dyn Observer,
 ) -> Result<usize, Cancelled> {
-    let mean_edge = mesh.mean_edge();
-    cut_spurs(mesh, adjacency, mean_edge, sharp);
+    let edges = (fineness, mesh.mean_edge());
+    cut_spurs(mesh, adjacency, edges, sharp);
     let mut bridged = 0;
     loop {
-        let (lines, ends) = loose_ends(mesh, adjacency, sharp, mean_edge);
+        let (lines, ends) = loose_ends(mesh, adjacency, sharp, edges);
         let mut bridges: Vec<Bridge> = Vec::new();
         for &v in ends.keys() {
             observer.check()?;
@@ -139,7 +150,7 @@ pub fn bridge_gaps(
 }
 
 impl End {
-    fn new(mesh: &TriMesh, lines: &BTreeMap<u32, Vec<u32>>, v: u32, mean_edge: f64) -> End {
+    fn new(mesh: &TriMesh, lines: &BTreeMap<u32, Vec<u32>>, v: u32, (fineness, mean_edge): (Fineness, f64)) -> End {
         let mut tail = vec![(v, 0.0)];
         let (mut h, mut along) = (lines[&v][0], 0.0);
         loop {
@@ -153,7 +164,10 @@ impl End {
             }
         }
         let last = LAST_EDGES.min(tail.len() - 1);
-        let edge = mean_edge.min(tail[last].1 / last as f64);
+        let edge = match fineness {
+            Fineness::OfMesh => mean_edge,
+            Fineness::OfLine => mean_edge.min(tail[last].1 / last as f64),
+        };
         let from = tail.iter().find(|t| t.1 >= LAST * edge).unwrap_or(&tail[tail.len() - 1]).0;
         let at = |v: u32| mesh.points[v as usize];
         End { direction: (at(v) - at(from)).normalize_or_zero(), tail, edge }
@@ -347,7 +361,7 @@ mod tests {
     fn bridged(chains: &[&[(usize, usize)]]) -> (usize, usize) {
         let (mesh, adjacency, mut sharp) = lines(chains);
         let before = sharp.iter().filter(|&&s| s).count() / 2;
-        let count = bridge_gaps(&mesh, &adjacency, &mut sharp, &crate::Silent).unwrap();
+        let count = bridge_gaps(&mesh, &adjacency, Fineness::OfLine, &mut sharp, &crate::Silent).unwrap();
         (count, sharp.iter().filter(|&&s| s).count() / 2 - before)
     }
 
@@ -376,7 +390,7 @@ mod tests {
         // The line ends two edges before a column, and an edge of noise leaves it two edges before its end.
         let column: Vec<(usize, usize)> = (5..=55).map(|j| (31, j)).collect();
         let (mesh, adjacency, mut sharp) = lines(&[&row(30, 5, 30), &[(28, 30), (28, 31)], &column]);
-        assert_eq!(bridge_gaps(&mesh, &adjacency, &mut sharp, &crate::Silent).unwrap(), 1);
+        assert_eq!(bridge_gaps(&mesh, &adjacency, Fineness::OfLine, &mut sharp, &crate::Silent).unwrap(), 1);
         let degree = |i: usize, j: usize| {
             let p = mesh.bounds().min + DVec3::new(i as f64, j as f64, 0.0) / CELLS as f64;
             (0..sharp.len() as u32)
@@ -393,10 +407,10 @@ mod tests {
         let (last, before) = (place(30), place(29));
         let v = mesh.points.iter().position(|p| p.distance(last) < 1e-9).expect("a vertex there");
         let count = |sharp: &[bool]| sharp.iter().filter(|&&s| s).count() / 2;
-        bridge_gaps(&mesh, &adjacency, &mut sharp, &crate::Silent).unwrap();
+        bridge_gaps(&mesh, &adjacency, Fineness::OfLine, &mut sharp, &crate::Silent).unwrap();
         assert_eq!(count(&sharp), 25);
         mesh.points[v] = before.lerp(last, 0.1);
-        bridge_gaps(&mesh, &adjacency, &mut sharp, &crate::Silent).unwrap();
+        bridge_gaps(&mesh, &adjacency, Fineness::OfLine, &mut sharp, &crate::Silent).unwrap();
         assert_eq!(count(&sharp), 24);
     }
 
@@ -413,7 +427,7 @@ mod tests {
         let mut sharp: Vec<bool> =
             halves.map(|h| is_on_row(mesh.origin(h)) && is_on_row(mesh.origin(next(h)))).collect();
         let before = sharp.clone();
-        bridge_gaps(&mesh, &adjacency, &mut sharp, &crate::Silent).unwrap();
+        bridge_gaps(&mesh, &adjacency, Fineness::OfLine, &mut sharp, &crate::Silent).unwrap();
         let lost = before.iter().zip(&sharp).filter(|(before, after)| **before && !**after).count() / 2;
         assert_eq!((before.iter().filter(|s| **s).count() / 2, lost), (19, 0));
     }

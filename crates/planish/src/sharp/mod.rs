@@ -18,7 +18,7 @@ mod slivers;
 
 pub(crate) use bent::split_bent;
 pub use borders::find_lines;
-pub(crate) use broken_lines::{bridge_gaps, cut_spikes};
+pub(crate) use broken_lines::{Fineness, bridge_gaps, cut_spikes};
 pub use fair_lines::fair_lines;
 pub use flanks::ScanScale;
 pub use slivers::tidy_lines;
