@@ -51,6 +51,22 @@ fn commands(args: &[&str]) -> Vec<String> {
         .collect()
 }
 
+#[test]
+fn the_guide_tells_of_every_key_of_a_report() {
+    let text = fs::read_to_string(root().join("docs/guide/report.md")).unwrap();
+    let has = |word: &str| text.contains(&format!("`{word}`"));
+    // Keys of one family stand together, `mesh.area`, `.volume`, and those of the stages, `truth.mesh_rms`, by their parts. A second
+    // key that is the same as a share of the diagonal is told once for all.
+    let is_told = |name: &str| {
+        let (_, last) = name.split_once('.').expect("a family and a name");
+        let by_parts = || last.split_once('_').is_some_and(|(stage, rest)| has(&format!("{stage}_")) && has(rest));
+        has(name) || has(&format!(".{last}")) || has(last) || by_parts()
+    };
+    let names = planish::pipeline::key::ALL.iter().map(|key| key.name).filter(|name| !name.ends_with("_rel"));
+    let missing: Vec<&str> = names.filter(|name| !is_told(name)).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
 /// The options in a piece of text.
 fn named(text: &str) -> Vec<String> {
     let mut found = Vec::new();

@@ -15,6 +15,7 @@
 
 mod bricks;
 mod deform;
+pub mod key;
 mod quality;
 mod record;
 mod rework;

@@ -12,6 +12,7 @@ use planish::cloud::bricks::{BrickStore, CloudStore, StoreError};
 use planish::cloud::{self, Cleaned, Cloud, CloudError, PointFacts, Samples};
 use planish::mesh::Attribute;
 use planish::model::Units;
+use planish::pipeline::key;
 use planish::pipeline::{self, BRICK_POINTS, BrickPlan, Figure, ScanError, ScanFacts, ScanParams};
 use planish::{DVec3, Observer};
 use planish_io::report::{Input, Report, count, number};
@@ -94,7 +95,7 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
     report.input.diagonal = of_samples.diagonal;
     pipeline::sample_figures(&of_samples, &mut report.quality, &mut report.warnings);
     if let Surface::Bricks(_, plan) = &surface {
-        report.quality.insert("scan.bricks".into(), Figure::Count(plan.bricks() as u64));
+        report.quality.insert(key::SCAN_BRICKS.into(), Figure::Count(plan.bricks() as u64));
     }
     figures(&facts, &mut report);
     staged.commit()?;
@@ -161,10 +162,13 @@ impl Kept {
 }
 
 fn figures(facts: &PointFacts, report: &mut Report) {
-    let counts =
-        [("scan.outliers", facts.outliers), ("scan.points_out", facts.kept), ("scan.feature_lines", facts.lines.len())];
+    let counts = [
+        (key::SCAN_OUTLIERS, facts.outliers),
+        (key::SCAN_POINTS_OUT, facts.kept),
+        (key::SCAN_FEATURE_LINES, facts.lines.len()),
+    ];
     report.quality.extend(counts.map(|(key, n)| (key.to_owned(), Figure::Count(n as u64))));
-    report.quality.insert("scan.moved_rms".into(), Figure::Number(facts.moved_rms));
+    report.quality.insert(key::SCAN_MOVED_RMS.into(), Figure::Number(facts.moved_rms));
 }
 
 /// The points of each segment beside the output: `NAME-0.ply`, `NAME-1.ply` ...
@@ -205,13 +209,13 @@ fn lines_obj(facts: &PointFacts, shift: DVec3) -> String {
 fn table(args: &Clean, samples: &ScanFacts, facts: &PointFacts, report: &Report) -> Summary {
     let mut table = Summary::default();
     table.row("input", format!("{}: {} points", report.input.path, count(report.input.counts["points"])));
-    table.row("noise", report.length("scan.noise"));
-    table.row("spacing", report.length("scan.spacing"));
+    table.row("noise", report.length(key::SCAN_NOISE));
+    table.row("spacing", report.length(key::SCAN_SPACING));
     table.row("samples", count(samples.samples as u64));
     table.row("segments", count(samples.segments as u64));
     table.row(
         "orientation",
-        format!("{} % of the evidence agrees", number(100.0 * report.figure("scan.confidence").unwrap_or(0.0))),
+        format!("{} % of the evidence agrees", number(100.0 * report.figure(key::SCAN_CONFIDENCE).unwrap_or(0.0))),
     );
     table.row("outliers", count(facts.outliers as u64));
     table.row("points", format!("{}: {}", args.output.display(), count(facts.kept as u64)));

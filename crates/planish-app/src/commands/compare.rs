@@ -15,6 +15,7 @@ use planish::mesh::compare::Spread;
 use planish::mesh::{Attribute, CompareParams};
 use planish::model::Units;
 use planish::observe::Observer;
+use planish::pipeline::key;
 use planish::pipeline::{Figure, Quality};
 use planish::register::{self, AlignError, AlignParams, Aligned, Deviation, DeviationError, Histogram, Shape};
 use planish::render;
@@ -187,23 +188,23 @@ fn figures(found: &Found, tolerance: Option<f64>) -> Quality {
         }
     }
     if let Some(share) = d.flipped_share {
-        number("normal.flipped_share", share);
+        number(key::NORMAL_FLIPPED_SHARE, share);
     }
     if d.signed {
         let [mean, deviation] = d.mean_and_deviation();
-        number("signed.mean", mean);
-        number("signed.deviation", deviation);
-        number("signed.min", d.values.first().copied().unwrap_or(0.0));
-        number("signed.max", d.values.last().copied().unwrap_or(0.0));
+        number(key::SIGNED_MEAN, mean);
+        number(key::SIGNED_DEVIATION, deviation);
+        number(key::SIGNED_MIN, d.values.first().copied().unwrap_or(0.0));
+        number(key::SIGNED_MAX, d.values.last().copied().unwrap_or(0.0));
     }
     if let Some(t) = tolerance {
-        number("distance.tolerance", t);
-        number("distance.within_share", d.share_within(t));
+        number(key::DISTANCE_TOLERANCE, t);
+        number(key::DISTANCE_WITHIN_SHARE, d.share_within(t));
     }
     if let Some(a) = &found.aligned {
-        number("align.turn_deg", a.placement.turn_deg());
-        number("align.median_before", a.median[0]);
-        number("align.median", a.median[1]);
+        number(key::ALIGN_TURN_DEG, a.placement.turn_deg());
+        number(key::ALIGN_MEDIAN_BEFORE, a.median[0]);
+        number(key::ALIGN_MEDIAN, a.median[1]);
         let m = a.placement.linear;
         for (k, column) in [m.x_axis, m.y_axis, m.z_axis, a.placement.shift].iter().enumerate() {
             for (row, value) in column.to_array().into_iter().enumerate() {

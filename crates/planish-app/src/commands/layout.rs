@@ -8,6 +8,7 @@ use crate::placed::Placed;
 use crate::products::Staged;
 use crate::summary::Summary;
 use planish::network::CurveKind;
+use planish::pipeline::key;
 use planish::pipeline::{self, Figure};
 use planish_io::report::{Report, count};
 
@@ -51,7 +52,7 @@ pub fn layout(session: &Session, args: &Layout) -> Result<Status, Failure> {
             count(of_kind(|kind| kind == CurveKind::Boundary))
         ),
     );
-    if let Some(Figure::Count(irregular)) = report.quality.get("patches.irregular_corners") {
+    if let Some(Figure::Count(irregular)) = report.quality.get(key::PATCHES_IRREGULAR_CORNERS) {
         table.row("irregular", format!("{} corners", count(*irregular)));
     }
     table.row("network", args.output.display().to_string());

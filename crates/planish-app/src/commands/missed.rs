@@ -4,6 +4,7 @@ use crate::tolerance::{Scale, Tolerance};
 use planish::layout;
 use planish::model::{Model, Units};
 use planish::network::{CurveKind, Network};
+use planish::pipeline::key;
 use planish::pipeline::{self, PipelineParams, Warning};
 use planish::surface::{Continuity, Measure, SeamQuality, normal_deviation_of};
 use planish_io::report::{Report, count, number};
@@ -21,10 +22,10 @@ impl Reach {
         let wanted = demanded?.share(Scale { diagonal: report.input.diagonal, units });
         let figure = |key: &str| report.figure(key).unwrap_or(0.0);
         let reached = match of {
-            Measure::Rms => figure("surface.patch_rms_max_rel"),
-            Measure::P95 => figure("surface.patch_p95_max_rel"),
+            Measure::Rms => figure(key::SURFACE_PATCH_RMS_MAX_REL),
+            Measure::P95 => figure(key::SURFACE_PATCH_P95_MAX_REL),
             // Between the points of the grids, too.
-            Measure::Max => figure("surface.patch_max_rel").max(figure("surface.max_rel")),
+            Measure::Max => figure(key::SURFACE_PATCH_MAX_REL).max(figure(key::SURFACE_MAX_REL)),
         };
         Some(Reach { wanted, reached })
     }

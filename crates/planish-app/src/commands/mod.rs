@@ -33,6 +33,7 @@ use planish::grid::Grid;
 use planish::mesh::{Adjacency, TriMesh, folded_back, self_intersections};
 use planish::model::{Model, Units};
 use planish::observe::{Cancelled, Observer};
+use planish::pipeline::key;
 use planish::pipeline::{Figure, PipelineError, Quality, StageRecord, Warning};
 use planish::relief::{Relief, ReliefError};
 use planish::surface::Surface;
@@ -198,8 +199,8 @@ fn write_relief(folder: &Path, model: &Model, quality: &mut Quality) -> Result<(
     let read = planish_io::relief_roundtrip(folder, &model.surfaces, edited.as_ref().unwrap_or(&model.grids));
     let away = read.map_err(|e| WriteError::Image(format!("the maps do not read back: {e}")))?;
     let diagonal = model.mesh.bounds().diagonal();
-    quality.insert("relief.roundtrip_max".into(), Figure::Number(away));
-    quality.insert("relief.roundtrip_max_rel".into(), Figure::Number(away / diagonal));
+    quality.insert(key::RELIEF_ROUNDTRIP_MAX.into(), Figure::Number(away));
+    quality.insert(key::RELIEF_ROUNDTRIP_MAX_REL.into(), Figure::Number(away / diagonal));
     Ok(())
 }
 
@@ -220,10 +221,10 @@ const MOST_LOOKED_AT: usize = 2_000_000;
 /// Counts triangles that cross others, where there are not too many, and those that are folded back on their neighbours.
 fn meeting_figures(mesh: &TriMesh, report: &mut Report) {
     let folded = folded_back(mesh, &Adjacency::new(mesh)).len();
-    report.quality.insert("mesh.folded_back".into(), Figure::Count(folded as u64));
+    report.quality.insert(key::MESH_FOLDED_BACK.into(), Figure::Count(folded as u64));
     if mesh.triangles.len() <= MOST_LOOKED_AT {
         let pairs = self_intersections(mesh).len();
-        report.quality.insert("mesh.self_intersections".into(), Figure::Count(pairs as u64));
+        report.quality.insert(key::MESH_SELF_INTERSECTIONS.into(), Figure::Count(pairs as u64));
     }
 }
 

@@ -16,6 +16,7 @@ use planish::cloud::{Cleaned, Cloud};
 use planish::mesh::{FeatureTags, TriMesh};
 use planish::model::{HistoryEntry, Model, Units};
 use planish::network::Network;
+use planish::pipeline::key;
 use planish::pipeline::{self, Figure, Fitted, Input, RunParams, ScanParams, StageRecord};
 use planish_io::report::{self, Report, SeamRow, count, distance, number, percent};
 use planish_io::{StepInput, Up, WriteError, WriteOptions};
@@ -249,9 +250,9 @@ pub fn fitted(
         report.input.diagonal = meshed.bounds().diagonal();
     }
     if let (Some(truth), Some(meshed)) = (&job.truth, meshed) {
-        report.quality.insert("truth.outliers".into(), Figure::Count(truth.outliers as u64));
-        report.quality.insert("truth.noise_rel".into(), Figure::Number(truth.noise_rel));
-        let noise = report.figure("scan.noise").unwrap_or(0.0);
+        report.quality.insert(key::TRUTH_OUTLIERS.into(), Figure::Count(truth.outliers as u64));
+        report.quality.insert(key::TRUTH_NOISE_REL.into(), Figure::Number(truth.noise_rel));
+        let noise = report.figure(key::SCAN_NOISE).unwrap_or(0.0);
         // An edge has its seam within two noise levels; without noise within a thousandth of the diagonal.
         let within = (2.0 * noise).max(1e-3 * truth.mesh.bounds().diagonal());
         let (found, record) =
@@ -284,16 +285,16 @@ pub fn summary(report: &Report, reach: Option<Reach>) -> Summary {
     let (unit, diagonal) = (report.input.units.as_str(), report.input.diagonal);
     let figure = |key: &str| report.figure(key).unwrap_or(0.0);
     let length = |key: &str| distance(figure(key), diagonal, unit);
-    let closed = if report.flag("mesh.watertight") == Some(true) { "watertight" } else { "open" };
-    let triangles = format!("{} triangles, {closed}", count(figure("mesh.triangles") as u64));
+    let closed = if report.flag(key::MESH_WATERTIGHT) == Some(true) { "watertight" } else { "open" };
+    let triangles = format!("{} triangles, {closed}", count(figure(key::MESH_TRIANGLES) as u64));
     match report.input.counts.get("points") {
         Some(&points) => {
             table.row("input", format!("{}: {} points", report.input.path, count(points)));
-            table.row("noise", report.length("scan.noise"));
-            table.row("orientation", format!("{} of the evidence agrees", percent(figure("scan.confidence"))));
-            table.row("points to mesh", format!("{} RMS", length("scan.to_mesh_rms")));
-            if figure("scan.lids") > 0.0 {
-                table.row("holes", format!("{} small ones closed", count(figure("scan.lids") as u64)));
+            table.row("noise", report.length(key::SCAN_NOISE));
+            table.row("orientation", format!("{} of the evidence agrees", percent(figure(key::SCAN_CONFIDENCE))));
+            table.row("points to mesh", format!("{} RMS", length(key::SCAN_TO_MESH_RMS)));
+            if figure(key::SCAN_LIDS) > 0.0 {
+                table.row("holes", format!("{} small ones closed", count(figure(key::SCAN_LIDS) as u64)));
             }
             table.row("mesh", triangles);
         }
@@ -301,24 +302,24 @@ pub fn summary(report: &Report, reach: Option<Reach>) -> Summary {
             table.row("input", format!("{}: {triangles}", report.input.path));
         }
     }
-    table.row("patches", count(figure("patches.count") as u64));
-    table.row("control points", count(figure("surface.control_points") as u64));
-    table.row("grids", format!("{} points, {} folds", count(figure("grid.points") as u64), figure("grid.folds")));
-    table.row("surface, RMS", length("surface.rms"));
-    table.row("surface, largest", length("surface.max"));
-    table.row("displaced, RMS", length("displaced.rms"));
-    table.row("displaced, largest", length("displaced.max"));
+    table.row("patches", count(figure(key::PATCHES_COUNT) as u64));
+    table.row("control points", count(figure(key::SURFACE_CONTROL_POINTS) as u64));
+    table.row("grids", format!("{} points, {} folds", count(figure(key::GRID_POINTS) as u64), figure(key::GRID_FOLDS)));
+    table.row("surface, RMS", length(key::SURFACE_RMS));
+    table.row("surface, largest", length(key::SURFACE_MAX));
+    table.row("displaced, RMS", length(key::DISPLACED_RMS));
+    table.row("displaced, largest", length(key::DISPLACED_MAX));
     table.row(
         "seams",
         format!(
             "gap {} {unit}, angle {} degrees at most, {} RMS",
-            number(figure("seam.gap_max")),
-            number(figure("seam.inner_angle_max_deg")),
-            number(figure("seam.angle_rms_deg"))
+            number(figure(key::SEAM_GAP_MAX)),
+            number(figure(key::SEAM_INNER_ANGLE_MAX_DEG)),
+            number(figure(key::SEAM_ANGLE_RMS_DEG))
         ),
     );
-    if figure("seam.folded") > 0.0 {
-        table.row("folded seams", count(figure("seam.folded") as u64));
+    if figure(key::SEAM_FOLDED) > 0.0 {
+        table.row("folded seams", count(figure(key::SEAM_FOLDED) as u64));
     }
     let (state, reasons) = planish_io::report::verdict(report);
     let why: Vec<&str> = reasons.iter().map(|r| r.1.as_str()).collect();
@@ -329,14 +330,14 @@ pub fn summary(report: &Report, reach: Option<Reach>) -> Summary {
         let lengths = [reach.reached, reach.wanted].map(|share| distance(share * diagonal, diagonal, unit));
         table.row("tolerance", format!("{word}: {} where {} is demanded", lengths[0], lengths[1]));
     }
-    if report.figure("truth.displaced_rms").is_some() {
-        table.row("to the truth", format!("{} RMS", length("truth.displaced_rms")));
+    if report.figure(key::TRUTH_DISPLACED_RMS).is_some() {
+        table.row("to the truth", format!("{} RMS", length(key::TRUTH_DISPLACED_RMS)));
         table.row(
             "true sharp edges",
             format!(
                 "{} have a seam, {} with their angle",
-                percent(figure("truth.sharp_found")),
-                percent(figure("truth.sharp_met"))
+                percent(figure(key::TRUTH_SHARP_FOUND)),
+                percent(figure(key::TRUTH_SHARP_MET))
             ),
         );
     }

@@ -14,6 +14,7 @@ use planish::DVec3;
 use planish::geom::Aabb;
 use planish::model::Units;
 use planish::observe::Observer;
+use planish::pipeline::key;
 use planish::pipeline::{Figure, Warning};
 use planish::register::{self, AlignError, AlignParams, HalfSpace, Placement, Shape};
 use planish_io::WriteOptions;
@@ -49,7 +50,7 @@ pub fn transform(session: &Session, args: &Transform) -> Result<Status, Failure>
     report.warnings.extend(moved);
     report.stages = vec![read, record];
     let is_scan = report.input.kind == "scan";
-    let what = if is_scan { "scan.points" } else { "mesh.vertices" };
+    let what = if is_scan { key::SCAN_POINTS } else { key::MESH_VERTICES };
     report.quality.insert(what.into(), Figure::Count(left as u64));
     staged.commit()?;
     commit_report(own_report, &report)?;

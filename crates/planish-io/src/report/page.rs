@@ -5,6 +5,7 @@ use super::verdict::{State, state_of, verdict};
 use super::words::{count, escape, number, percent};
 use super::{Report, SeamRow};
 use planish::pipeline::Figure;
+use planish::pipeline::key::{self, Key, Reading};
 use std::fmt::Write;
 
 /// Rows of the table of seams; the rest are in `report.json`.
@@ -15,96 +16,80 @@ const ROUNDING: f64 = 1e-12;
 const END_DEG: f64 = 10.0;
 const STYLE: &str = include_str!("style.css");
 
-/// Figures of a scan in words: key, meaning, and how the value is read.
-const SCAN_FIGURES: [(&str, &str, Reading); 16] = [
-    ("scan.noise", "Noise of the points, standard deviation", Reading::Length),
-    ("scan.spacing", "Distance of neighbouring points", Reading::Length),
-    ("scan.samples", "Samples fitted to them", Reading::Plain),
-    ("scan.segments", "Connected parts", Reading::Plain),
-    ("scan.confidence", "Evidence that agrees with the orientation", Reading::Fraction),
-    ("scan.normal_noise_deg", "Typical error of the normals", Reading::Degrees),
-    ("scan.outliers", "Outliers left out", Reading::Plain),
-    ("scan.moved_rms", "Points moved onto the surface by, root mean square", Reading::Length),
-    ("scan.closed", "Holes were closed", Reading::Plain),
-    ("scan.lids", "Small holes of an open scan that were closed", Reading::Plain),
-    ("scan.bricks", "Bricks that the scan was meshed in", Reading::Plain),
-    ("scan.specks", "Specks of noise left out", Reading::Plain),
-    ("scan.to_mesh_rms", "Raw points to the mesh, root mean square", Reading::Length),
-    ("scan.to_mesh_mean", "Raw points to the mesh, mean", Reading::Length),
-    ("truth.noise_rel", "True noise along the rays", Reading::Fraction),
-    ("truth.outliers", "True number of wrong ranges", Reading::Plain),
+/// Figures of a scan.
+const SCAN_FIGURES: [&str; 16] = [
+    key::SCAN_NOISE,
+    key::SCAN_SPACING,
+    key::SCAN_SAMPLES,
+    key::SCAN_SEGMENTS,
+    key::SCAN_CONFIDENCE,
+    key::SCAN_NORMAL_NOISE_DEG,
+    key::SCAN_OUTLIERS,
+    key::SCAN_MOVED_RMS,
+    key::SCAN_CLOSED,
+    key::SCAN_LIDS,
+    key::SCAN_BRICKS,
+    key::SCAN_SPECKS,
+    key::SCAN_TO_MESH_RMS,
+    key::SCAN_TO_MESH_MEAN,
+    key::TRUTH_NOISE_REL,
+    key::TRUTH_OUTLIERS,
 ];
 
 /// Figures of a result against a known truth.
-const TRUTH_FIGURES: [(&str, &str, Reading); 12] = [
-    ("truth.mesh_rms", "Mesh to truth, root mean square", Reading::Length),
-    ("truth.mesh_max", "Mesh to truth, largest", Reading::Length),
-    ("truth.mesh_normal_deg", "Normals of the mesh, mean error", Reading::Degrees),
-    ("truth.surface_rms", "Surfaces to truth, root mean square", Reading::Length),
-    ("truth.surface_normal_deg", "Normals of the surfaces, mean error", Reading::Degrees),
-    ("truth.displaced_rms", "Displaced surfaces to truth, root mean square", Reading::Length),
-    ("truth.displaced_max", "Displaced surfaces to truth, largest", Reading::Length),
-    ("truth.displaced_normal_deg", "Normals of the displaced surfaces, mean error", Reading::Degrees),
-    ("truth.sharp_length", "Length of the true edges above 40°", Reading::Length),
-    ("truth.sharp_found", "Of that with a seam on it", Reading::Fraction),
-    ("truth.sharp_met", "Of that with the true angle within 3°", Reading::Fraction),
-    ("truth.sharp_false", "Sharp seams where the truth is smooth", Reading::Fraction),
+const TRUTH_FIGURES: [&str; 12] = [
+    key::TRUTH_MESH_RMS,
+    key::TRUTH_MESH_MAX,
+    key::TRUTH_MESH_NORMAL_DEG,
+    key::TRUTH_SURFACE_RMS,
+    key::TRUTH_SURFACE_NORMAL_DEG,
+    key::TRUTH_DISPLACED_RMS,
+    key::TRUTH_DISPLACED_MAX,
+    key::TRUTH_DISPLACED_NORMAL_DEG,
+    key::TRUTH_SHARP_LENGTH,
+    key::TRUTH_SHARP_FOUND,
+    key::TRUTH_SHARP_MET,
+    key::TRUTH_SHARP_FALSE,
 ];
 
-/// Figures of quality in words: key, meaning, and how the value is read.
-const FIGURES: [(&str, &str, Reading); 35] = [
-    ("mesh.triangles", "Triangles of the mesh after repair", Reading::Plain),
-    ("mesh.watertight", "The mesh is closed", Reading::Plain),
-    ("mesh.manifold", "The mesh is manifold", Reading::Plain),
-    ("mesh.feature_edges", "Sharp edges found", Reading::Plain),
-    ("patches.count", "Four-sided patches", Reading::Plain),
-    ("patches.irregular_corners", "Corners where not four patches meet", Reading::Plain),
-    ("layout.cones", "Cones of the directions it follows", Reading::Plain),
-    ("layout.deviation_deg", "Patches off these directions, mean", Reading::Degrees),
-    ("layout.along_form_share", "Area whose patches follow the form", Reading::Fraction),
-    ("grid.points", "Points of all grids", Reading::Plain),
-    ("grid.folds", "Folded grid cells", Reading::Plain),
-    ("grid.spacing_cv", "Unevenness of grid spacing (deviation over mean)", Reading::Fraction),
-    ("surface.control_points", "Control points of all surfaces", Reading::Plain),
-    ("surface.rms", "Surface to input, root mean square", Reading::Length),
-    ("surface.p95", "Surface to input, 95 of 100 places are closer", Reading::Length),
-    ("surface.max", "Surface to input, largest", Reading::Length),
-    ("displaced.rms", "Displaced surface to input, root mean square", Reading::Length),
-    ("displaced.p95", "Displaced surface to input, 95 of 100 places are closer", Reading::Length),
-    ("displaced.max", "Displaced surface to input, largest", Reading::Length),
-    ("seam.count", "Seams between two patches", Reading::Plain),
-    ("seam.gap_max", "Largest gap along a seam", Reading::Length),
-    ("seam.gap_bound", "What no gap exceeds, between samples neither", Reading::Length),
-    ("seam.folded", "Smooth seams that are folded over", Reading::Plain),
-    ("seam.inner_angle_max_deg", "Largest angle across a smooth seam, its ends left out", Reading::Degrees),
-    ("seam.angle_max_deg", "The same with ends, which may have no normal of their own", Reading::Degrees),
-    (
-        "seam.regular_angle_max_deg",
-        "The same without the first knot span beside corners of less than 25 or more than 150 degrees",
-        Reading::Degrees,
-    ),
-    ("seam.regular_angle_bound_deg", "What that angle nowhere exceeds, between samples neither", Reading::Degrees),
-    ("seam.odd_ends", "Ends of smooth seams in such corners", Reading::Plain),
-    ("seam.angle_rms_deg", "Angle across smooth seams, root mean square", Reading::Degrees),
-    ("seam.angle_p95_deg", "Angle that 95 of 100 of the length of smooth seams do not exceed", Reading::Degrees),
-    ("seam.edges", "Pieces of smooth seams at which the grids meet at an edge: they keep its angle", Reading::Plain),
-    ("seam.edges_share", "Share of the length of smooth seams in such pieces", Reading::Fraction),
-    ("relief.texels", "Texels of all displacement maps", Reading::Plain),
-    ("relief.max", "Largest displacement", Reading::Length),
-    (
-        "relief.roundtrip_max",
-        "Surface plus displacement, read back from the files, to the grid, largest",
-        Reading::Length,
-    ),
+/// Figures of quality.
+const FIGURES: [&str; 35] = [
+    key::MESH_TRIANGLES,
+    key::MESH_WATERTIGHT,
+    key::MESH_MANIFOLD,
+    key::MESH_FEATURE_EDGES,
+    key::PATCHES_COUNT,
+    key::PATCHES_IRREGULAR_CORNERS,
+    key::LAYOUT_CONES,
+    key::LAYOUT_DEVIATION_DEG,
+    key::LAYOUT_ALONG_FORM_SHARE,
+    key::GRID_POINTS,
+    key::GRID_FOLDS,
+    key::GRID_SPACING_CV,
+    key::SURFACE_CONTROL_POINTS,
+    key::SURFACE_RMS,
+    key::SURFACE_P95,
+    key::SURFACE_MAX,
+    key::DISPLACED_RMS,
+    key::DISPLACED_P95,
+    key::DISPLACED_MAX,
+    key::SEAM_COUNT,
+    key::SEAM_GAP_MAX,
+    key::SEAM_GAP_BOUND,
+    key::SEAM_FOLDED,
+    key::SEAM_INNER_ANGLE_MAX_DEG,
+    key::SEAM_ANGLE_MAX_DEG,
+    key::SEAM_REGULAR_ANGLE_MAX_DEG,
+    key::SEAM_REGULAR_ANGLE_BOUND_DEG,
+    key::SEAM_ODD_ENDS,
+    key::SEAM_ANGLE_RMS_DEG,
+    key::SEAM_ANGLE_P95_DEG,
+    key::SEAM_EDGES,
+    key::SEAM_EDGES_SHARE,
+    key::RELIEF_TEXELS,
+    key::RELIEF_MAX,
+    key::RELIEF_ROUNDTRIP_MAX,
 ];
-
-#[derive(Clone, Copy, PartialEq)]
-enum Reading {
-    Plain,
-    Fraction,
-    Length,
-    Degrees,
-}
 
 /// The page for `report`, with `pictures` in their order.
 pub fn html(report: &Report, pictures: &[Picture]) -> String {
@@ -183,9 +168,9 @@ fn header(page: &mut String, report: &Report, name: &str) {
 
 /// The result in one or two sentences.
 fn lead(page: &mut String, report: &Report) {
-    let Some(patches) = report.figure("patches.count") else { return };
+    let Some(patches) = report.figure(key::PATCHES_COUNT) else { return };
     let mut text = format!("{} four-sided B-spline patches", count(patches as u64));
-    if let (Some(rms), Some(max)) = (report.figure("surface.rms_rel"), report.figure("surface.max_rel")) {
+    if let (Some(rms), Some(max)) = (report.figure(key::SURFACE_RMS_REL), report.figure(key::SURFACE_MAX_REL)) {
         text += &format!(
             " follow the input to {} of its diagonal (RMS) and {} at the worst place",
             percent(rms),
@@ -193,24 +178,26 @@ fn lead(page: &mut String, report: &Report) {
         );
     }
     text += ".";
-    if let (Some(noise), Some(sure)) = (report.figure("scan.noise_rel"), report.figure("scan.confidence")) {
+    if let (Some(noise), Some(sure)) = (report.figure(key::SCAN_NOISE_REL), report.figure(key::SCAN_CONFIDENCE)) {
         text += &format!(
             " The points scatter by {} of the diagonal; {} of the evidence agrees on which side is outside.",
             percent(noise),
             percent(sure)
         );
     }
-    if let (Some(rms), Some(found)) = (report.figure("truth.displaced_rms_rel"), report.figure("truth.sharp_found")) {
+    if let (Some(rms), Some(found)) =
+        (report.figure(key::TRUTH_DISPLACED_RMS_REL), report.figure(key::TRUTH_SHARP_FOUND))
+    {
         text += &format!(
             " From the true shape the result is {} of the diagonal away; {} of its sharp edges have a seam.",
             percent(rms),
             percent(found)
         );
     }
-    if let Some(rms) = report.figure("displaced.rms_rel") {
+    if let Some(rms) = report.figure(key::DISPLACED_RMS_REL) {
         text += &format!(" With the displacement maps applied the average is {}.", percent(rms));
     }
-    if let (Some(gap), Some(angle)) = (report.figure("seam.gap_max"), report.figure("seam.inner_angle_max_deg")) {
+    if let (Some(gap), Some(angle)) = (report.figure(key::SEAM_GAP_MAX), report.figure(key::SEAM_INNER_ANGLE_MAX_DEG)) {
         let closed = if gap <= ROUNDING * report.input.diagonal {
             "Neighbours share their boundaries exactly".to_owned()
         } else {
@@ -223,7 +210,7 @@ fn lead(page: &mut String, report: &Report) {
 
 /// The verdict, where there is a result to judge.
 fn judged(page: &mut String, report: &Report) {
-    if report.figure("patches.count").is_none() {
+    if report.figure(key::PATCHES_COUNT).is_none() {
         return;
     }
     let (state, reasons) = verdict(report);
@@ -249,37 +236,37 @@ fn tiles(page: &mut String, report: &Report) {
     let seconds: f64 = report.stages.iter().map(|s| s.seconds).sum();
     let state = |key: &str| state_of(report, key).unwrap_or(State::Good);
     let mut row: Vec<(String, &str, &str, String, State)> = Vec::new();
-    let control = report.figure("surface.control_points");
-    if let Some(n) = report.figure("patches.count") {
+    let control = report.figure(key::SURFACE_CONTROL_POINTS);
+    if let Some(n) = report.figure(key::PATCHES_COUNT) {
         let detail = control.map(|c| format!("{} control points", count(c as u64))).unwrap_or_default();
         row.push((count(n as u64), "", "Patches", detail, State::Good));
     }
     for (key, name) in [
-        ("surface.rms", "Deviation, RMS"),
-        ("surface.max", "Largest deviation"),
-        ("displaced.rms", "With displacement, RMS"),
+        (key::SURFACE_RMS, "Deviation, RMS"),
+        (key::SURFACE_MAX, "Largest deviation"),
+        (key::DISPLACED_RMS, "With displacement, RMS"),
     ] {
         if let Some((value, small, detail)) = length(key) {
             row.push((value, small, name, detail, state(key)));
         }
     }
-    let angle = report.figure("seam.inner_angle_max_deg").or(report.figure("seam.angle_max_deg"));
+    let angle = report.figure(key::SEAM_INNER_ANGLE_MAX_DEG).or(report.figure(key::SEAM_ANGLE_MAX_DEG));
     if let Some(angle) = angle {
-        let gap = match gap_of(report, report.figure("seam.gap_max").unwrap_or(0.0)) {
+        let gap = match gap_of(report, report.figure(key::SEAM_GAP_MAX).unwrap_or(0.0)) {
             0.0 => "no gaps".to_owned(),
             gap => format!("gap {} {unit}", number(gap)),
         };
-        let worst = ["seam.folded", "seam.inner_angle_max_deg", "seam.gap_max"].map(state).into_iter().max();
+        let worst = [key::SEAM_FOLDED, key::SEAM_INNER_ANGLE_MAX_DEG, key::SEAM_GAP_MAX].map(state).into_iter().max();
         row.push((number(angle), "°", "Smooth seams bend, most", gap, worst.unwrap_or(State::Good)));
     }
-    if let Some(folds) = report.figure("grid.folds") {
-        let cells = report.figure("grid.points").unwrap_or(0.0);
+    if let Some(folds) = report.figure(key::GRID_FOLDS) {
+        let cells = report.figure(key::GRID_POINTS).unwrap_or(0.0);
         let detail = format!("of {}", count(cells as u64));
-        row.push((count(folds as u64), "", "Folded cells", detail, state("grid.folds")));
+        row.push((count(folds as u64), "", "Folded cells", detail, state(key::GRID_FOLDS)));
     }
-    if let Some(closed) = report.flag("mesh.watertight") {
+    if let Some(closed) = report.flag(key::MESH_WATERTIGHT) {
         let word = if closed { "closed" } else { "open" };
-        row.push((word.to_owned(), "", "Shape", format!("{} s", number(seconds)), state("mesh.watertight")));
+        row.push((word.to_owned(), "", "Shape", format!("{} s", number(seconds)), state(key::MESH_WATERTIGHT)));
     }
     if row.is_empty() {
         return;
@@ -378,8 +365,8 @@ fn gap_of(report: &Report, gap: f64) -> f64 {
     if gap <= ROUNDING * report.input.diagonal { 0.0 } else { gap }
 }
 
-fn figures(page: &mut String, report: &Report, title: &str, list: &[(&str, &str, Reading)]) {
-    if !list.iter().any(|f| report.quality.contains_key(f.0)) {
+fn figures(page: &mut String, report: &Report, title: &str, list: &[&str]) {
+    if !list.iter().any(|name| report.quality.contains_key(*name)) {
         return;
     }
     let _ = write!(
@@ -387,21 +374,21 @@ fn figures(page: &mut String, report: &Report, title: &str, list: &[(&str, &str,
         "<h2>{title}</h2>\n<p class=\"note\">Each with its key in <code>report.json</code>.</p>\n\
          <table class=\"stack\"><tbody>\n",
     );
-    for &(key, words, reading) in list {
-        let Some(figure) = report.quality.get(key) else { continue };
+    for &Key { name, meaning, reading } in list.iter().filter_map(|name| key::of(name)) {
+        let Some(figure) = report.quality.get(name) else { continue };
         let value = match (figure, reading) {
             (Figure::Flag(yes), _) => if *yes { "yes" } else { "no" }.to_owned(),
             (Figure::Count(n), _) => count(*n),
-            (Figure::Number(_), Reading::Length) => report.length(key),
+            (Figure::Number(_), Reading::Length) => report.length(name),
             (Figure::Number(x), Reading::Degrees) => format!("{}°", number(*x)),
-            (Figure::Number(x), Reading::Fraction) => percent(*x),
+            (Figure::Number(x), Reading::Share) => percent(*x),
             (Figure::Number(x), Reading::Plain) => number(*x),
         };
         let _ = writeln!(
             page,
-            "<tr class=\"{}\"><td>{}</td><td class=\"n\">{}</td><td class=\"key\"><code>{key}</code></td></tr>",
-            state_of(report, key).filter(|s| *s != State::Good).map_or("", State::class),
-            escape(words),
+            "<tr class=\"{}\"><td>{}</td><td class=\"n\">{}</td><td class=\"key\"><code>{name}</code></td></tr>",
+            state_of(report, name).filter(|s| *s != State::Good).map_or("", State::class),
+            escape(meaning),
             escape(&value)
         );
     }

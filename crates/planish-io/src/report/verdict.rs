@@ -2,6 +2,7 @@
 
 use super::Report;
 use super::words::{count, number, percent};
+use planish::pipeline::key;
 
 /// What a figure says of the result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -51,10 +52,10 @@ pub fn state_of(report: &Report, key: &str) -> Option<State> {
     let value = report.figure(key)?;
     let relative = report.figure(&format!("{key}_rel"));
     let found = match key {
-        "mesh.manifold" if value == 0.0 => State::Broken,
-        "mesh.watertight" if value == 0.0 => State::Look,
-        "mesh.manifold" | "mesh.watertight" => State::Good,
-        "seam.folded" => {
+        key::MESH_MANIFOLD if value == 0.0 => State::Broken,
+        key::MESH_WATERTIGHT if value == 0.0 => State::Look,
+        key::MESH_MANIFOLD | key::MESH_WATERTIGHT => State::Good,
+        key::SEAM_FOLDED => {
             if value > 0.0 {
                 State::Broken
             } else {
@@ -62,37 +63,37 @@ pub fn state_of(report: &Report, key: &str) -> Option<State> {
             }
         }
         // A folded seam is told as such, and its angle says no more.
-        "seam.inner_angle_max_deg" if report.figure("seam.folded").is_some_and(|n| n > 0.0) => return None,
-        "seam.inner_angle_max_deg" => {
+        key::SEAM_INNER_ANGLE_MAX_DEG if report.figure(key::SEAM_FOLDED).is_some_and(|n| n > 0.0) => return None,
+        key::SEAM_INNER_ANGLE_MAX_DEG => {
             if value > BENT_DEG {
                 State::Look
             } else {
                 State::Good
             }
         }
-        "seam.gap_max" => {
+        key::SEAM_GAP_MAX => {
             if relative? > GAP_REL {
                 State::Broken
             } else {
                 State::Good
             }
         }
-        "displaced.rms" => {
+        key::DISPLACED_RMS => {
             if relative? > LOST_REL {
                 State::Broken
             } else {
                 State::Good
             }
         }
-        "grid.folds" => {
-            let cells = report.figure("grid.points").unwrap_or(0.0);
+        key::GRID_FOLDS => {
+            let cells = report.figure(key::GRID_POINTS).unwrap_or(0.0);
             match value {
                 0.0 => State::Good,
                 folds if folds > FOLDS_SHARE * cells => State::Broken,
                 _ => State::Look,
             }
         }
-        "scan.confidence" => {
+        key::SCAN_CONFIDENCE => {
             if value < SURE {
                 State::Look
             } else {
@@ -106,14 +107,14 @@ pub fn state_of(report: &Report, key: &str) -> Option<State> {
 
 /// Figures that decide, the gravest first.
 const DECISIVE: [&str; 8] = [
-    "mesh.manifold",
-    "displaced.rms",
-    "seam.gap_max",
-    "seam.folded",
-    "grid.folds",
-    "scan.confidence",
-    "seam.inner_angle_max_deg",
-    "mesh.watertight",
+    key::MESH_MANIFOLD,
+    key::DISPLACED_RMS,
+    key::SEAM_GAP_MAX,
+    key::SEAM_FOLDED,
+    key::GRID_FOLDS,
+    key::SCAN_CONFIDENCE,
+    key::SEAM_INNER_ANGLE_MAX_DEG,
+    key::MESH_WATERTIGHT,
 ];
 /// Warnings that ask for a look, and why.
 const CODES: [(&str, &str); 5] = [
@@ -146,18 +147,18 @@ pub fn verdict(report: &Report) -> (State, Vec<(State, String)>) {
 fn reason(report: &Report, key: &str) -> String {
     let value = report.figure(key).unwrap_or(0.0);
     match key {
-        "mesh.manifold" => "the mesh is not manifold".into(),
-        "displaced.rms" => format!("with displacement the result leaves the input by {}", report.length(key)),
-        "seam.gap_max" => format!("neighbours are apart by {}", report.length(key)),
-        "seam.folded" if value == 1.0 => "one smooth seam is folded over".into(),
-        "seam.folded" => format!("{} smooth seams are folded over", count(value as u64)),
-        "grid.folds" => {
-            let cells = report.figure("grid.points").unwrap_or(1.0).max(1.0);
+        key::MESH_MANIFOLD => "the mesh is not manifold".into(),
+        key::DISPLACED_RMS => format!("with displacement the result leaves the input by {}", report.length(key)),
+        key::SEAM_GAP_MAX => format!("neighbours are apart by {}", report.length(key)),
+        key::SEAM_FOLDED if value == 1.0 => "one smooth seam is folded over".into(),
+        key::SEAM_FOLDED => format!("{} smooth seams are folded over", count(value as u64)),
+        key::GRID_FOLDS => {
+            let cells = report.figure(key::GRID_POINTS).unwrap_or(1.0).max(1.0);
             let are = if value == 1.0 { "cell is" } else { "cells are" };
             format!("{} grid {are} folded ({})", count(value as u64), percent(value / cells))
         }
-        "scan.confidence" => format!("only {} of the evidence agrees on which side is outside", percent(value)),
-        "seam.inner_angle_max_deg" => format!("a smooth seam bends by {}°", number(value)),
+        key::SCAN_CONFIDENCE => format!("only {} of the evidence agrees on which side is outside", percent(value)),
+        key::SEAM_INNER_ANGLE_MAX_DEG => format!("a smooth seam bends by {}°", number(value)),
         _ => "the shape is open: a shell, no solid".into(),
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! See `docs/methods/measuring.md`; the keys are in `docs/guide/report.md`.
 
+use super::key;
 use super::{Figure, PipelineError, Quality, Warning};
 use crate::geom::is_positive;
 use crate::grid::{self, Grid};
@@ -52,7 +53,7 @@ pub(super) fn measure(
     observer.progress(0.1);
 
     let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
-    quality.insert("surface.control_points".into(), Figure::Count(control as u64));
+    quality.insert(key::SURFACE_CONTROL_POINTS.into(), Figure::Count(control as u64));
     let one = |(s, g): (&Surface, &Grid)| {
         observer.check()?;
         Ok(surface::normal_deviation_of(s, g))
@@ -60,9 +61,9 @@ pub(super) fn measure(
     let patches_off: Result<Vec<Deviation>, Cancelled> = model.surfaces.par_iter().zip(&model.grids).map(one).collect();
     let patches_off = patches_off?;
     let worst = |of: fn(&Deviation) -> f64| patches_off.iter().map(of).fold(0.0, f64::max);
-    length(&mut quality, "surface.patch_rms_max", worst(|d| d.rms), diagonal);
-    length(&mut quality, "surface.patch_p95_max", worst(|d| d.p95), diagonal);
-    length(&mut quality, "surface.patch_max", worst(|d| d.max), diagonal);
+    length(&mut quality, key::SURFACE_PATCH_RMS_MAX, worst(|d| d.rms), diagonal);
+    length(&mut quality, key::SURFACE_PATCH_P95_MAX, worst(|d| d.p95), diagonal);
+    length(&mut quality, key::SURFACE_PATCH_MAX, worst(|d| d.max), diagonal);
     let base = surface_mesh(model, observer)?;
     distances(&mut quality, "surface", &compare(&model.mesh, &base, &Part::new(observer, 0.1, 0.45))?, diagonal);
     drop(base);
@@ -203,10 +204,10 @@ pub(super) fn mesh_figures(
     warnings: &mut Vec<Warning>,
 ) {
     let facts = mesh::diagnose(mesh);
-    quality.insert("mesh.triangles".into(), Figure::Count(facts.triangles as u64));
-    quality.insert("mesh.watertight".into(), Figure::Flag(facts.watertight));
-    quality.insert("mesh.manifold".into(), Figure::Flag(facts.manifold));
-    quality.insert("mesh.feature_edges".into(), Figure::Count(feature_edges(network)));
+    quality.insert(key::MESH_TRIANGLES.into(), Figure::Count(facts.triangles as u64));
+    quality.insert(key::MESH_WATERTIGHT.into(), Figure::Flag(facts.watertight));
+    quality.insert(key::MESH_MANIFOLD.into(), Figure::Flag(facts.manifold));
+    quality.insert(key::MESH_FEATURE_EDGES.into(), Figure::Count(feature_edges(network)));
     if repairs.any() {
         warnings.push(Warning::new("mesh_repaired", in_words(repairs), ""));
     }
@@ -267,10 +268,13 @@ pub(super) fn method_figures(pieces: &[(f64, Method)], quality: &mut Quality, wa
         }
     }
     if along > 0.0 {
-        quality.insert("layout.cones".into(), Figure::Count(cones as u64));
-        quality.insert("layout.deviation_deg".into(), Figure::Number(deviation / along));
-        quality.insert("layout.along_form_share".into(), Figure::Number(along.min(1.0)));
-        if ["seam.folded", "grid.folds"].iter().any(|&key| quality.get(key).is_some_and(|n| *n != Figure::Count(0))) {
+        quality.insert(key::LAYOUT_CONES.into(), Figure::Count(cones as u64));
+        quality.insert(key::LAYOUT_DEVIATION_DEG.into(), Figure::Number(deviation / along));
+        quality.insert(key::LAYOUT_ALONG_FORM_SHARE.into(), Figure::Number(along.min(1.0)));
+        if [key::SEAM_FOLDED, key::GRID_FOLDS]
+            .iter()
+            .any(|&key| quality.get(key).is_some_and(|n| *n != Figure::Count(0)))
+        {
             let text = "Patches along the form fold; patches of about one size may not.";
             warnings.push(Warning::new("layout_folds", text, "").with_step("--even"));
         }
@@ -302,8 +306,8 @@ pub(super) fn network_figures(network: &Network, quality: &mut Quality) {
     }
     let regular = |(&n, &rim): (&usize, &bool)| n == if rim { 3 } else { 4 };
     let irregular = valence.iter().zip(&boundary).filter(|c| !regular(*c)).count();
-    quality.insert("patches.count".into(), Figure::Count(network.patches.len() as u64));
-    quality.insert("patches.irregular_corners".into(), Figure::Count(irregular as u64));
+    quality.insert(key::PATCHES_COUNT.into(), Figure::Count(network.patches.len() as u64));
+    quality.insert(key::PATCHES_IRREGULAR_CORNERS.into(), Figure::Count(irregular as u64));
 }
 
 fn grid_figures(
@@ -321,9 +325,9 @@ fn grid_figures(
     let grids = grids?;
     let folds: usize = grids.iter().map(|g| g.folds).sum();
     let mean = |f: fn(&grid::GridQuality) -> f64| grids.iter().map(f).sum::<f64>() / grids.len().max(1) as f64;
-    quality.insert("grid.points".into(), Figure::Count(model.grids.iter().map(|g| g.points.len() as u64).sum()));
-    quality.insert("grid.folds".into(), Figure::Count(folds as u64));
-    quality.insert("grid.spacing_cv".into(), Figure::Number(mean(|g| g.spacing_cv)));
+    quality.insert(key::GRID_POINTS.into(), Figure::Count(model.grids.iter().map(|g| g.points.len() as u64).sum()));
+    quality.insert(key::GRID_FOLDS.into(), Figure::Count(folds as u64));
+    quality.insert(key::GRID_SPACING_CV.into(), Figure::Number(mean(|g| g.spacing_cv)));
     if folds > 0 {
         let places: Vec<String> =
             grids.iter().enumerate().filter(|(_, g)| g.folds > 0).map(|(p, _)| p.to_string()).collect();
@@ -359,24 +363,24 @@ fn seam_figures(
     let smooth: Vec<&SeamQuality> = seams.iter().filter(|s| s.kind.is_smooth()).collect();
     let total: f64 = smooth.iter().map(|s| s.length).sum();
     let squares: f64 = smooth.iter().map(|s| s.length * s.angle_rms_deg * s.angle_rms_deg).sum();
-    quality.insert("seam.count".into(), Figure::Count(seams.len() as u64));
-    length(quality, "seam.gap_max", gap, diagonal);
-    length(quality, "seam.gap_bound", seams.iter().map(|s| s.gap_bound).fold(0.0, f64::max), diagonal);
+    quality.insert(key::SEAM_COUNT.into(), Figure::Count(seams.len() as u64));
+    length(quality, key::SEAM_GAP_MAX, gap, diagonal);
+    length(quality, key::SEAM_GAP_BOUND, seams.iter().map(|s| s.gap_bound).fold(0.0, f64::max), diagonal);
     let widest = smooth.iter().map(|s| s.angle_max_deg).fold(0.0, f64::max);
-    quality.insert("seam.angle_max_deg".into(), Figure::Number(widest));
+    quality.insert(key::SEAM_ANGLE_MAX_DEG.into(), Figure::Number(widest));
     let widest = smooth.iter().map(|s| s.regular_angle_max_deg).fold(0.0, f64::max);
-    quality.insert("seam.regular_angle_max_deg".into(), Figure::Number(widest));
+    quality.insert(key::SEAM_REGULAR_ANGLE_MAX_DEG.into(), Figure::Number(widest));
     let bound = smooth.iter().filter_map(|s| s.regular_angle_bound_deg).fold(0.0, f64::max);
-    quality.insert("seam.regular_angle_bound_deg".into(), Figure::Number(bound));
+    quality.insert(key::SEAM_REGULAR_ANGLE_BOUND_DEG.into(), Figure::Number(bound));
     let odd: usize = smooth.iter().map(|s| s.odd_ends.iter().filter(|odd| **odd).count()).sum();
-    quality.insert("seam.odd_ends".into(), Figure::Count(odd as u64));
+    quality.insert(key::SEAM_ODD_ENDS.into(), Figure::Count(odd as u64));
     let inner = inner_angles(model);
-    quality.insert("seam.angle_p95_deg".into(), Figure::Number(angle_p95(model)));
+    quality.insert(key::SEAM_ANGLE_P95_DEG.into(), Figure::Number(angle_p95(model)));
     let inner_of = |s: &SeamQuality| inner.get(&s.curve).map_or(0.0, |found| found.0);
     let widest = smooth.iter().map(|s| inner_of(s)).fold(0.0, f64::max);
-    quality.insert("seam.inner_angle_max_deg".into(), Figure::Number(widest));
+    quality.insert(key::SEAM_INNER_ANGLE_MAX_DEG.into(), Figure::Number(widest));
     let folded: Vec<&&SeamQuality> = smooth.iter().filter(|s| inner_of(s) > FOLDED_DEG).collect();
-    quality.insert("seam.folded".into(), Figure::Count(folded.len() as u64));
+    quality.insert(key::SEAM_FOLDED.into(), Figure::Count(folded.len() as u64));
     if let Some(at) = folded.first().and_then(|s| inner.get(&s.curve)) {
         let names: Vec<String> = folded.iter().map(|s| s.curve.to_string()).collect();
         let text = format!(
@@ -386,7 +390,7 @@ fn seam_figures(
         warnings.push(Warning::new("seam_folds", text, format!("curves {}", few(&names))).with_step(relax_near(at.1)));
     }
     let rms = if total > 0.0 { (squares / total).sqrt() } else { 0.0 };
-    quality.insert("seam.angle_rms_deg".into(), Figure::Number(rms));
+    quality.insert(key::SEAM_ANGLE_RMS_DEG.into(), Figure::Number(rms));
     let bent = smooth.iter().filter(|s| inner_of(s) > BENT_DEG).count();
     if bent > 0 {
         let text = format!(
@@ -413,8 +417,8 @@ fn edge_figures(
     let length_of = |curve: u32| seams.iter().find(|s| s.curve == curve).map_or(0.0, |s| s.length);
     let whole: f64 = seams.iter().filter(|s| s.kind.is_smooth()).map(|s| s.length).sum();
     let share: f64 = edges.iter().map(|e| length_of(e.curve) * (e.range[1] - e.range[0])).sum();
-    quality.insert("seam.edges".into(), Figure::Count(edges.len() as u64));
-    quality.insert("seam.edges_share".into(), Figure::Number(if share > 0.0 { share / whole } else { 0.0 }));
+    quality.insert(key::SEAM_EDGES.into(), Figure::Count(edges.len() as u64));
+    quality.insert(key::SEAM_EDGES_SHARE.into(), Figure::Number(if share > 0.0 { share / whole } else { 0.0 }));
     let worst_first = |a: &&EdgeInSeam, b: &&EdgeInSeam| b.angle_deg.total_cmp(&a.angle_deg);
     let mut sorted: Vec<&EdgeInSeam> = edges.iter().collect();
     sorted.sort_by(worst_first);
@@ -506,9 +510,9 @@ fn relief_figures(
     });
     let each: Vec<(f64, f64, usize)> = each.collect::<Result<_, relief::ReliefError>>()?;
     let texels: usize = model.reliefs.iter().map(|r| r.vectors.len()).sum();
-    quality.insert("relief.texels".into(), Figure::Count(texels as u64));
-    length(quality, "relief.rounding_max", each.iter().map(|e| e.0).fold(0.0, f64::max), diagonal);
-    length(quality, "relief.max", each.iter().map(|e| e.1).fold(0.0, f64::max), diagonal);
+    quality.insert(key::RELIEF_TEXELS.into(), Figure::Count(texels as u64));
+    length(quality, key::RELIEF_ROUNDING_MAX, each.iter().map(|e| e.0).fold(0.0, f64::max), diagonal);
+    length(quality, key::RELIEF_MAX, each.iter().map(|e| e.1).fold(0.0, f64::max), diagonal);
     let folding: usize = each.iter().map(|e| e.2).sum();
     if folding > 0 {
         let places: Vec<String> =

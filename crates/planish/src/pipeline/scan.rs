@@ -2,6 +2,7 @@
 //!
 //! See `docs/methods/samples.md`, section 9, and `docs/methods/sharp.md`.
 
+use super::key;
 use super::record::Figure;
 use super::{Fitted, PipelineParams, Quality, Warning};
 use crate::cloud::{self, CleanParams, Cloud, CloudError, PointFacts, ProjectParams, Samples};
@@ -342,11 +343,11 @@ pub(super) fn reach(
 pub fn scan_figures(made: &ScanMeshed, quality: &mut Quality, warnings: &mut Vec<Warning>) {
     sample_figures(&made.facts, quality, warnings);
     if made.bricks > 0 {
-        quality.insert("scan.bricks".into(), Figure::Count(made.bricks as u64));
+        quality.insert(key::SCAN_BRICKS.into(), Figure::Count(made.bricks as u64));
     }
-    quality.insert("scan.specks".into(), Figure::Count(made.specks as u64));
-    quality.insert("scan.closed".into(), Figure::Flag(made.closed));
-    quality.insert("scan.lids".into(), Figure::Count(made.lids as u64));
+    quality.insert(key::SCAN_SPECKS.into(), Figure::Count(made.specks as u64));
+    quality.insert(key::SCAN_CLOSED.into(), Figure::Flag(made.closed));
+    quality.insert(key::SCAN_LIDS.into(), Figure::Count(made.lids as u64));
     for (key, x) in [("rms", made.to_points.0), ("mean", made.to_points.1)] {
         quality.insert(format!("scan.to_mesh_{key}"), Figure::Number(x));
         quality.insert(format!("scan.to_mesh_{key}_rel"), Figure::Number(x / made.facts.diagonal));
@@ -358,10 +359,10 @@ pub fn scan_figures(made: &ScanMeshed, quality: &mut Quality, warnings: &mut Vec
 pub(super) fn run_figures(made: &ScanMeshed, points: &PointFacts, diagonal: f64, fitted: &mut Fitted) {
     let mut found = Quality::new();
     scan_figures(made, &mut found, &mut fitted.warnings);
-    found.insert("scan.outliers".into(), Figure::Count(points.outliers as u64));
-    found.insert("scan.moved_rms".into(), Figure::Number(points.moved_rms));
+    found.insert(key::SCAN_OUTLIERS.into(), Figure::Count(points.outliers as u64));
+    found.insert(key::SCAN_MOVED_RMS.into(), Figure::Number(points.moved_rms));
     // Noise and spacing are those of the samples, whatever is made of these.
-    for key in ["scan.moved_rms", "scan.to_mesh_rms", "scan.to_mesh_mean"] {
+    for key in [key::SCAN_MOVED_RMS, key::SCAN_TO_MESH_RMS, key::SCAN_TO_MESH_MEAN] {
         if let Some(x) = found.get(key).map(|f| f.value()) {
             found.insert(format!("{key}_rel"), Figure::Number(x / diagonal));
         }
@@ -372,16 +373,16 @@ pub(super) fn run_figures(made: &ScanMeshed, points: &PointFacts, diagonal: f64,
 /// The figures of samples alone.
 pub fn sample_figures(facts: &ScanFacts, quality: &mut Quality, warnings: &mut Vec<Warning>) {
     let numbers = [
-        ("scan.noise", facts.noise),
-        ("scan.noise_rel", facts.noise / facts.diagonal),
-        ("scan.spacing", facts.spacing),
-        ("scan.spacing_rel", facts.spacing / facts.diagonal),
-        ("scan.confidence", facts.confidence),
-        ("scan.normal_noise_deg", facts.normal_noise_deg),
+        (key::SCAN_NOISE, facts.noise),
+        (key::SCAN_NOISE_REL, facts.noise / facts.diagonal),
+        (key::SCAN_SPACING, facts.spacing),
+        (key::SCAN_SPACING_REL, facts.spacing / facts.diagonal),
+        (key::SCAN_CONFIDENCE, facts.confidence),
+        (key::SCAN_NORMAL_NOISE_DEG, facts.normal_noise_deg),
     ];
     quality.extend(numbers.map(|(key, x)| (key.to_owned(), Figure::Number(x))));
-    quality.insert("scan.samples".into(), Figure::Count(facts.samples as u64));
-    quality.insert("scan.segments".into(), Figure::Count(facts.segments as u64));
+    quality.insert(key::SCAN_SAMPLES.into(), Figure::Count(facts.samples as u64));
+    quality.insert(key::SCAN_SEGMENTS.into(), Figure::Count(facts.segments as u64));
     if facts.confidence < UNSURE_ORIENTATION {
         let text = format!(
             "The orientation of the points is unsure: {:.1} % of the evidence agrees. Normals or scanner positions in the \

@@ -2,6 +2,7 @@
 //!
 //! See `docs/methods/measuring.md`, "Truth".
 
+use super::key;
 use super::record::Figure;
 use super::{PipelineError, Quality, quality};
 use crate::geom::KdTree;
@@ -161,16 +162,16 @@ pub fn truth_figures(
         }
         figures.insert(format!("truth.{name}_normal_deg"), Figure::Number(found.normal_deg.mean));
         if name == "mesh" {
-            figures.insert("truth.mesh_zone_deg".into(), Figure::Number(zone(truth, &samples).normal_deg));
+            figures.insert(key::TRUTH_MESH_ZONE_DEG.into(), Figure::Number(zone(truth, &samples).normal_deg));
         }
     }
-    figures.insert("truth.mesh_topology".into(), Figure::Flag(same_topology(truth, meshed)));
+    figures.insert(key::TRUTH_MESH_TOPOLOGY.into(), Figure::Flag(same_topology(truth, meshed)));
     let edges = edges_found(truth, model, within);
     let shares = [
-        ("truth.sharp_length", edges.length),
-        ("truth.sharp_found", edges.found),
-        ("truth.sharp_met", edges.met),
-        ("truth.sharp_false", edges.false_share),
+        (key::TRUTH_SHARP_LENGTH, edges.length),
+        (key::TRUTH_SHARP_FOUND, edges.found),
+        (key::TRUTH_SHARP_MET, edges.met),
+        (key::TRUTH_SHARP_FALSE, edges.false_share),
     ];
     figures.extend(shares.map(|(key, x)| (key.to_owned(), Figure::Number(x))));
     Ok(figures)

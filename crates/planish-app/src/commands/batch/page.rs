@@ -1,6 +1,7 @@
 //! All rows of a batch as a table: for a terminal, and as a page with the report of each.
 
 use super::{Outcome, Row};
+use planish::pipeline::key;
 use planish_io::report::table_page;
 use std::path::Path;
 
@@ -8,10 +9,10 @@ use std::path::Path;
 type Column = (&'static str, &'static str, fn(f64) -> String);
 
 const COLUMNS: [Column; 4] = [
-    ("patches", "patches.count", |x| format!("{x:.0}")),
-    ("RMS %", "surface.rms_rel", |x| format!("{:.4}", x * 100.0)),
-    ("max %", "surface.max_rel", |x| format!("{:.4}", x * 100.0)),
-    ("seam deg", "seam.inner_angle_max_deg", |x| format!("{x:.2}")),
+    ("patches", key::PATCHES_COUNT, |x| format!("{x:.0}")),
+    ("RMS %", key::SURFACE_RMS_REL, |x| format!("{:.4}", x * 100.0)),
+    ("max %", key::SURFACE_MAX_REL, |x| format!("{:.4}", x * 100.0)),
+    ("seam deg", key::SEAM_INNER_ANGLE_MAX_DEG, |x| format!("{x:.2}")),
 ];
 
 /// The heading and a list of texts for each row.

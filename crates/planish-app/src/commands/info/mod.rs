@@ -12,6 +12,7 @@ use crate::{progress, stdout};
 use planish::DVec3;
 use planish::mesh::{Adjacency, Diagnosis, TriMesh, diagnose};
 use planish::model::{Model, Units};
+use planish::pipeline::key;
 use planish::pipeline::{Figure, Warning};
 use planish_io::report::{Report, count, number};
 use planish_io::{FileUnits, MeshFormat};
@@ -87,9 +88,9 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
     let crossings = crossings(mesh, &mut report);
     let of_mesh = report.warnings.len();
     if let Some(model) = model {
-        report.quality.insert("patches.count".into(), Figure::Count(model.network.patches.len() as u64));
+        report.quality.insert(key::PATCHES_COUNT.into(), Figure::Count(model.network.patches.len() as u64));
         let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
-        report.quality.insert("surface.control_points".into(), Figure::Count(control as u64));
+        report.quality.insert(key::SURFACE_CONTROL_POINTS.into(), Figure::Count(control as u64));
         super::relief::folds(model, &mut report, file)?;
         report.warnings.extend(network_faults(model));
         folds(model, &mut report);
@@ -100,13 +101,13 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
         let mut table = Summary::default();
         mesh_rows(&mut table, &report, &facts, model.map_or(DVec3::ZERO, |m| m.shift));
         table.row("crossings", crossings);
-        table.row("folded back", report.figure("mesh.folded_back").map_or(String::new(), |n| count(n as u64)));
+        table.row("folded back", report.figure(key::MESH_FOLDED_BACK).map_or(String::new(), |n| count(n as u64)));
         table.row("units", told_units(session, args, model.is_some(), &report));
         let columns: Vec<&str> = mesh.attributes.iter().map(|a| a.name.as_str()).collect();
         table.row("attributes", if columns.is_empty() { "none".into() } else { columns.join(", ") });
         if let Some(model) = model {
             model_rows(&mut table, model);
-            if let (Some(grids), Some(surfaces)) = (report.figure("grid.folds"), report.figure("surface.folds")) {
+            if let (Some(grids), Some(surfaces)) = (report.figure(key::GRID_FOLDS), report.figure(key::SURFACE_FOLDS)) {
                 table.row("folds", format!("{grids} cells of grids, {surfaces} places of surfaces"));
             }
         }
@@ -139,10 +140,10 @@ fn scan_info(session: &Session, args: &Info) -> Result<Report, Failure> {
     places.dedup();
     let repeated = finite - places.len();
     let facts = [
-        ("scan.points", scan.points.len()),
-        ("scan.not_finite", lost),
-        ("scan.repeated", repeated),
-        ("scan.scanners", scan.scanners.len()),
+        (key::SCAN_POINTS, scan.points.len()),
+        (key::SCAN_NOT_FINITE, lost),
+        (key::SCAN_REPEATED, repeated),
+        (key::SCAN_SCANNERS, scan.scanners.len()),
     ];
     report.quality.extend(facts.map(|(key, n)| (key.to_owned(), Figure::Count(n as u64))));
     for (n, code, what) in [
@@ -179,26 +180,26 @@ fn scan_info(session: &Session, args: &Info) -> Result<Report, Failure> {
 
 fn figures(facts: &Diagnosis, report: &mut Report) {
     let counts = [
-        ("mesh.triangles", facts.triangles),
-        ("mesh.vertices", facts.vertices),
-        ("mesh.components", facts.components),
-        ("mesh.boundary_loops", facts.boundary_loops),
-        ("mesh.non_manifold_edges", facts.non_manifold_edges),
-        ("mesh.non_manifold_vertices", facts.non_manifold_vertices),
-        ("mesh.duplicate_faces", facts.duplicate_faces),
-        ("mesh.degenerate_faces", facts.degenerate_faces),
-        ("mesh.flipped_faces", facts.flipped_faces),
-        ("mesh.unreferenced_vertices", facts.unreferenced_vertices),
+        (key::MESH_TRIANGLES, facts.triangles),
+        (key::MESH_VERTICES, facts.vertices),
+        (key::MESH_COMPONENTS, facts.components),
+        (key::MESH_BOUNDARY_LOOPS, facts.boundary_loops),
+        (key::MESH_NON_MANIFOLD_EDGES, facts.non_manifold_edges),
+        (key::MESH_NON_MANIFOLD_VERTICES, facts.non_manifold_vertices),
+        (key::MESH_DUPLICATE_FACES, facts.duplicate_faces),
+        (key::MESH_DEGENERATE_FACES, facts.degenerate_faces),
+        (key::MESH_FLIPPED_FACES, facts.flipped_faces),
+        (key::MESH_UNREFERENCED_VERTICES, facts.unreferenced_vertices),
     ];
     report.quality.extend(counts.map(|(key, n)| (key.to_owned(), Figure::Count(n as u64))));
-    report.quality.insert("mesh.watertight".into(), Figure::Flag(facts.watertight));
-    report.quality.insert("mesh.manifold".into(), Figure::Flag(facts.manifold));
-    report.quality.insert("mesh.area".into(), Figure::Number(facts.area));
+    report.quality.insert(key::MESH_WATERTIGHT.into(), Figure::Flag(facts.watertight));
+    report.quality.insert(key::MESH_MANIFOLD.into(), Figure::Flag(facts.manifold));
+    report.quality.insert(key::MESH_AREA.into(), Figure::Number(facts.area));
     if let Some(volume) = facts.volume {
-        report.quality.insert("mesh.volume".into(), Figure::Number(volume));
+        report.quality.insert(key::MESH_VOLUME.into(), Figure::Number(volume));
     }
     if let Some(genus) = facts.genus {
-        report.quality.insert("mesh.genus".into(), Figure::Number(genus as f64));
+        report.quality.insert(key::MESH_GENUS.into(), Figure::Number(genus as f64));
     }
 }
 
@@ -232,7 +233,7 @@ fn crossings(mesh: &TriMesh, report: &mut Report) -> String {
             report.warnings.push(Warning::new(code, format!("{n} {words}."), ""));
         }
     }
-    found(report, "mesh.self_intersections").unwrap_or_else(|| "not looked for: too many triangles".into())
+    found(report, key::MESH_SELF_INTERSECTIONS).unwrap_or_else(|| "not looked for: too many triangles".into())
 }
 
 /// Counts folds of the grids and surfaces of a model.
@@ -244,8 +245,8 @@ fn folds(model: &Model, report: &mut Report) {
     let grids: usize = model.grids.iter().zip(&patches).map(|(g, p)| planish::grid::measure(g, p).folds).sum();
     let surfaces: usize = model.surfaces.iter().zip(&model.grids).map(|(s, g)| planish::surface::folds(s, g)).sum();
     for (key, n, words) in [
-        ("grid.folds", grids, "cells of grids are turned over"),
-        ("surface.folds", surfaces, "places of surfaces are turned over"),
+        (key::GRID_FOLDS, grids, "cells of grids are turned over"),
+        (key::SURFACE_FOLDS, surfaces, "places of surfaces are turned over"),
     ] {
         report.quality.insert(key.into(), Figure::Count(n as u64));
         if n > 0 {

@@ -10,6 +10,7 @@ use crate::progress;
 use crate::summary::Summary;
 use crate::tolerance::Scale;
 use planish::mesh::{DecimateError, DecimateParams, DecimateTarget, decimate as decimate_mesh, diagnose};
+use planish::pipeline::key;
 use planish::pipeline::{Figure, Warning};
 use planish_io::WriteOptions;
 use planish_io::report::{Report, count, number};
@@ -39,13 +40,13 @@ pub fn decimate(session: &Session, args: &Decimate) -> Result<Status, Failure> {
     report.warnings.extend(placed.warning(units.symbol()).into_iter().chain(moved));
     report.stages = vec![read, record];
     let facts = diagnose(&made.mesh);
-    report.quality.insert("mesh.triangles".into(), Figure::Count(facts.triangles as u64));
-    report.quality.insert("mesh.watertight".into(), Figure::Flag(facts.watertight));
-    report.quality.insert("mesh.manifold".into(), Figure::Flag(facts.manifold));
-    report.quality.insert("mesh.feature_edges".into(), Figure::Count(made.tags.edges.len() as u64));
-    report.quality.insert("mesh.self_intersections".into(), Figure::Count(made.self_intersections as u64));
+    report.quality.insert(key::MESH_TRIANGLES.into(), Figure::Count(facts.triangles as u64));
+    report.quality.insert(key::MESH_WATERTIGHT.into(), Figure::Flag(facts.watertight));
+    report.quality.insert(key::MESH_MANIFOLD.into(), Figure::Flag(facts.manifold));
+    report.quality.insert(key::MESH_FEATURE_EDGES.into(), Figure::Count(made.tags.edges.len() as u64));
+    report.quality.insert(key::MESH_SELF_INTERSECTIONS.into(), Figure::Count(made.self_intersections as u64));
     if let Some(distance) = made.distance {
-        report.quality.insert("mesh.distance_max".into(), Figure::Number(distance));
+        report.quality.insert(key::MESH_DISTANCE_MAX.into(), Figure::Number(distance));
     }
     if made.self_intersections > 0 {
         let text = format!("{} pairs of triangles meet, as in the input.", made.self_intersections);

@@ -22,6 +22,7 @@ use planish::field::{Field, Formula, MeshBody, Part, ScalarGrid, Solid, Spacing}
 use planish::geom::Aabb;
 use planish::mesh::{TriMesh, diagnose};
 use planish::model::Units;
+use planish::pipeline::key;
 use planish::pipeline::{self, Figure, ScanError, ScanMeshed, ScanParams, StageRecord, Warning};
 use planish::{DVec3, Observer};
 use planish_io::report::{Input, Report, count, number};
@@ -137,7 +138,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     report.stages = vec![read, record, write];
     figures(made, &mut report);
     if let Some(count) = tiles {
-        report.quality.insert("mesh.tiles".into(), Figure::Count(count as u64));
+        report.quality.insert(key::MESH_TILES.into(), Figure::Count(count as u64));
     }
     if let Source::Mesh(input) = &source {
         thin_walls(made, &input.mesh, &mut report);
@@ -217,14 +218,14 @@ fn volume(session: &Session, args: &Mesh, from: Sampled, params: &ScanParams) ->
     let mut report = Report::new("mesh", input);
     report.stages = vec![read, record, write];
     let [x, y, z] = grid.size;
-    report.quality.insert("volume.samples".into(), Figure::Count(grid.values.len() as u64));
-    report.quality.insert("volume.spacing".into(), Figure::Number(grid.spacing.x));
+    report.quality.insert(key::VOLUME_SAMPLES.into(), Figure::Count(grid.values.len() as u64));
+    report.quality.insert(key::VOLUME_SPACING.into(), Figure::Number(grid.spacing.x));
     staged.commit()?;
     commit_report(own_report, &report)?;
     if !session.common.quiet {
         let mut table = Summary::default();
         table.row("input", format!("{}: {}", report.input.path, report.input.kind));
-        table.row("volume", format!("{x} x {y} x {z} samples, {} apart", report.length("volume.spacing")));
+        table.row("volume", format!("{x} x {y} x {z} samples, {} apart", report.length(key::VOLUME_SPACING)));
         table.row("written", args.output.display().to_string());
         table.print();
     }
@@ -367,27 +368,27 @@ fn figures(made: &Meshed, report: &mut Report) {
     let facts = diagnose(&made.extracted.mesh);
     let counts = made.extracted.counts;
     let whole = [
-        ("mesh.triangles", facts.triangles),
-        ("mesh.vertices", facts.vertices),
-        ("mesh.components", facts.components),
-        ("mesh.feature_edges", made.extracted.tags.edges.len()),
-        ("mesh.cells", counts.cells),
-        ("mesh.fallback_cells", counts.fallbacks),
-        ("mesh.pushed_cells", counts.pushed),
-        ("mesh.clamped_features", counts.kept),
-        ("mesh.mended_hits", made.mended),
+        (key::MESH_TRIANGLES, facts.triangles),
+        (key::MESH_VERTICES, facts.vertices),
+        (key::MESH_COMPONENTS, facts.components),
+        (key::MESH_FEATURE_EDGES, made.extracted.tags.edges.len()),
+        (key::MESH_CELLS, counts.cells),
+        (key::MESH_FALLBACK_CELLS, counts.fallbacks),
+        (key::MESH_PUSHED_CELLS, counts.pushed),
+        (key::MESH_CLAMPED_FEATURES, counts.kept),
+        (key::MESH_MENDED_HITS, made.mended),
     ];
     report.quality.extend(whole.map(|(key, n)| (key.to_owned(), Figure::Count(n as u64))));
     super::meeting_figures(&made.extracted.mesh, report);
-    report.quality.insert("mesh.watertight".into(), Figure::Flag(facts.watertight));
-    report.quality.insert("mesh.manifold".into(), Figure::Flag(facts.manifold));
-    report.quality.insert("mesh.voxel".into(), Figure::Number(made.lattice.step.x));
-    report.quality.insert("mesh.area".into(), Figure::Number(facts.area));
+    report.quality.insert(key::MESH_WATERTIGHT.into(), Figure::Flag(facts.watertight));
+    report.quality.insert(key::MESH_MANIFOLD.into(), Figure::Flag(facts.manifold));
+    report.quality.insert(key::MESH_VOXEL.into(), Figure::Number(made.lattice.step.x));
+    report.quality.insert(key::MESH_AREA.into(), Figure::Number(facts.area));
     if let Some(volume) = facts.volume {
-        report.quality.insert("mesh.volume".into(), Figure::Number(volume));
+        report.quality.insert(key::MESH_VOLUME.into(), Figure::Number(volume));
     }
     if let Some(genus) = facts.genus {
-        report.quality.insert("mesh.genus".into(), Figure::Number(genus as f64));
+        report.quality.insert(key::MESH_GENUS.into(), Figure::Number(genus as f64));
     }
     if counts.fallbacks > 0 {
         let text = format!("{} cells have no sharp vertex although their normals ask for one.", counts.fallbacks);
@@ -408,12 +409,12 @@ const THIN_SHARE: f64 = 0.02;
 /// Tells of walls and gaps of a mesh that are thinner than the voxel.
 fn thin_walls(made: &Meshed, input: &TriMesh, report: &mut Report) {
     let thin = made.thin;
-    report.quality.insert("mesh.thin_edges".into(), Figure::Count(thin.edges as u64));
+    report.quality.insert(key::MESH_THIN_EDGES.into(), Figure::Count(thin.edges as u64));
     if thin.edges > 0 {
-        report.quality.insert("mesh.thin_width".into(), Figure::Number(thin.width));
+        report.quality.insert(key::MESH_THIN_WIDTH.into(), Figure::Number(thin.width));
     }
     let facts = diagnose(input);
-    let pieces = report.quality.get("mesh.components").and_then(|f| match f {
+    let pieces = report.quality.get(key::MESH_COMPONENTS).and_then(|f| match f {
         Figure::Count(n) => Some(*n),
         _ => None,
     });
@@ -442,10 +443,10 @@ fn table(args: &Mesh, made: &Meshed, report: &Report) -> Summary {
     let [x, y, z] = made.lattice.cells;
     table.row("input", format!("{}: {}", report.input.path, report.input.kind));
     table.row("voxel", format!("{} {unit} ({x} x {y} x {z} cells)", number(made.lattice.step.x)));
-    if report.figure("scan.noise").is_some() {
-        table.row("noise", report.length("scan.noise"));
+    if report.figure(key::SCAN_NOISE).is_some() {
+        table.row("noise", report.length(key::SCAN_NOISE));
     }
-    if let Some(lids) = report.figure("scan.lids").filter(|&n| n > 0.0) {
+    if let Some(lids) = report.figure(key::SCAN_LIDS).filter(|&n| n > 0.0) {
         table.row("holes", format!("{} small ones closed", count(lids as u64)));
     }
     table.row("triangles", count(made.extracted.mesh.triangles.len() as u64));
@@ -454,12 +455,12 @@ fn table(args: &Mesh, made: &Meshed, report: &Report) -> Summary {
         "surface",
         format!(
             "{}, {}",
-            flag("mesh.watertight", "watertight", "open"),
-            flag("mesh.manifold", "manifold", "not manifold")
+            flag(key::MESH_WATERTIGHT, "watertight", "open"),
+            flag(key::MESH_MANIFOLD, "manifold", "not manifold")
         ),
     );
     table.row("fallback cells", count(made.extracted.counts.fallbacks as u64));
-    if let Some(tiles) = report.figure("mesh.tiles") {
+    if let Some(tiles) = report.figure(key::MESH_TILES) {
         table.row("tiles", count(tiles as u64));
     }
     table.row("mesh", args.output.display().to_string());

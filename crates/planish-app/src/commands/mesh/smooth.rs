@@ -9,6 +9,7 @@ use crate::products::Staged;
 use crate::progress;
 use crate::summary::Summary;
 use planish::mesh::smooth as smooth_mesh;
+use planish::pipeline::key;
 use planish::pipeline::{Figure, Warning};
 use planish_io::WriteOptions;
 use planish_io::report::{Report, count, number};
@@ -34,10 +35,10 @@ pub fn smooth(session: &Session, args: &Smooth) -> Result<Status, Failure> {
     let mut report = Report::new("smooth", files::mesh_facts(&args.mesh, mesh, units));
     report.warnings.extend(placed.warning(units.symbol()).into_iter().chain(moved));
     report.stages = vec![read, record];
-    report.quality.insert("mesh.triangles".into(), Figure::Count(made.mesh.triangles.len() as u64));
-    report.quality.insert("mesh.noise".into(), Figure::Number(made.noise));
-    report.quality.insert("mesh.kept_vertices".into(), Figure::Count(made.kept as u64));
-    report.quality.insert("mesh.feature_edges".into(), Figure::Count(tags.edges.len() as u64));
+    report.quality.insert(key::MESH_TRIANGLES.into(), Figure::Count(made.mesh.triangles.len() as u64));
+    report.quality.insert(key::MESH_NOISE.into(), Figure::Number(made.noise));
+    report.quality.insert(key::MESH_KEPT_VERTICES.into(), Figure::Count(made.kept as u64));
+    report.quality.insert(key::MESH_FEATURE_EDGES.into(), Figure::Count(tags.edges.len() as u64));
     if made.kept > 0 {
         let text = format!("{} vertices stayed where they were: triangles would have turned or met.", made.kept);
         report.warnings.push(Warning::new("kept_vertices", text, ""));

@@ -12,6 +12,7 @@ use crate::summary::Summary;
 use crate::tolerance::Scale;
 use planish::model::Model;
 use planish::pipeline::Figure;
+use planish::pipeline::key;
 use planish::relief::Displaced;
 use planish::relief::maps::{self, MapKind, MapParams, PatchMap, Preset, Sheet, SheetKind};
 use planish_io::maps::{
@@ -69,11 +70,11 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
     let triangles = model.mesh.triangles.len() as f64;
     let each =
         |bytes: u64| format!("{} bytes, {} a triangle of the mesh", count(bytes), number(bytes as f64 / triangles));
-    report.quality.insert("relief.map_bytes".into(), Figure::Count(bytes));
-    report.quality.insert("relief.map_bytes_per_triangle".into(), Figure::Number(bytes as f64 / triangles));
-    report.quality.insert("relief.map_error_max".into(), Figure::Number(error));
+    report.quality.insert(key::RELIEF_MAP_BYTES.into(), Figure::Count(bytes));
+    report.quality.insert(key::RELIEF_MAP_BYTES_PER_TRIANGLE.into(), Figure::Number(bytes as f64 / triangles));
+    report.quality.insert(key::RELIEF_MAP_ERROR_MAX.into(), Figure::Number(error));
     if let Some(crack) = crack {
-        report.quality.insert("relief.map_crack_max".into(), Figure::Number(crack));
+        report.quality.insert(key::RELIEF_MAP_CRACK_MAX.into(), Figure::Number(crack));
     }
     let others = max_error.map_or(Ok(Vec::new()), |e| others(&made, &sheet, &options, e)).map_err(failed)?;
     for other in &others {
