@@ -29,7 +29,7 @@ macro_rules! keys {
     ($($constant:ident = $name:literal, $reading:ident, $meaning:literal;)*) => {
         $(#[doc = $meaning] pub const $constant: &str = $name;)*
 
-        /// All keys that are no lists by their nature, as `truth.*` of each stage or `a_to_b.*` are.
+        /// All keys but those whose names are put together, such as `a_to_b.rms`.
         pub const ALL: &[Key] = &[$(Key { name: $name, meaning: $meaning, reading: Reading::$reading }),*];
     };
 }
