@@ -17,10 +17,8 @@ const WIDEST_GAP: f64 = 8.0;
 const SIDE_TARGET_FACTOR: f64 = 2.0;
 /// A line must be this many times as long as its bridge costs; nor does a bridge lead to a place on its own line nearer than that.
 const LINE_PER_GAP: f64 = 3.0;
-/// Length over which the direction of a line at its end is taken, edges.
+/// Length over which the direction of a line at its end is taken, edges; so many of its edges tell how long they are.
 const LAST: f64 = 4.0;
-/// So many of its last edges tell how long the edges of a line are.
-const LAST_EDGES: usize = 4;
 /// Cosine of the greatest angle (50 degrees) between a bridge and the direction in which its line ends; bridges shorter than
 /// `SHORTEST` edges may have any.
 const AHEAD: f64 = 0.64;
@@ -163,7 +161,7 @@ impl End {
                 _ => break,
             }
         }
-        let last = LAST_EDGES.min(tail.len() - 1);
+        let last = (LAST as usize).min(tail.len() - 1);
         let edge = match fineness {
             Fineness::OfMesh => mean_edge,
             Fineness::OfLine => mean_edge.min(tail[last].1 / last as f64),

@@ -31,7 +31,7 @@ use std::rc::Rc;
 const FINE: f64 = 0.6;
 
 /// Area of an equilateral triangle with edges of length 1.
-const EQUILATERAL: f64 = 0.433_012_701_892_219_3;
+pub(super) const EQUILATERAL: f64 = 0.433_012_701_892_219_3;
 
 /// Places with shorter edges at most: every length looks at all of them. Where more ask for room, as in soups of triangles,
 /// all of the mesh is too coarse, and shorter edges here and there help no longer.
