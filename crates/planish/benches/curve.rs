@@ -375,7 +375,7 @@ fn follows(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
         return;
     }
     let adjacency = Adjacency::new(mesh);
-    let before = layout(mesh, Known::default(), &LayoutParams::default(), &Silent).expect("a network").network;
+    let before = layout(mesh, Known::default(), &LayoutParams::default(), None, &Silent).expect("a network").network;
     let old = imprint(mesh, &before, &Silent).expect("patches");
     let params = GridParams::default();
     let sizes = grid::choose_sizes(&before, &old, &params);

@@ -20,6 +20,7 @@ mod quality;
 mod record;
 mod rework;
 mod scan;
+mod trial;
 mod truth;
 
 pub use bricks::{
@@ -614,7 +615,7 @@ fn draw(
 ) -> Result<Layout, PipelineError> {
     let tagged = tags.map(|tags| tags.half_edges(input, mesh)).unwrap_or_default();
     let lay = |params: &LayoutParams, o: &dyn Observer| {
-        layout::layout(mesh, Known { sharp: &tagged, ..Known::default() }, params, o)
+        layout::layout(mesh, Known { sharp: &tagged, ..Known::default() }, params, Some(&trial::Coarse), o)
     };
     let laid = |o: &dyn Observer| -> Result<Layout, PipelineError> {
         let by = (params.patches as f64 / MOST_LAID as f64).sqrt().ceil() as usize;

@@ -149,7 +149,7 @@ fn parting_of_points_into_bricks_ends_within_200_ms() {
 #[test]
 fn layout_ends_within_200_ms() {
     let mesh = part(60_000);
-    stops("layout", |o| layout::layout(&mesh, Known::default(), &Default::default(), o));
+    stops("layout", |o| layout::layout(&mesh, Known::default(), &Default::default(), None, o));
 }
 
 #[test]

@@ -150,9 +150,10 @@ fn a_stroke_that_is_drawn_to_a_corner_beyond_a_curve_divides_the_curve_on_its_wa
 fn split_and_join_give_the_curve_back_and_deleting_takes_its_free_corners() {
     let mesh = shapes::sphere(1.0, 3);
     let adjacency = Adjacency::new(&mesh);
-    let network = layout(&mesh, Known::default(), &LayoutParams { patches: 8, ..LayoutParams::default() }, &Silent)
-        .unwrap()
-        .network;
+    let network =
+        layout(&mesh, Known::default(), &LayoutParams { patches: 8, ..LayoutParams::default() }, None, &Silent)
+            .unwrap()
+            .network;
     let mut editor = Editor::new(&mesh, &adjacency, network.clone());
     let before = editor.network.curves[3].points.iter().map(|p| p.position(&mesh)).collect::<Vec<_>>();
     let length = |p: &[DVec3]| p.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
@@ -182,9 +183,10 @@ fn dragging_a_corner_or_a_curve_of_a_layout_leaves_a_finished_network_and_the_re
     let mesh = shapes::sphere(1.0, 4);
     let adjacency = Adjacency::new(&mesh);
     let bvh = Bvh::new(&mesh);
-    let network = layout(&mesh, Known::default(), &LayoutParams { patches: 12, ..LayoutParams::default() }, &Silent)
-        .unwrap()
-        .network;
+    let network =
+        layout(&mesh, Known::default(), &LayoutParams { patches: 12, ..LayoutParams::default() }, None, &Silent)
+            .unwrap()
+            .network;
     let mut editor = Editor::new(&mesh, &adjacency, network.clone());
     let params = SnakeParams { fairness: 0.1, curvature: 1.0, ..SnakeParams::default() };
     let p = network.corners[2].place.position(&mesh);
@@ -506,8 +508,9 @@ fn patches_beside_a_feature_curve_share_its_nodes_and_the_model_has_no_gaps() {
 #[test]
 fn slanted_feature_curves_of_both_families_on_a_torus_leave_no_fold_in_their_patch() {
     let mesh = shapes::torus(2.0, 0.7, 72, 36);
-    let network =
-        layout(&mesh, Known::default(), &LayoutParams { patches: 16, ..Default::default() }, &Silent).unwrap().network;
+    let network = layout(&mesh, Known::default(), &LayoutParams { patches: 16, ..Default::default() }, None, &Silent)
+        .unwrap()
+        .network;
     let bvh = Bvh::new(&mesh);
     let patches = imprint(&mesh, &network, &Silent).unwrap();
     for patch in [0, 5] {
@@ -656,9 +659,10 @@ fn a_half_drawn_network_is_mirrored_across_the_plane_of_symmetry() {
 #[test]
 fn a_network_is_carried_to_another_shape_of_its_class_and_stays_finished() {
     let from = shapes::sphere(1.0, 4);
-    let network = layout(&from, Known::default(), &LayoutParams { patches: 10, ..LayoutParams::default() }, &Silent)
-        .unwrap()
-        .network;
+    let network =
+        layout(&from, Known::default(), &LayoutParams { patches: 10, ..LayoutParams::default() }, None, &Silent)
+            .unwrap()
+            .network;
     let mut to = shapes::sphere(1.0, 5);
     let bend = |p: DVec3| DVec3::new(1.4 * p.x, 0.9 * p.y, p.z + 0.25 * p.x * p.x);
     to.points.iter_mut().for_each(|p| *p = bend(*p));

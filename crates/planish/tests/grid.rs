@@ -325,7 +325,7 @@ fn disks_cut_from_scans_give_grids_on_the_mesh() {
 fn a_box_divided_by_3_has_54_patches_with_corners_at_thirds_of_its_sides_within_1e_4() {
     let size = DVec3::new(3.0, 6.0, 9.0);
     let mesh = shapes::cuboid(size, 10);
-    let network = layout(&mesh, Known::default(), &LayoutParams::default(), &Silent).unwrap().network;
+    let network = layout(&mesh, Known::default(), &LayoutParams::default(), None, &Silent).unwrap().network;
     assert_eq!(network.patches.len(), 6);
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -37,8 +37,9 @@ fn length(mesh: &TriMesh, network: &Network, kind: CurveKind) -> f64 {
 #[test]
 fn every_layout_is_disks_that_cover_the_mesh_to_1e_9_of_its_area() {
     for (name, mesh, euler) in surfaces() {
-        let network =
-            layout(&mesh, Known::default(), &params(24), &Silent).unwrap_or_else(|e| panic!("{name}: {e}")).network;
+        let network = layout(&mesh, Known::default(), &params(24), None, &Silent)
+            .unwrap_or_else(|e| panic!("{name}: {e}"))
+            .network;
         let patches = imprint(&mesh, &network, &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(patches.len(), network.patches.len());
         let area = |m: &TriMesh| (0..m.triangles.len()).map(|t| m.area(t)).sum::<f64>();
@@ -69,8 +70,9 @@ fn sharp_edges_and_boundaries_are_curves_to_1e_9_of_their_length() {
                 edges += d / 2.0;
             }
         }
-        let network =
-            layout(&mesh, Known::default(), &params(24), &Silent).unwrap_or_else(|e| panic!("{name}: {e}")).network;
+        let network = layout(&mesh, Known::default(), &params(24), None, &Silent)
+            .unwrap_or_else(|e| panic!("{name}: {e}"))
+            .network;
         for (kind, want) in [(CurveKind::Feature, edges), (CurveKind::Boundary, rim)] {
             let got = length(&mesh, &network, kind);
             assert!((got - want).abs() <= 1e-9 * want.max(1.0), "{name}: {kind:?} {got} of {want}");
@@ -81,7 +83,7 @@ fn sharp_edges_and_boundaries_are_curves_to_1e_9_of_their_length() {
 #[test]
 fn corners_of_a_torus_of_60_patches_are_square_within_20_degrees_in_the_mean() {
     let mesh = shapes::torus(1.0, 0.4, 90, 45);
-    let network = layout(&mesh, Known::default(), &params(60), &Silent).expect("a torus has a layout").network;
+    let network = layout(&mesh, Known::default(), &params(60), None, &Silent).expect("a torus has a layout").network;
     assert!(network.patches.len().abs_diff(60) <= 12, "{} patches", network.patches.len());
     let mut off = Vec::new();
     for patch in imprint(&mesh, &network, &Silent).expect("disks") {
@@ -126,7 +128,7 @@ fn near_corners(mesh: &TriMesh, network: &Network) -> Vec<f64> {
 #[test]
 fn near_their_nodes_the_curves_of_a_torus_meet_at_90_degrees_within_12_in_the_mean_and_none_below_40() {
     let mesh = shapes::torus(1.0, 0.4, 180, 90);
-    let network = layout(&mesh, Known::default(), &params(60), &Silent).expect("a torus has a layout").network;
+    let network = layout(&mesh, Known::default(), &params(60), None, &Silent).expect("a torus has a layout").network;
     let angles = near_corners(&mesh, &network);
     let off = angles.iter().map(|a| (a - 90.0).abs()).sum::<f64>() / angles.len() as f64;
     let least = angles.iter().fold(f64::INFINITY, |a, &b| a.min(b));
@@ -148,7 +150,7 @@ fn jittered_sheet() -> TriMesh {
 #[test]
 fn curves_on_a_flat_sheet_of_poor_triangles_turn_by_less_than_30_degrees_in_the_mean_over_16_steps() {
     let mesh = jittered_sheet();
-    let network = layout(&mesh, Known::default(), &params(16), &Silent).expect("a sheet has a layout").network;
+    let network = layout(&mesh, Known::default(), &params(16), None, &Silent).expect("a sheet has a layout").network;
     let turn = |curve: &Curve| {
         let points: Vec<DVec3> = curve.points.iter().map(|p| p.position(&mesh)).collect();
         let length = polyline::length(points.iter().copied());
@@ -164,16 +166,16 @@ fn curves_on_a_flat_sheet_of_poor_triangles_turn_by_less_than_30_degrees_in_the_
 #[test]
 fn a_pinhole_in_a_sphere_of_24_patches_adds_at_most_16() {
     let mut mesh = shapes::sphere(1.0, 5);
-    let whole = layout(&mesh, Known::default(), &params(24), &Silent).unwrap().network.patches.len();
+    let whole = layout(&mesh, Known::default(), &params(24), None, &Silent).unwrap().network.patches.len();
     mesh.triangles.remove(7);
-    let pierced = layout(&mesh, Known::default(), &params(24), &Silent).unwrap().network.patches.len();
+    let pierced = layout(&mesh, Known::default(), &params(24), None, &Silent).unwrap().network.patches.len();
     assert!(pierced <= whole + 16, "{pierced} patches, {whole} without the hole");
 }
 
 #[test]
 fn a_sheet_of_24_patches_with_36_pinholes_has_at_most_8_more_once_they_are_closed_and_16_for_each_before() {
     let whole = shapes::rectangle(6.0, 6.0, 60, 60);
-    let sheet = layout(&whole, Known::default(), &params(24), &Silent).unwrap().network.patches.len();
+    let sheet = layout(&whole, Known::default(), &params(24), None, &Silent).unwrap().network.patches.len();
     let low = whole.bounds().min;
     let mut mesh = whole.clone();
     // Two triangles around the middle of each of 36 squares of side 1.
@@ -183,12 +185,12 @@ fn a_sheet_of_24_patches_with_36_pinholes_has_at_most_8_more_once_they_are_close
         off(p.x) > 0.05 || off(p.y) > 0.05
     });
     assert_eq!(whole.triangles.len() - mesh.triangles.len(), 72);
-    let pierced = layout(&mesh, Known::default(), &params(24), &Silent).unwrap().network.patches.len();
+    let pierced = layout(&mesh, Known::default(), &params(24), None, &Silent).unwrap().network.patches.len();
     assert!(pierced <= sheet + 16 * 36, "{pierced} patches, {sheet} without holes");
     let mut tags = FeatureTags::from_edges(mesh.points.len(), []);
     assert_eq!(close_holes(&mut mesh, &mut tags, 1.0, &Silent), Ok(36));
     assert_eq!(diagnose(&mesh).boundary_loops, 1);
-    let closed = layout(&mesh, Known::default(), &params(24), &Silent).unwrap().network.patches.len();
+    let closed = layout(&mesh, Known::default(), &params(24), None, &Silent).unwrap().network.patches.len();
     assert!(closed <= sheet + 8, "{closed} patches, {sheet} without holes");
 }
 
@@ -197,7 +199,9 @@ fn layouts_are_equal_on_1_and_4_threads() {
     let mesh = synthetic::demo(7, 6000);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| layout(&mesh, Known::default(), &params(40), &Silent)).expect("the demo has a layout").network
+        pool.install(|| layout(&mesh, Known::default(), &params(40), None, &Silent))
+            .expect("the demo has a layout")
+            .network
     };
     assert_eq!(on(1), on(4));
 }
@@ -206,7 +210,7 @@ fn layouts_are_equal_on_1_and_4_threads() {
 fn a_mesh_of_two_triangles_has_a_layout_of_one_patch() {
     let square = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
     let mesh = TriMesh::new(square.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
-    let network = layout(&mesh, Known::default(), &params(1), &Silent).expect("a square has a layout").network;
+    let network = layout(&mesh, Known::default(), &params(1), None, &Silent).expect("a square has a layout").network;
     let patches = imprint(&mesh, &network, &Silent).expect("disks");
     assert!((1..=4).contains(&patches.len()), "{} patches", patches.len());
 }
@@ -214,7 +218,7 @@ fn a_mesh_of_two_triangles_has_a_layout_of_one_patch() {
 #[test]
 fn a_cylinder_of_2044_needles_has_a_network_along_its_form_of_30_patches_at_most() {
     let mesh = shapes::faceted_cylinder(3.0, 10.0, 512);
-    let laid = layout(&mesh, Known::default(), &LayoutParams::default(), &Silent).unwrap();
+    let laid = layout(&mesh, Known::default(), &LayoutParams::default(), None, &Silent).unwrap();
     assert!(matches!(laid.pieces[..], [(_, Method::Field { .. })]), "{:?}", laid.pieces);
     assert!(laid.network.patches.len() <= 30, "{}", laid.network.patches.len());
     let rims = 2.0 * 512.0 * 6.0 * (std::f64::consts::PI / 512.0).sin();
@@ -232,14 +236,14 @@ fn regress_a_wedge_of_15_degrees_has_12_patches_whose_grids_and_seams_are_not_fo
 
 #[test]
 fn meshes_without_faces_with_three_faces_on_an_edge_or_of_loose_triangles_are_refused() {
-    assert_eq!(layout(&TriMesh::default(), Known::default(), &params(10), &Silent), Err(LayoutError::Empty));
+    assert_eq!(layout(&TriMesh::default(), Known::default(), &params(10), None, &Silent), Err(LayoutError::Empty));
     let points = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, -DVec3::Y];
     let mesh = TriMesh::new(points, vec![[0, 1, 2], [1, 0, 3], [0, 1, 4]]);
-    assert_eq!(layout(&mesh, Known::default(), &params(10), &Silent), Err(LayoutError::NotManifold { edges: 1 }));
+    assert_eq!(layout(&mesh, Known::default(), &params(10), None, &Silent), Err(LayoutError::NotManifold { edges: 1 }));
     let points = (0..9).map(|k| DVec3::new(f64::from(k / 3) + 0.4 * f64::from(k % 3), f64::from(k % 3 / 2), 0.0));
     let mesh = TriMesh::new(points.collect(), vec![[0, 1, 2], [3, 4, 5], [6, 7, 8]]);
     let loose = Err(LayoutError::Loose { pieces: 3, triangles: 3 });
-    assert_eq!(layout(&mesh, Known::default(), &params(10), &Silent), loose);
+    assert_eq!(layout(&mesh, Known::default(), &params(10), None, &Silent), loose);
 }
 
 /// A unit square of two triangles as one patch, with `extra` curves.
@@ -299,8 +303,9 @@ fn a_part_that_no_patch_covers_is_refused() {
 fn real_meshes_have_layouts_of_disks_with_no_patch_above_8_times_the_mean() {
     for name in ["fandisk", "goathead", "casting"] {
         let Some(mesh) = common::data_mesh(&format!("{name}.ply")) else { continue };
-        let network =
-            layout(&mesh, Known::default(), &params(100), &Silent).unwrap_or_else(|e| panic!("{name}: {e}")).network;
+        let network = layout(&mesh, Known::default(), &params(100), None, &Silent)
+            .unwrap_or_else(|e| panic!("{name}: {e}"))
+            .network;
         let areas: Vec<f64> = imprint(&mesh, &network, &Silent)
             .unwrap_or_else(|e| panic!("{name}: {e}"))
             .iter()

@@ -24,9 +24,10 @@ fn edited(share: f64) -> (TriMesh, Adjacency, Network, Network, u32) {
         *p *= 1.0 + 0.05 * (5.0 * p.x).sin() * (4.0 * p.y).cos() + 0.01 * (23.0 * p.z + 11.0 * p.x).sin();
     }
     let adjacency = Adjacency::new(&mesh);
-    let before = layout(&mesh, Known::default(), &LayoutParams { patches: 24, ..LayoutParams::default() }, &Silent)
-        .unwrap()
-        .network;
+    let before =
+        layout(&mesh, Known::default(), &LayoutParams { patches: 24, ..LayoutParams::default() }, None, &Silent)
+            .unwrap()
+            .network;
     let length = |c: usize| {
         let at: Vec<DVec3> = before.curves[c].points.iter().map(|p| p.position(&mesh)).collect();
         at.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>()

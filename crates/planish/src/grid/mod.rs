@@ -29,7 +29,7 @@ pub use feature::curve::{FeatureGrid, Sections, relax_with_features};
 pub use feature::network::{Drawn, Here, check_features, family_of, relax_network};
 pub use feature::{Family, FeatureCurve, FeatureError};
 pub use follow::follow;
-pub use quality::{GridQuality, measure};
+pub use quality::{GridQuality, folds, measure};
 pub use resample::{Relaxer, densify, resample, resample_by};
 pub use sizes::choose_sizes;
 

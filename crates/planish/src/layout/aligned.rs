@@ -15,12 +15,13 @@ use super::integers::{self, IntegerMap, QuantizeError, Scale};
 use super::map::{self, Charts, Effort};
 use super::proxy::{self, Proxy, Sizing};
 use super::recut::Bench;
-use super::{LayoutParams, Piece, SETTLING_PER_SMOOTHING, TYPICAL_PATCHES, finish, improve};
+use super::{LayoutParams, Piece, SETTLING_PER_SMOOTHING, TYPICAL_PATCHES, Trial, by_folds, finish, improve, tried};
 use crate::mesh::TriMesh;
 use crate::network::Network;
 use crate::network::field::{self, FieldParams};
 use crate::observe::{Cancelled, Observer, counted};
 use glam::DVec3;
+use std::cmp::Ordering;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
@@ -192,9 +193,17 @@ impl AlignError {
 /// Numbers of squares that are tried, in those of the coarsest network: as few as the form needs.
 const GROWTH: [f64; 8] = [1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0, 11.3];
 
-/// More squares than this are not tried where nobody asked for them: where lines and cones alone need more, the partition
-/// does with fewer.
-const MOST_UNASKED: f64 = 300.0;
+/// How a network along the form is sought.
+#[derive(Clone, Copy)]
+pub(super) struct Search<'a> {
+    /// What tells whether a network will do; without it the shapes of its cells do.
+    pub trial: Option<&'a dyn Trial>,
+    /// Squares at most that are tried where nobody asked for a number.
+    pub most: usize,
+}
+
+/// Networks of one map over which surfaces are tried at most. Chosen.
+const MOST_TRIED: usize = 2;
 
 /// Numbers that are tried in place of one that was asked for and that the form does not allow.
 const NEAR_ASKED: [f64; 4] = [1.0, 1.1, 0.9, 1.2];
@@ -212,14 +221,30 @@ pub(super) struct Laid {
     pub worth: Worth,
     /// The same on the mesh.
     on_mesh: Worth,
+    /// Places where a trial finds surfaces folded; `None` without one.
+    pub folds: Option<usize>,
     /// True if no number in question is good and this is none of the lines' doing: another map would hardly be better.
     is_far: bool,
 }
 
 impl Laid {
-    /// True if there is no need to look for another: it is good, or the form leaves no hope of a good one.
-    pub fn is_final(&self) -> bool {
+    /// True if there is no need for another map: this is good, or the form leaves no hope of a good one.
+    fn is_final(&self) -> bool {
         self.worth.is_kept() && (self.worth.is_enough() || self.is_far)
+    }
+
+    /// True if this is taken rather than the other.
+    fn is_better(&self, other: &Laid) -> bool {
+        match self.worth.missed.total_cmp(&other.worth.missed).then(by_folds(self.folds, other.folds)) {
+            Ordering::Less => true,
+            Ordering::Greater => false,
+            Ordering::Equal => self.on_mesh.is_better(other.on_mesh),
+        }
+    }
+
+    /// True if a partition need not be looked at either.
+    pub fn is_sound(&self) -> bool {
+        self.is_final() && self.folds.is_none_or(|folds| folds == 0)
     }
 }
 
@@ -286,6 +311,7 @@ pub(super) fn asked(params: &LayoutParams) -> Option<usize> {
 pub(super) fn lay(
     &Piece { mesh, sharp, corners, share }: &Piece,
     params: &LayoutParams,
+    search: Search,
     observer: &dyn Observer,
 ) -> Result<Laid, AlignError> {
     if corners.iter().any(|c| *c) {
@@ -315,9 +341,9 @@ pub(super) fn lay(
             };
             has_tight |= !aligned.charts.tight.is_empty();
             observer.progress(0.3);
-            let (laid, trouble) = aligned.choose(params, observer)?;
+            let (laid, trouble) = aligned.choose(params, (mesh, search), observer)?;
             if let Some(laid) = laid
-                && best.as_ref().is_none_or(|best| laid.on_mesh.is_better(best.on_mesh))
+                && best.as_ref().is_none_or(|best| laid.is_better(best))
             {
                 best = Some(laid);
             }
@@ -355,26 +381,28 @@ struct Draft {
 
 impl Aligned {
     /// The network of fewest squares that is good, of the numbers in question, else the best; and what was in the way of
-    /// others that would be preferred.
+    /// others that would be preferred. Where surfaces over it fold, the next best may take its place.
     ///
     /// Where the first is not good the largest number comes next: if that is not good either those between hardly ever are.
     fn choose(
         &self,
         params: &LayoutParams,
+        (mesh, search): (&TriMesh, Search),
         observer: &dyn Observer,
     ) -> Result<(Option<Laid>, Option<AlignError>), Cancelled> {
         if let Err(folded) = self.unfolded(&self.mapped) {
             return Ok((None, Some(folded)));
         }
-        let mut scales = match self.scales(params, observer) {
+        let mut scales = match self.scales(params, search.most, observer) {
             Ok(scales) => VecDeque::from(scales),
             Err(AlignError::Cancelled(cancelled)) => return Err(cancelled),
             Err(e) => return Ok((None, Some(e))),
         };
         let (first, largest) = (scales.front().copied(), scales.iter().copied().max());
         let count = scales.len();
-        let (mut best, mut trouble, mut is_far): (Option<Draft>, Option<(Scale, AlignError)>, bool) =
-            (None, None, false);
+        // The best comes first.
+        let (mut drafts, mut trouble, mut is_far): (Vec<Draft>, Option<(Scale, AlignError)>, bool) =
+            (Vec::new(), None, false);
         while let Some(scale) = scales.pop_front() {
             observer.progress(0.9 - 0.6 * (scales.len() + 1) as f64 / count as f64);
             match self.quantized(scale, observer).and_then(|whole| self.draft(&whole, params, observer)) {
@@ -383,12 +411,14 @@ impl Aligned {
                     let is_largest = Some(scale) == largest;
                     if is_largest && !is_enough {
                         is_far = fitness::is_open(&draft.covers);
-                    } else if best.is_none() && draft.worth.is_kept() && !is_enough {
+                    } else if drafts.is_empty() && draft.worth.is_kept() && !is_enough {
                         scales.make_contiguous().sort_by_key(|&scale| (Some(scale) != largest, scale));
                     }
-                    if best.as_ref().is_none_or(|best| draft.worth.is_better(best.worth)) {
-                        best = Some(draft);
+                    if drafts.first().is_none_or(|best| draft.worth.is_better(best.worth)) {
+                        drafts.insert(0, draft);
                         trouble = trouble.filter(|(other, _)| !is_enough || *other < scale);
+                    } else {
+                        drafts.push(draft);
                     }
                     // Below a good largest number there may be others.
                     if is_enough != is_largest {
@@ -402,26 +432,37 @@ impl Aligned {
                 break;
             }
             // What has no room for two numbers of squares has none for more.
-            if Some(scale) != first && best.is_none() && trouble.as_ref().is_some_and(|(_, e)| !e.places().is_empty()) {
+            if Some(scale) != first
+                && drafts.is_empty()
+                && trouble.as_ref().is_some_and(|(_, e)| !e.places().is_empty())
+            {
                 break;
             }
         }
         let mut trouble = trouble.map(|(_, e)| e);
-        let laid = match best.map(|draft| self.laid(draft, is_far, params, observer)) {
-            Some(Err(AlignError::Cancelled(cancelled))) => return Err(cancelled),
-            Some(Err(e)) => {
-                trouble = Some(e);
-                None
+        let mut best: Option<Laid> = None;
+        for draft in drafts.into_iter().take(if search.trial.is_some() { MOST_TRIED } else { 1 }) {
+            match self.laid(draft, is_far, params, observer) {
+                Ok(mut laid) => {
+                    laid.folds = tried(search.trial, mesh, &laid.network, observer)?;
+                    if best.as_ref().is_none_or(|best| laid.is_better(best)) {
+                        best = Some(laid);
+                    }
+                }
+                Err(AlignError::Cancelled(cancelled)) => return Err(cancelled),
+                Err(e) => trouble = Some(e),
             }
-            laid => laid.and_then(Result::ok),
-        };
-        Ok((laid, trouble))
+            if best.as_ref().is_some_and(|best| best.folds == Some(0)) {
+                break;
+            }
+        }
+        Ok((best, trouble))
     }
 
     /// The scales in question, in the order in which they are tried.
     /// # Errors
     /// [`AlignError`], among others `Count` and `LeastCount`.
-    fn scales(&self, params: &LayoutParams, observer: &dyn Observer) -> Result<Vec<Scale>, AlignError> {
+    fn scales(&self, params: &LayoutParams, most: usize, observer: &dyn Observer) -> Result<Vec<Scale>, AlignError> {
         if let Some(asked) = asked(params) {
             return Ok(NEAR_ASKED.map(|near| Scale::Squares(((near * asked as f64).round() as usize).max(1))).to_vec());
         }
@@ -429,16 +470,15 @@ impl Aligned {
             return Ok(vec![Scale::Coarsest]);
         }
         let Proxy { mesh, adjacency, lines, .. } = &*self.proxy;
-        let is_many = |squares: usize| squares as f64 > MOST_UNASKED;
         let least = integers::least_squares(mesh, adjacency, &self.mapped.map, lines);
-        if is_many(least) {
+        if least > most {
             return Err(AlignError::LeastCount { least });
         }
         let least = self.quantized(Scale::Coarsest, observer)?.squares;
-        if is_many(least) {
+        if least > most {
             return Err(AlignError::Count { found: least });
         }
-        let numbers = GROWTH.map(|n| n * least as f64).into_iter().filter(|n| *n <= MOST_UNASKED);
+        let numbers = GROWTH.map(|n| n * least as f64).into_iter().filter(|n| *n <= most as f64);
         Ok(numbers.map(|n| Scale::Squares(n as usize)).collect())
     }
 
@@ -516,7 +556,7 @@ impl Aligned {
         finish(&mut bench, params, observer).map_err(|_| Cancelled)?;
         let cones = self.charts.index.iter().filter(|i| **i != 0).count();
         let on_mesh = Worth { good_part: fitness::good_part(&fitness::covers(&bench)), ..worth };
-        Ok(Laid { network: proxy.network(&bench.complex), cones, deviation_deg, worth, on_mesh, is_far })
+        Ok(Laid { network: proxy.network(&bench.complex), cones, deviation_deg, worth, on_mesh, folds: None, is_far })
     }
 }
 
@@ -533,7 +573,16 @@ mod tests {
     fn a_network_of_the_number_asked_for_is_final_if_it_is_good_or_if_no_number_outweighs_its_bad_cells() {
         let is_final = |patches, good_part, is_far| {
             let worth = Worth::new(patches, Some(60), good_part);
-            Laid { network: Network::default(), cones: 0, deviation_deg: 0.0, worth, on_mesh: worth, is_far }.is_final()
+            Laid {
+                network: Network::default(),
+                cones: 0,
+                deviation_deg: 0.0,
+                worth,
+                on_mesh: worth,
+                folds: None,
+                is_far,
+            }
+            .is_final()
         };
         assert!(is_final(60, 0.95, false) && is_final(60, 0.4, true));
         assert!(!is_final(60, 0.85, false) && !is_final(110, 0.4, true));

@@ -29,7 +29,7 @@ mod slide;
 mod strips;
 
 pub use crate::layout::aligned::count_is_near;
-use crate::layout::aligned::{AlignError, Worth};
+use crate::layout::aligned::{AlignError, Search, Worth};
 use crate::layout::complex::Complex;
 use crate::layout::partition::{outline, polygon, tips};
 use crate::layout::proxy::refine::Refined;
@@ -38,9 +38,10 @@ use crate::layout::recut::Bench;
 use crate::mesh::{Adjacency, FacePoint, FeatureTags, MeshParts, NONE, TriMesh, components, next};
 use crate::network::imprint::{self, Shared};
 use crate::network::{Corner, Curve, Network, Patch, Side};
-use crate::observe::{Cancelled, Observer, Part};
+use crate::observe::{Cancelled, Observer, Part, counted};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 use std::collections::HashSet;
 
 /// Edges of the working mesh against the side of a patch: short enough for a curve to find its way.
@@ -79,6 +80,13 @@ const FINISH_TO_SIDE: f64 = 0.25;
 /// Patches of a typical layout; default ones of the measured meshes have 33 to 285. The scale of directions goes by their side, and
 /// pieces of less area than one are small.
 const TYPICAL_PATCHES: f64 = 100.0;
+
+/// More patches along the form than this are not tried where nobody asked for them: where lines and cones alone need more, the
+/// partition does with fewer.
+const MOST_UNASKED: usize = 300;
+
+/// Unless its patches fold: then up to so many times as many along the form are tried. Chosen.
+const MORE_UNFOLDED: usize = 2;
 
 /// Patches of a partition where no number is asked for.
 const PARTITION_PATCHES: usize = 120;
@@ -165,6 +173,14 @@ pub struct Known<'a> {
     pub corners: &'a [bool],
 }
 
+/// Tries networks before one is taken.
+pub trait Trial: Sync {
+    /// Number of places where surfaces over the patches of `network`, which covers `mesh`, turn over.
+    /// # Errors
+    /// [`Cancelled`] by the observer.
+    fn folds(&self, mesh: &TriMesh, network: &Network, observer: &dyn Observer) -> Result<usize, Cancelled>;
+}
+
 /// How the patches of a piece of a mesh were laid.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Method {
@@ -174,6 +190,8 @@ pub enum Method {
         cones: usize,
         /// Mean angle between the isolines of the patches and the field, degrees.
         deviation_deg: f64,
+        /// Places where a trial finds surfaces folded; even patches do no better then.
+        folds: usize,
     },
     /// By a partition into even cells, improved one by one: where there is no usable map, or where that was asked for.
     Partition {
@@ -207,6 +225,7 @@ struct Piece<'a> {
 /// Each piece of the mesh gets a network of its own: what is in the way of one is not in that of another.
 ///
 /// Sharp lines and boundaries lie on patch boundaries; every patch is an exact disk ([`crate::network::imprint`]).
+/// * `trial` - tells whether patches along the form are good enough, or those of a partition better; without it their shapes do
 /// # Errors
 /// `NotManifold` for a mesh that needs repair, `Loose` for single triangles, `Stuck` if its faces are degenerate beyond use;
 /// `Cancelled`.
@@ -214,6 +233,7 @@ pub fn layout(
     mesh: &TriMesh,
     known: Known,
     params: &LayoutParams,
+    trial: Option<&dyn Trial>,
     observer: &dyn Observer,
 ) -> Result<Layout, LayoutError> {
     let Known { sharp: tagged, lines, corners } = known;
@@ -228,7 +248,7 @@ pub fn layout(
     let groups = grouped(mesh, &piece_of, pieces);
     if let [_] = groups[..] {
         let piece = Piece { mesh, sharp: &sharp, corners, share: 1.0 };
-        let (network, method) = lay(&piece, params, observer)?;
+        let (network, method) = lay(&piece, params, trial, observer)?;
         return Ok(Layout { network, pieces: vec![(1.0, method)] });
     }
     let (none, mut start) = (FeatureTags::default(), 0.0);
@@ -239,7 +259,7 @@ pub fn layout(
         let sharp: Vec<bool> = faces.iter().flat_map(|&f| &sharp[3 * f as usize..][..3]).copied().collect();
         let corners: Vec<bool> = part.vertices.iter().filter_map(|&v| corners.get(v as usize).copied()).collect();
         let piece = Piece { mesh: &part.mesh, sharp: &sharp, corners: &corners, share: *share };
-        let (network, method) = lay(&piece, params, &Part::new(observer, start, *share))?;
+        let (network, method) = lay(&piece, params, trial, &Part::new(observer, start, *share))?;
         append(&mut laid.network, network, faces);
         laid.pieces.push((*share, method));
         start += share;
@@ -283,20 +303,34 @@ fn append(network: &mut Network, mut piece: Network, faces: &[u32]) {
     network.patches.append(&mut piece.patches);
 }
 
-/// The network of a piece along its form, or of a partition where that is worth more or was asked for. A number of patches is
-/// asked for of the whole mesh.
-fn lay(piece: &Piece, params: &LayoutParams, observer: &dyn Observer) -> Result<(Network, Method), LayoutError> {
+/// The network of a piece along its form, or of a partition where that folds in fewer places, is worth more or was asked for. A number of
+/// patches is asked for of the whole mesh.
+fn lay(
+    piece: &Piece,
+    params: &LayoutParams,
+    trial: Option<&dyn Trial>,
+    observer: &dyn Observer,
+) -> Result<(Network, Method), LayoutError> {
     let of_piece = |patches: usize| ((piece.share * patches as f64).round() as usize).max(1);
     let params = &match params.patches {
         0 => params.clone(),
         patches => LayoutParams { patches: of_piece(patches).min(most_patches(piece.mesh)), ..params.clone() },
     };
-    let along = (!params.even).then(|| aligned::lay(piece, params, observer));
+    let trial = trial.filter(|_| !params.coarsest);
+    let along = (!params.even).then(|| aligned::lay(piece, params, Search { trial, most: MOST_UNASKED }, observer));
+    let many = match along {
+        Some(Err(AlignError::Count { found })) => Some(found),
+        _ => None,
+    };
     let (along, why) = match along {
         None => (None, None),
-        Some(Ok(laid)) if params.coarsest || laid.is_final() => return Ok(laid.into()),
+        Some(Ok(laid)) if params.coarsest || laid.is_sound() => return Ok(laid.into()),
         Some(Ok(laid)) if laid.worth.is_kept() => {
-            (Some(laid), Some("patches along its form would be covered less well by grids".to_owned()))
+            let why = match laid.folds {
+                Some(folds) => format!("surfaces along its form would fold in {}", counted(folds, "place", "places")),
+                None => "patches along its form would be covered less well by grids".to_owned(),
+            };
+            (Some(laid), Some(why))
         }
         Some(Ok(laid)) => {
             let found = laid.network.patches.len();
@@ -311,19 +345,52 @@ fn lay(piece: &Piece, params: &LayoutParams, observer: &dyn Observer) -> Result<
         0 => of_piece(PARTITION_PATCHES),
         patches => patches,
     };
-    let params = LayoutParams { patches, ..params.clone() };
-    let (network, good_part) = partitioned(piece, &params, observer)?;
-    let worth = Worth::new(network.patches.len(), asked, good_part);
-    match along {
-        // Where neither is good the form is followed, unless that is worse.
-        Some(laid) if !worth.exceeds(laid.worth) => Ok(laid.into()),
-        _ => Ok((network, Method::Partition { why })),
+    let (network, good_part) = partitioned(piece, &LayoutParams { patches, ..params.clone() }, observer)?;
+    if along.is_none() && many.is_none() {
+        return Ok((network, Method::Partition { why }));
     }
+    let worth = Worth::new(network.patches.len(), asked, good_part);
+    let folds = tried(trial, piece.mesh, &network, observer)?;
+    let most = MORE_UNFOLDED * network.patches.len();
+    let along = if folds.is_some_and(|folds| folds > 0) && many.is_some_and(|many| many <= most) {
+        match aligned::lay(piece, params, Search { trial, most }, &Part::new(observer, 1.0, 0.0)) {
+            Err(AlignError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            laid => laid.ok(),
+        }
+    } else {
+        along
+    };
+    let Some(laid) = along else { return Ok((network, Method::Partition { why })) };
+    // Where neither is good the form is followed, unless that is worse.
+    let is_better = match by_folds(folds, laid.folds) {
+        Ordering::Less => worth.is_kept() || !laid.worth.is_kept(),
+        Ordering::Equal => worth.exceeds(laid.worth),
+        Ordering::Greater => worth.is_kept() && !laid.worth.is_kept(),
+    };
+    Ok(if is_better { (network, Method::Partition { why }) } else { laid.into() })
+}
+
+/// Which of two networks folds in fewer places. Numbers that differ by no more than the standard deviation of two such counts (their
+/// sum is its square, where places are independent) are equal, and so are those that nobody counted.
+fn by_folds(one: Option<usize>, other: Option<usize>) -> Ordering {
+    let (Some(one), Some(other)) = (one, other) else { return Ordering::Equal };
+    let by = one.abs_diff(other);
+    if by.saturating_mul(by) > one.saturating_add(other) { one.cmp(&other) } else { Ordering::Equal }
+}
+
+/// What a trial says of a network, if there is one.
+fn tried(
+    trial: Option<&dyn Trial>,
+    mesh: &TriMesh,
+    network: &Network,
+    observer: &dyn Observer,
+) -> Result<Option<usize>, Cancelled> {
+    trial.map(|trial| trial.folds(mesh, network, &Part::new(observer, 1.0, 0.0))).transpose()
 }
 
 impl From<aligned::Laid> for (Network, Method) {
-    fn from(aligned::Laid { network, cones, deviation_deg, .. }: aligned::Laid) -> (Network, Method) {
-        (network, Method::Field { cones, deviation_deg })
+    fn from(aligned::Laid { network, cones, deviation_deg, folds, .. }: aligned::Laid) -> (Network, Method) {
+        (network, Method::Field { cones, deviation_deg, folds: folds.unwrap_or_default() })
     }
 }
 
@@ -601,12 +668,37 @@ mod tests {
         let mesh = shapes::sphere(1.0, 4);
         let laid = |even| {
             let params = LayoutParams { even, ..LayoutParams::default() };
-            layout(&mesh, Known::default(), &params, &Silent).unwrap()
+            layout(&mesh, Known::default(), &params, None, &Silent).unwrap()
         };
         let [form, even] = [false, true].map(laid);
         assert!(matches!(form.pieces[..], [(_, Method::Field { .. })]), "{:?}", form.pieces);
         assert_eq!((form.network.patches.len(), even.pieces), (6, vec![(1.0, Method::Partition { why: None })]));
         assert!((PARTITION_PATCHES / 2..2 * PARTITION_PATCHES).contains(&even.network.patches.len()));
+    }
+
+    /// Finds `self.1` folds in networks of fewer than `self.0` patches, and `self.2` in others.
+    struct Verdict(usize, usize, usize);
+
+    impl Trial for Verdict {
+        fn folds(&self, _: &TriMesh, network: &Network, _: &dyn Observer) -> Result<usize, Cancelled> {
+            Ok(if network.patches.len() < self.0 { self.1 } else { self.2 })
+        }
+    }
+
+    #[test]
+    fn even_patches_take_the_place_of_those_along_the_form_where_these_fold_more_often_than_by_chance() {
+        let mesh = shapes::sphere(1.0, 4);
+        let count = |few: usize, many: usize| {
+            let trial = Verdict(PARTITION_PATCHES / 2, few, many);
+            let laid = layout(&mesh, Known::default(), &LayoutParams::default(), Some(&trial), &Silent).unwrap();
+            (laid.network.patches.len() == 6, laid.pieces.into_iter().next().unwrap().1)
+        };
+        assert!(matches!(count(0, 9), (true, Method::Field { folds: 0, .. })));
+        // By chance.
+        assert!(matches!(count(3, 1), (true, Method::Field { folds: 3, .. })));
+        let (is_form, method) = count(3, 0);
+        let why = "surfaces along its form would fold in 3 places".to_owned();
+        assert!(!is_form && method == Method::Partition { why: Some(why) });
     }
 
     #[test]
@@ -620,7 +712,7 @@ mod tests {
             let triangles = cube.triangles.iter().map(|t| t.map(|v| v + base));
             mesh.triangles = triangles.chain(mesh.triangles.iter().copied()).collect();
         }
-        let laid = layout(&mesh, Known::default(), &LayoutParams::default(), &Silent).unwrap();
+        let laid = layout(&mesh, Known::default(), &LayoutParams::default(), None, &Silent).unwrap();
         let area = 4.0 + 1.0 + 0.01 + 0.0025;
         for (&(share, ref method), wanted) in laid.pieces.iter().zip([4.0, 1.0, 0.0125]) {
             assert!((share - wanted / area).abs() < 1e-9);
@@ -645,7 +737,7 @@ mod tests {
         lines[h as usize] = true;
         lines[adjacency.opposite[h as usize] as usize] = true;
         let known = Known { sharp: &[], lines: &lines, corners: &corners };
-        let laid = layout(&mesh, known, &LayoutParams::default(), &Silent).unwrap();
+        let laid = layout(&mesh, known, &LayoutParams::default(), None, &Silent).unwrap();
         assert!(
             matches!(laid.pieces[..], [(_, Method::Partition { .. }), (_, Method::Field { .. })]),
             "{:?}",

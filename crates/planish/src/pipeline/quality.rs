@@ -255,11 +255,12 @@ fn in_words(repairs: &Repairs) -> String {
 /// * `pieces` - with their parts of the area; none for a network that was not made here
 /// * `quality` - with the folds, where surfaces were made
 pub(super) fn method_figures(pieces: &[(f64, Method)], quality: &mut Quality, warnings: &mut Vec<Warning>) {
-    let (mut cones, mut deviation, mut along) = (0, 0.0, 0.0);
+    let (mut cones, mut deviation, mut along, mut known) = (0, 0.0, 0.0, 0);
     let mut reasons = Vec::new();
     for (share, method) in pieces {
         match method {
-            Method::Field { cones: own, deviation_deg } => {
+            Method::Field { cones: own, deviation_deg, folds } => {
+                known += folds;
                 cones += own;
                 deviation += share * deviation_deg;
                 along += share;
@@ -271,10 +272,9 @@ pub(super) fn method_figures(pieces: &[(f64, Method)], quality: &mut Quality, wa
         quality.insert(key::LAYOUT_CONES.into(), Figure::Count(cones as u64));
         quality.insert(key::LAYOUT_DEVIATION_DEG.into(), Figure::Number(deviation / along));
         quality.insert(key::LAYOUT_ALONG_FORM_SHARE.into(), Figure::Number(along.min(1.0)));
-        if [key::SEAM_FOLDED, key::GRID_FOLDS]
-            .iter()
-            .any(|&key| quality.get(key).is_some_and(|n| *n != Figure::Count(0)))
-        {
+        let is_found = |key: &str| quality.get(key).is_some_and(|n| *n != Figure::Count(0));
+        // Where the trial of the layout found folds, even patches have been tried.
+        if known == 0 && [key::SEAM_FOLDED, key::GRID_FOLDS].into_iter().any(is_found) {
             let text = "Patches along the form fold; patches of about one size may not.";
             warnings.push(Warning::new("layout_folds", text, "").with_step("--even"));
         }
@@ -448,13 +448,17 @@ const INNER_STEP: f64 = 2e-3;
 /// For each curve the largest angle between the normals beside it and where that is, but for its ends: a corner of an angle near
 /// 180 degrees has no normal of its own, and what is measured there says nothing of the seam.
 pub fn inner_angles(model: &Model) -> BTreeMap<u32, (f64, DVec3)> {
-    let step = INNER_STEP * model.mesh.bounds().diagonal();
+    inner_angles_of(&model.network, &model.surfaces, model.mesh.bounds().diagonal())
+}
+
+/// As [`inner_angles`], of surfaces over the patches of a network.
+pub(super) fn inner_angles_of(network: &Network, surfaces: &[Surface], diagonal: f64) -> BTreeMap<u32, (f64, DVec3)> {
+    let step = INNER_STEP * diagonal;
     let mut found: BTreeMap<u32, (f64, DVec3)> = BTreeMap::new();
     if !is_positive(step) {
         return found;
     }
-    for place in surface::seam_angles(&model.network, &model.surfaces, step).iter().filter(|p| p.angle_deg.is_finite())
-    {
+    for place in surface::seam_angles(network, surfaces, step).iter().filter(|p| p.angle_deg.is_finite()) {
         let best = found.entry(place.curve).or_insert((0.0, place.point));
         if place.angle_deg > best.0 {
             *best = (place.angle_deg, place.point);
@@ -540,8 +544,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn even_patches_are_advised_where_those_along_the_form_fold_and_nowhere_else() {
-        let field = Method::Field { cones: 8, deviation_deg: 3.0 };
+    fn even_patches_are_advised_where_those_along_the_form_fold_though_the_trial_did_not_tell_and_nowhere_else() {
+        let field = |folds| Method::Field { cones: 8, deviation_deg: 3.0, folds };
         let even = Method::Partition { why: None };
         let steps = |method: &Method, folds: [u64; 2]| {
             let keys = ["grid.folds", "seam.folded"].map(String::from);
@@ -550,7 +554,11 @@ mod tests {
             method_figures(&[(1.0, method.clone())], &mut quality, &mut warnings);
             warnings.into_iter().map(|w| w.step).collect::<Vec<String>>()
         };
-        assert_eq!([steps(&field, [0, 1]), steps(&field, [3, 0])], [["--even"], ["--even"]]);
-        assert!(steps(&field, [0, 0]).is_empty() && steps(&even, [3, 1]).is_empty());
+        assert_eq!([steps(&field(0), [0, 1]), steps(&field(0), [3, 0])], [["--even"], ["--even"]]);
+        assert!(
+            steps(&field(0), [0, 0]).is_empty()
+                && steps(&field(2), [0, 1]).is_empty()
+                && steps(&even, [3, 1]).is_empty()
+        );
     }
 }

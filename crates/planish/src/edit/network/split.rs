@@ -245,7 +245,7 @@ impl Editor<'_> {
             }
         }
         let known = Known { lines: &drawn.barrier, corners: &corner, ..Known::default() };
-        let laid = layout(&drawn.cut.mesh, known, params, observer)?.network;
+        let laid = layout(&drawn.cut.mesh, known, params, None, observer)?.network;
         let triangles = &drawn.cut.mesh.triangles;
         let to_input = |p: &FacePoint| drawn.cut.to_uncut(self.adjacency, &self.mesh.triangles, p.face, p.bary);
         let mut network = Network { patches: laid.patches.clone(), ..Network::default() };

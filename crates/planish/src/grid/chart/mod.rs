@@ -3,7 +3,8 @@
 //! Convex combination map (Tutte 1963, Floater 1997): the sides go to the sides of the square by arc length, every
 //! inner vertex to a positively weighted mean of its neighbours, which cannot fold. Cotangent weights keep it
 //! harmonic and reproduce a flat square; where they are negative they may fold a few triangles, which are then
-//! mended one by one, or else the weights are clamped to positive ones. Symmetric: one sparse Cholesky serves.
+//! mended one by one, or else the weights are clamped to positive ones, or are inverse lengths. Symmetric: one sparse Cholesky
+//! serves.
 //!
 //! Two things break the theorem and are seen to here: an inner edge whose ends lie on one side of the square (it
 //! would flatten a whole piece) is halved first, which leaves the surface as it is; and rounding, where a long
@@ -302,11 +303,24 @@ impl Chart {
         weights
     }
 
+    /// Half the inverse of the length of each half-edge's edge, with the mean length as unit: positive on any triangle. With equal
+    /// weights what lies behind `n` needles that start and end on one side of the square would be nearer to that side by a factor for
+    /// each of them; with these it is nearer about as it is on the surface.
+    fn inverse_lengths(&self) -> Vec<f64> {
+        let length = |h: usize| {
+            let [a, b] = [h % 3, (h + 1) % 3].map(|k| self.points[self.triangles[h / 3][k] as usize]);
+            a.distance(b)
+        };
+        let lengths: Vec<f64> = (0..3 * self.triangles.len()).map(length).collect();
+        let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
+        lengths.iter().map(|l| mean / divisor(*l) / 2.0).collect()
+    }
+
     fn solve_without_folds(&mut self, boundary: &[bool], observer: &dyn Observer) -> Result<(), Fault> {
         let cotangents = self.cotangents();
-        let uniform = vec![0.5; cotangents.len()];
+        let inverse = self.inverse_lengths();
         let few = 1 + (FEW_FOLDS * self.triangles.len() as f64) as usize;
-        for (weights, clamped) in [(&cotangents, false), (&cotangents, true), (&uniform, true)] {
+        for (weights, clamped) in [(&cotangents, false), (&cotangents, true), (&inverse, false)] {
             let limit = |w: f64| if clamped { w.clamp(WEIGHT_RANGE[0], WEIGHT_RANGE[1]) } else { w };
             if self.solve(boundary, weights, &limit, observer).is_ok() {
                 let folds = self.folds();
@@ -320,7 +334,7 @@ impl Chart {
             observer.check()?;
         }
         // Spread: a triangle that came out too small gets softer springs, which lets it grow.
-        let mut weights = uniform;
+        let mut weights = inverse;
         for _ in 0..SPREAD_ROUNDS {
             let ratios = self.area_ratios();
             for (t, ratio) in ratios.iter().enumerate() {
@@ -490,18 +504,22 @@ pub mod tests {
         let points = (0..n * n).map(|k| shape((k % n) as f64 / 20.0, (k / n) as f64 / 20.0)).collect();
         let cells = (0..n - 1).flat_map(|j| (0..n - 1).map(move |i| j * n + i));
         let triangles = cells.flat_map(|a| [[a, a + 1, a + 1 + n], [a, a + 1 + n, a + n]]).collect();
-        let input = TriMesh::new(points, triangles);
-        let mut origin = vec![FacePoint::corner(0, 0); input.points.len()];
-        for (f, t) in input.triangles.iter().enumerate() {
-            (0..3).for_each(|k| origin[t[k] as usize] = FacePoint::corner(f as u32, k));
-        }
-        let face_origin = (0..input.triangles.len() as u32).collect();
         let sides = [
             (0..n).collect(),
             (0..n).map(|j| j * n + n - 1).collect(),
             (0..n).rev().map(|i| (n - 1) * n + i).collect(),
             (0..n).rev().map(|j| j * n).collect(),
         ];
+        flat(TriMesh::new(points, triangles), sides)
+    }
+
+    /// Chart of a whole mesh with these sides.
+    fn flat(input: TriMesh, sides: [Vec<u32>; 4]) -> Chart {
+        let mut origin = vec![FacePoint::corner(0, 0); input.points.len()];
+        for (f, t) in input.triangles.iter().enumerate() {
+            (0..3).for_each(|k| origin[t[k] as usize] = FacePoint::corner(f as u32, k));
+        }
+        let face_origin = (0..input.triangles.len() as u32).collect();
         let patch = PatchMesh { mesh: input.clone(), origin, face_origin, sides };
         flatten(&input, &patch, &SideStops::default(), [2, 2], &crate::Silent).expect("a flat chart")
     }
@@ -512,6 +530,26 @@ pub mod tests {
         for (uv, p) in chart.uv.iter().zip(&chart.points) {
             assert!(uv.distance(p.truncate()) < 1e-12);
         }
+    }
+
+    #[test]
+    fn needles_across_a_side_that_bulges_map_without_folds() {
+        // Two triangles lead from each chord of the right side to the next, as CAD programs write cylinders: 20 long, and .04 and .002
+        // apart by turns.
+        const CHORDS: u32 = 40;
+        let level = |k: u32| f64::from(k) / f64::from(CHORDS);
+        let x = |k: u32| 0.042 * f64::from(k / 2) + 0.04 * f64::from(k % 2);
+        let end = |k: u32, sign: f64| DVec3::new(x(k), sign * 10.0 * (1.0 - level(k).powi(2)).sqrt(), 0.0);
+        let mut points = vec![DVec3::new(-1.0, -10.0, 0.0), DVec3::new(-1.0, 10.0, 0.0)];
+        points.extend((0..CHORDS).flat_map(|k| [end(k, -1.0), end(k, 1.0)]));
+        points.push(end(CHORDS, 1.0));
+        let (low, high, tip) = (|k: u32| 2 + 2 * k, |k: u32| 3 + 2 * k, 2 + 2 * CHORDS);
+        let mut triangles = vec![[0, low(0), high(0)], [0, high(0), 1]];
+        triangles.extend((1..CHORDS).flat_map(|k| [[low(k - 1), low(k), high(k)], [low(k - 1), high(k), high(k - 1)]]));
+        triangles.push([low(CHORDS - 1), tip, high(CHORDS - 1)]);
+        let right = (0..CHORDS).map(low).chain([tip]).chain((0..CHORDS).rev().map(high)).collect();
+        let sides = [vec![0, low(0)], right, vec![high(0), 1], vec![1, 0]];
+        assert_eq!(flat(TriMesh::new(points, triangles), sides).folds(), 0);
     }
 
     #[test]

@@ -29,6 +29,8 @@ pub(super) struct Elimination {
     known: Vec<Option<Affine>>,
     /// The first unknowns, so many, go before the others.
     first: u32,
+    /// For each of the others how many unknowns it would drag along where it is left; empty if that does not matter.
+    drag: Vec<u32>,
 }
 
 /// A constant that is left of an equation without unknowns counts as zero up to this.
@@ -37,7 +39,13 @@ const CONTRADICTION: f64 = 1e-6;
 impl Elimination {
     /// * `first` - so many of the unknowns are expressed by the others rather than the other way around
     pub fn new(unknowns: usize, first: u32) -> Elimination {
-        Elimination { known: vec![None; unknowns], first }
+        Elimination { known: vec![None; unknowns], first, drag: Vec::new() }
+    }
+
+    /// As [`Elimination::new`] for equations with coefficients of 1 and 2. First unknowns go even if that takes halves, which are as exact,
+    /// and of the others those with the least `drag`.
+    pub fn sparse(first: u32, drag: Vec<u32>) -> Elimination {
+        Elimination { known: vec![None; first as usize + drag.len()], first, drag }
     }
 
     /// Demands that `terms + constant` is zero. False if that contradicts what was demanded before.
@@ -47,7 +55,12 @@ impl Elimination {
     pub fn demand(&mut self, terms: Vec<(u32, f64)>, constant: f64) -> bool {
         let sum = self.expand(&terms, constant);
         let pivot = sum.terms.iter().min_by(|a, b| {
-            let order = |t: &(u32, f64)| (t.1.abs() != 1.0, t.0 >= self.first, u32::MAX - t.0);
+            let order = |t: &(u32, f64)| {
+                let is_whole = t.1.abs() == 1.0;
+                let is_exact = is_whole || (!self.drag.is_empty() && t.1.abs() == 2.0);
+                let drag = t.0.checked_sub(self.first).and_then(|i| self.drag.get(i as usize)).copied();
+                (!is_exact, t.0 >= self.first, drag, !is_whole, u32::MAX - t.0)
+            };
             order(a).cmp(&order(b))
         });
         let Some(&(pivot, c)) = pivot else { return sum.constant.abs() <= CONTRADICTION };

@@ -123,7 +123,7 @@ impl<'a> Maps<'a> {
 
     /// The system of `sum weight |J|^2`. `None` if it is not positive or has more than [`MOST_ENTRIES`].
     fn system(&self, weight: &[f64]) -> Option<SparseCholesky> {
-        if self.entries() > MOST_ENTRIES {
+        if self.is_too_large() {
             return None;
         }
         let entries: Vec<Vec<(usize, usize, f64)>> = (0..self.gradient.len())
@@ -147,6 +147,11 @@ impl<'a> Maps<'a> {
             })
             .collect();
         SparseCholesky::factor(self.seams.free(), &entries.concat()).ok()
+    }
+
+    /// True if the systems have more than [`MOST_ENTRIES`].
+    pub fn is_too_large(&self) -> bool {
+        self.entries() > MOST_ENTRIES
     }
 
     /// Entries of the system at most, before those of one place are added up.

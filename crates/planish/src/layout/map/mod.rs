@@ -103,7 +103,11 @@ pub(super) fn seamless(
     charts: &Charts,
     observer: &dyn Observer,
 ) -> Result<Option<Mapped>, Cancelled> {
-    let Some(seams) = Seams::new(mesh, adjacency, lines, charts, Held::Origin) else { return Ok(None) };
+    let Some(mut seams) = Seams::new(mesh, adjacency, lines, charts, Held::Origin) else { return Ok(None) };
+    if Maps::new(mesh, charts, &seams, 1.0, true).is_too_large() {
+        let Some(sparse) = Seams::sparse(mesh, adjacency, lines, charts) else { return Ok(None) };
+        seams = sparse;
+    }
     let maps = Maps::new(mesh, charts, &seams, 1.0, true);
     let Some(straight) = maps.follow(&vec![1.0; charts.scale.len()]) else { return Ok(None) };
     observer.check()?;

@@ -12,6 +12,7 @@ use crate::mesh::{Adjacency, NONE, TriMesh, next};
 use crate::network::field::edge_angles;
 use glam::DVec2;
 use rayon::prelude::*;
+use std::collections::{BTreeMap, VecDeque};
 use std::f64::consts::FRAC_PI_2;
 
 /// What is held of a map.
@@ -46,6 +47,25 @@ impl Seams {
     /// What is `held` beside the equations decides what is free: a map with the same charts that holds the same has the same
     /// free unknowns.
     pub fn new(mesh: &TriMesh, adjacency: &Adjacency, lines: &[bool], charts: &Charts, held: Held) -> Option<Seams> {
+        Seams::solved(mesh, adjacency, lines, charts, (held, false))
+    }
+
+    /// As [`Seams::new`], with corners that hang on few unknowns each where there are many cones.
+    ///
+    /// The cut is a tree as a rule, with cones for ends. A translation far from the ends is the sum of those of all ends behind it: as
+    /// unknowns these would be dragged along to every corner there. So of translations that meet, that with the fewest ends behind it
+    /// is expressed by the others, and cones by translations: no corner hangs on more than the logarithm of the number of cones then.
+    pub fn sparse(mesh: &TriMesh, adjacency: &Adjacency, lines: &[bool], charts: &Charts) -> Option<Seams> {
+        Seams::solved(mesh, adjacency, lines, charts, (Held::Origin, true))
+    }
+
+    fn solved(
+        mesh: &TriMesh,
+        adjacency: &Adjacency,
+        lines: &[bool],
+        charts: &Charts,
+        (held, is_sparse): (Held, bool),
+    ) -> Option<Seams> {
         let held = match held {
             Held::Origin => None,
             Held::At(uv) => Some((uv, false)),
@@ -57,7 +77,12 @@ impl Seams {
             .filter(|&h| charts.cut[h as usize] && h < adjacency.opposite[h as usize])
             .collect();
         let coordinates = 2 * count;
-        let mut system = Elimination::new((coordinates + 2 * cuts.len() as u32) as usize, coordinates);
+        let mut system = if is_sparse {
+            let ends = ends_behind(cuts.iter().map(|&h| [mesh.origin(h), mesh.origin(next(h))]));
+            Elimination::sparse(coordinates, ends.into_iter().flat_map(|n| [n; 2]).collect())
+        } else {
+            Elimination::new((coordinates + 2 * cuts.len() as u32) as usize, coordinates)
+        };
         let corner = |h: u32, axis: u32| 2 * place[h as usize / 3][h as usize % 3] + axis;
         let mut consistent = true;
         if let Some((uv, _)) = held {
@@ -227,6 +252,32 @@ fn places(adjacency: &Adjacency, charts: &Charts, faces: usize) -> (Vec<[u32; 3]
     (place, count)
 }
 
+/// For each edge of a graph the number of its ends (vertices of one edge) behind it, on the side that comes free of loops first;
+/// [`NONE`] for edges of loops and between them.
+fn ends_behind(edges: impl Iterator<Item = [u32; 2]>) -> Vec<u32> {
+    let edges: Vec<[u32; 2]> = edges.collect();
+    let mut around: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (i, ends) in edges.iter().enumerate() {
+        ends.iter().for_each(|v| around.entry(*v).or_default().push(i));
+    }
+    let mut left: BTreeMap<u32, usize> = around.iter().map(|(&v, list)| (v, list.len())).collect();
+    let mut behind = vec![NONE; edges.len()];
+    let mut bare: VecDeque<u32> = left.iter().filter(|(_, n)| **n == 1).map(|(&v, _)| v).collect();
+    while let Some(v) = bare.pop_front() {
+        let known = around[&v].iter().filter(|&&i| behind[i] != NONE).map(|&i| behind[i]).sum::<u32>();
+        let Some(&i) = around[&v].iter().find(|&&i| behind[i] == NONE) else { continue };
+        behind[i] = known.max(1);
+        let other = edges[i][usize::from(edges[i][0] == v)];
+        for v in [v, other] {
+            left.entry(v).and_modify(|n| *n -= 1);
+        }
+        if left[&other] == 1 {
+            bare.push_back(other);
+        }
+    }
+    behind
+}
+
 /// One place of each component of the mesh; with `loose`, of those components only that have no corner.
 fn origins(adjacency: &Adjacency, place: &[[u32; 3]], charts: &Charts, loose: bool) -> Vec<u32> {
     let mut sets = Sets::new(place.len());
@@ -242,4 +293,17 @@ fn origins(adjacency: &Adjacency, place: &[[u32; 3]], charts: &Charts, loose: bo
     }
     let components = (0..place.len() as u32).filter(|&f| sets.root(f) == f && !has_corner[f as usize]);
     components.map(|f| place[f as usize][0]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn behind_an_edge_of_a_tree_are_the_ends_of_its_smaller_side_and_a_loop_has_none() {
+        // A path 0-1-2-3-4 with twigs 5 and 6 at 2 and 7 at 3, and a triangle that hangs on 8.
+        let tree = [[0, 1], [1, 2], [2, 3], [3, 4], [2, 5], [2, 6], [3, 7]];
+        assert_eq!(ends_behind(tree.into_iter()), [1, 1, 2, 1, 1, 1, 1]);
+        assert_eq!(ends_behind([[8, 9], [9, 10], [10, 11], [11, 9]].into_iter()), [1, NONE, NONE, NONE]);
+    }
 }
