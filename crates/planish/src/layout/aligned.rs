@@ -200,6 +200,15 @@ pub(super) struct Search<'a> {
     pub trial: Option<&'a dyn Trial>,
     /// Squares at most that are tried where nobody asked for a number.
     pub most: usize,
+    /// True to take the first network over which surfaces do not fold, for all else does.
+    pub is_last: bool,
+}
+
+impl Search<'_> {
+    /// True if there is no need for another map.
+    fn ends_with(&self, laid: &Laid) -> bool {
+        laid.is_final() || (self.is_last && laid.folds == Some(0))
+    }
 }
 
 /// Networks of one map over which surfaces are tried at most. Chosen.
@@ -349,7 +358,7 @@ pub(super) fn lay(
             }
             // A coarser one may be good as well.
             let is_open = trouble.is_some() && asked(params).is_none();
-            if best.as_ref().is_some_and(|best| params.coarsest || best.is_final() && !is_open) {
+            if best.as_ref().is_some_and(|best| params.coarsest || search.ends_with(best) && !is_open) {
                 break;
             }
             let Some(trouble) = trouble else { break };
@@ -362,7 +371,7 @@ pub(super) fn lay(
                 break;
             }
         }
-        if best.as_ref().is_some_and(|best| params.coarsest || best.is_final()) {
+        if best.as_ref().is_some_and(|best| params.coarsest || search.ends_with(best)) {
             break;
         }
     }

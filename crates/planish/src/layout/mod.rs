@@ -317,7 +317,8 @@ fn lay(
         patches => LayoutParams { patches: of_piece(patches).min(most_patches(piece.mesh)), ..params.clone() },
     };
     let trial = trial.filter(|_| !params.coarsest);
-    let along = (!params.even).then(|| aligned::lay(piece, params, Search { trial, most: MOST_UNASKED }, observer));
+    let along = (!params.even)
+        .then(|| aligned::lay(piece, params, Search { trial, most: MOST_UNASKED, is_last: false }, observer));
     let many = match along {
         Some(Err(AlignError::Count { found })) => Some(found),
         _ => None,
@@ -353,7 +354,7 @@ fn lay(
     let folds = tried(trial, piece.mesh, &network, observer)?;
     let most = MORE_UNFOLDED * network.patches.len();
     let along = if folds.is_some_and(|folds| folds > 0) && many.is_some_and(|many| many <= most) {
-        match aligned::lay(piece, params, Search { trial, most }, &Part::new(observer, 1.0, 0.0)) {
+        match aligned::lay(piece, params, Search { trial, most, is_last: true }, &Part::new(observer, 1.0, 0.0)) {
             Err(AlignError::Cancelled(cancelled)) => return Err(cancelled.into()),
             laid => laid.ok(),
         }
