@@ -82,7 +82,7 @@ const FINISH_TO_SIDE: f64 = 0.25;
 const TYPICAL_PATCHES: f64 = 100.0;
 
 /// More patches along the form than this are not tried where nobody asked for them: where lines and cones alone need more, the
-/// partition does with fewer.
+/// partition does with fewer. Chosen.
 const MOST_UNASKED: usize = 300;
 
 /// Unless its patches fold: then up to so many times as many along the form are tried. Chosen.
@@ -327,7 +327,7 @@ fn lay(
         None => (None, None),
         Some(Ok(laid)) if params.coarsest || laid.is_sound() => return Ok(laid.into()),
         Some(Ok(laid)) if laid.worth.is_kept() => {
-            let why = match laid.folds {
+            let why = match laid.folds.filter(|folds| *folds > 0) {
                 Some(folds) => format!("surfaces along its form would fold in {}", counted(folds, "place", "places")),
                 None => "patches along its form would be covered less well by grids".to_owned(),
             };

@@ -17,8 +17,8 @@ impl Trial for Coarse {
     fn folds(&self, mesh: &TriMesh, network: &Network, observer: &dyn Observer) -> Result<usize, Cancelled> {
         match folds(mesh, network, observer) {
             Err(e) if Cancelled::is_cause_of(&e) => Err(Cancelled),
-            // What cannot be tried is no network to take.
-            found => Ok(found.unwrap_or(usize::MAX)),
+            // Where surfaces cannot be made no patch is any good.
+            found => Ok(found.unwrap_or(network.patches.len())),
         }
     }
 }
