@@ -10,11 +10,12 @@
 
 use super::complex::Complex;
 use super::embed::{self, EmbedError};
-use super::fitness::{self, Cover};
+use super::fitness::{self, Cover, Price};
 use super::integers::{self, IntegerMap, QuantizeError, Scale};
 use super::map::{self, Charts, Effort};
 use super::proxy::{self, Proxy, Sizing};
 use super::recut::Bench;
+use super::strips::chords::{self, Order};
 use super::{LayoutParams, Piece, SETTLING_PER_SMOOTHING, TYPICAL_PATCHES, Trial, by_folds, finish, improve, tried};
 use crate::mesh::TriMesh;
 use crate::network::Network;
@@ -448,11 +449,33 @@ impl Aligned {
                 break;
             }
         }
-        let mut trouble = trouble.map(|(_, e)| e);
-        let mut best: Option<Laid> = None;
-        for draft in drafts.into_iter().take(if search.trial.is_some() { MOST_TRIED } else { 1 }) {
+        let (best, misplaced) = self.best_of(drafts, is_far, params, (mesh, search), observer)?;
+        Ok((best, misplaced.or(trouble.map(|(_, e)| e))))
+    }
+
+    /// The first of some drafts over which surfaces do not fold, else the best; and what was in the way of others.
+    fn best_of(
+        &self,
+        drafts: Vec<Draft>,
+        is_far: bool,
+        params: &LayoutParams,
+        (mesh, search): (&TriMesh, Search),
+        observer: &dyn Observer,
+    ) -> Result<(Option<Laid>, Option<AlignError>), Cancelled> {
+        let (mut best, mut trouble): (Option<Laid>, Option<AlignError>) = (None, None);
+        // Each comes without the strips that it is better without, and with them where surfaces fold that way.
+        let mut waiting: VecDeque<(Draft, bool)> = drafts.into_iter().map(|draft| (draft, true)).collect();
+        let mut left = if search.trial.is_some() { MOST_TRIED } else { 1 };
+        while let Some((mut draft, is_whole)) = waiting.pop_front().filter(|_| left > 0) {
+            let closed = if is_whole { self.closed(&draft, params, observer) } else { Ok(None) };
+            match closed {
+                Ok(Some(closed)) => waiting.push_front((std::mem::replace(&mut draft, closed), false)),
+                Err(AlignError::Cancelled(cancelled)) => return Err(cancelled),
+                _ => {}
+            }
             match self.laid(draft, is_far, params, observer) {
                 Ok(mut laid) => {
+                    left -= 1;
                     laid.folds = tried(search.trial, mesh, &laid.network, observer)?;
                     if best.as_ref().is_none_or(|best| laid.is_better(best)) {
                         best = Some(laid);
@@ -461,7 +484,7 @@ impl Aligned {
                 Err(AlignError::Cancelled(cancelled)) => return Err(cancelled),
                 Err(e) => trouble = Some(e),
             }
-            if best.as_ref().is_some_and(|best| best.folds == Some(0)) {
+            if best.as_ref().is_some_and(|best| best.folds.is_none_or(|folds| folds == 0)) {
                 break;
             }
         }
@@ -530,6 +553,43 @@ impl Aligned {
         let complex = bench.complex;
         let worth = Worth::new(complex.live_cells().count(), asked(params), good_part);
         Ok(Draft { proxy, complex, worth, covers, deviation_deg: mapped.deviation_deg })
+    }
+
+    /// A good draft without the strips of cells that it is better without; `None` if there are none.
+    fn closed(
+        &self,
+        draft: &Draft,
+        params: &LayoutParams,
+        observer: &dyn Observer,
+    ) -> Result<Option<Draft>, AlignError> {
+        if !draft.worth.is_good {
+            return Ok(None);
+        }
+        let Proxy { mesh, adjacency, .. } = &*draft.proxy;
+        let rounds = SETTLING_PER_SMOOTHING * params.smoothing;
+        let settle = |bench: &mut Bench, fresh: Vec<bool>| {
+            let patches = bench.complex.live_cells().count();
+            improve::settle_along_lines_around(bench, (patches, rounds), fresh, observer).map_err(|_| Cancelled)
+        };
+        let is_better = |now: &Bench, then: &Bench| Price::of(then).is_below(Price::of(now));
+        let close = |order: Order| {
+            let mut bench = Bench::new(mesh, adjacency, draft.complex.clone()).ok_or(AlignError::Misplaced)?;
+            let has_overtaken = chords::close(&mut bench, (order, params.patches), settle, is_better)?;
+            Ok::<_, AlignError>((bench, has_overtaken))
+        };
+        let (mut bench, has_overtaken) = close(Order::ByGain)?;
+        if has_overtaken {
+            let (other, _) = close(Order::RingsLast)?;
+            bench = if is_better(&bench, &other) { other } else { bench };
+        }
+        let patches = bench.complex.live_cells().count();
+        Ok((patches < draft.worth.patches).then(|| Draft {
+            proxy: draft.proxy.clone(),
+            complex: bench.complex,
+            worth: Worth { patches, ..draft.worth },
+            covers: Vec::new(),
+            deviation_deg: draft.deviation_deg,
+        }))
     }
 
     /// # Errors

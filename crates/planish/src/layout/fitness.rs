@@ -2,8 +2,8 @@
 
 use super::complex::Complex;
 use super::recut::Bench;
-use super::shape::STEEP_DEG;
-use super::strips;
+use super::shape::{STEEP_DEG, Shape, ground_cost};
+use super::strips::{self, chords::PATCH_COST};
 use crate::geom::polyline;
 use crate::mesh::TriMesh;
 use crate::network::CurveKind;
@@ -127,6 +127,36 @@ fn joined_sides(mesh: &TriMesh, complex: &Complex, a: u32, b: u32) -> Option<[Si
         one(side(b, j + 2)),
         both(side(b, j + 3), side(a, i + 1)),
     ])
+}
+
+/// Corners of patches further off square than this make bad patches, however good the others are. Chosen.
+const MOST_OFF_SQUARE_DEG: f64 = 55.0;
+
+/// What a network costs where patches have a price.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Price {
+    /// Patches with a corner more than [`MOST_OFF_SQUARE_DEG`] off square.
+    bad: usize,
+    /// [`PATCH_COST`] for each patch, and what its shape and its ground cost; its size does not matter.
+    cost: f64,
+}
+
+impl Price {
+    pub fn of(bench: &Bench) -> Price {
+        let covers = covers(bench);
+        let shapes = bench.shapes();
+        let shape = |s: &Shape| PATCH_COST + s.cost(s.area);
+        let ground: f64 = covers.iter().map(|c| ground_cost(c.flatness)).sum();
+        Price {
+            bad: covers.iter().filter(|c| c.corner_deg > MOST_OFF_SQUARE_DEG).count(),
+            cost: ground + shapes.iter().flatten().map(shape).sum::<f64>(),
+        }
+    }
+
+    /// True if this is taken rather than the other.
+    pub fn is_below(self, other: Price) -> bool {
+        self.bad <= other.bad && self.cost < other.cost
+    }
 }
 
 /// Part of the patches that a grid covers well.

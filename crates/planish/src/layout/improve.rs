@@ -112,7 +112,18 @@ pub(super) fn settle_along_lines(
     rounds: usize,
     observer: &dyn Observer,
 ) -> Result<(), LayoutError> {
-    let (mut fresh, mut known) = (vec![true; bench.complex.nodes.len()], Known::new());
+    let fresh = vec![true; bench.complex.nodes.len()];
+    settle_along_lines_around(bench, (patches, rounds), fresh, observer)
+}
+
+/// The same around the nodes in `fresh`, for a number of patches and in so many rounds.
+pub(super) fn settle_along_lines_around(
+    bench: &mut Bench,
+    (patches, rounds): (usize, usize),
+    mut fresh: Vec<bool>,
+    observer: &dyn Observer,
+) -> Result<(), LayoutError> {
+    let mut known = Known::new();
     for _ in 0..rounds {
         let mut drawn = settle_some(bench, (patches, Footing::Ignored), 1, fresh.clone(), &mut known, observer)?;
         fresh.iter_mut().zip(&drawn).for_each(|(fresh, drawn)| *fresh |= drawn);

@@ -677,6 +677,20 @@ mod tests {
         assert!((PARTITION_PATCHES / 2..2 * PARTITION_PATCHES).contains(&even.network.patches.len()));
     }
 
+    #[test]
+    fn a_square_sheet_with_a_round_hole_has_a_patch_between_the_hole_and_each_side() {
+        let side = |u: f64| {
+            let (k, t) = ((4.0 * u) as usize % 4, (4.0 * u).fract());
+            let corner = |k: usize| [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]][k % 4].into();
+            glam::DVec2::lerp(corner(k), corner(k + 1), t)
+        };
+        let hole = |u: f64| 0.4 * glam::DVec2::from_angle(std::f64::consts::TAU * (u - 0.375));
+        let mesh = shapes::sheet(80, 20, true, false, |u, v| side(u).lerp(hole(u), v).extend(0.0));
+        let laid = layout(&mesh, Known::default(), &LayoutParams::default(), None, &Silent).unwrap();
+        assert!(matches!(laid.pieces[..], [(_, Method::Field { .. })]), "{:?}", laid.pieces);
+        assert_eq!(laid.network.patches.len(), 4);
+    }
+
     /// Finds `self.1` folds in networks of fewer than `self.0` patches, and `self.2` in others.
     struct Verdict(usize, usize, usize);
 

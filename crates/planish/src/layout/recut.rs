@@ -62,7 +62,7 @@ pub(super) struct Union {
 }
 
 /// What a change comes to, once drawn.
-struct Drawn {
+pub(super) struct Drawn {
     outline: Vec<u32>,
     lines: Vec<Vec<Place>>,
     spokes: Vec<Vec<Place>>,
@@ -159,7 +159,7 @@ impl Embedding {
     }
 
     /// Draws a change; `None` if it cannot be.
-    fn draw(&self, mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex, change: &Change) -> Option<Drawn> {
+    pub fn draw(&self, mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex, change: &Change) -> Option<Drawn> {
         let union = self.map(complex, change)?;
         let Union { disk, corners, uv, .. } = &union;
         let line = |a: u32, b: u32| self.line(mesh, adjacency, disk, uv, a, b);
@@ -476,7 +476,7 @@ impl<'a> Bench<'a> {
 }
 
 /// Puts a drawn change into the complex; returns its new arcs.
-fn replace(complex: &mut Complex, change: &Change, drawn: &Drawn) -> Vec<u32> {
+pub(super) fn replace(complex: &mut Complex, change: &Change, drawn: &Drawn) -> Vec<u32> {
     let mut free_arcs: Vec<u32> = change.removed.iter().rev().copied().collect();
     let mut free_cells: Vec<u32> = change.cells.iter().rev().copied().collect();
     for &a in &change.removed {

@@ -25,7 +25,7 @@ pub(super) struct Slide {
     /// Where in it the node stands.
     pub at: usize,
     /// The half-arcs that leave the node along the line: back and forth.
-    along: [u32; 2],
+    pub along: [u32; 2],
     /// What lies on either side; one, on a boundary.
     pub sides: Vec<Flank>,
 }
@@ -36,7 +36,7 @@ pub(super) struct Flank {
     /// Their union, with the smooth arcs at the node as its lines.
     pub change: Change,
     /// The half-arcs of these lines, which leave the node.
-    halves: Vec<u32>,
+    pub halves: Vec<u32>,
     /// Number of the node in the outline.
     pub corner: usize,
 }

@@ -5,11 +5,12 @@ use crate::layout::map::quarter_turn;
 use crate::layout::proxy::{Sizing, proxy};
 use crate::layout::recut::Bench;
 use crate::layout::strips;
+use crate::layout::strips::chords::{self, Order};
 use crate::mesh::sharp_edges;
 use crate::network::imprint::imprint;
 use crate::synthetic::shapes;
 use glam::{DVec2, DVec3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The map in units in which each side of a voxel, `fine` small squares wide, has `squares` unit squares a side.
 fn scaled(made: &Charted, fine: i32, squares: i32) -> SeamlessMap {
@@ -219,4 +220,47 @@ fn three_squares_in_a_row_become_three_two_or_one_as_the_area_allowed_for_a_cell
         assert_eq!(complex.live_cells().count(), cells);
         assert!(Bench::new(&sheet.mesh, &sheet.adjacency, complex).is_some());
     }
+}
+
+#[test]
+fn chords_are_closed_until_a_cube_has_6_cells_an_l_14_and_a_torus_4_while_a_bored_plate_keeps_its_32() {
+    let bent = [[0, 0, 0], [1, 0, 0], [0, 1, 0]];
+    let bored: Vec<[i32; 3]> = cuboid([3, 3, 1]).into_iter().filter(|v| v[0] != 1 || v[1] != 1).collect();
+    let made = [
+        (solid(&cuboid([1, 1, 1]), 8), 3, 6),
+        (solid(&bent, 8), 2, 14),
+        // Each of its chords lies between two corners.
+        (solid(&bored, 8), 1, 32),
+        (torus(2, 1, 12), 4, 4),
+    ];
+    for (made, squares, expected) in made {
+        let fine = if made.sides == 2 { 12 } else { 8 };
+        for order in [Order::ByGain, Order::RingsLast] {
+            let complex = checked(&made, &scaled(&made, fine, squares));
+            let mut bench = Bench::new(&made.mesh, &made.adjacency, complex).expect("an embedding");
+            let corners = |bench: &Bench| -> BTreeSet<u32> {
+                let is_live = |n: &usize| {
+                    bench.complex.live_arcs().any(|a| bench.complex.arc(2 * a).nodes.contains(&(*n as u32)))
+                };
+                let nodes = (0..bench.complex.nodes.len()).filter(is_live).map(|n| bench.complex.nodes[n]);
+                nodes.filter(|n| n.stays).map(|n| n.vertex).collect()
+            };
+            let before = corners(&bench);
+            chords::close(&mut bench, (order, 1), |_, _| Ok::<(), ()>(()), |_, _| true).unwrap();
+            assert_eq!((bench.complex.live_cells().count(), corners(&bench)), (expected, before));
+        }
+    }
+}
+
+#[test]
+fn no_chord_is_closed_below_the_number_of_cells_that_is_asked_for_nor_where_nothing_gets_better() {
+    let cube = solid(&cuboid([1, 1, 1]), 8);
+    let left = |fewest: usize, is_better: bool| {
+        let complex = checked(&cube, &scaled(&cube, 8, 3));
+        let mut bench = Bench::new(&cube.mesh, &cube.adjacency, complex).expect("an embedding");
+        chords::close(&mut bench, (Order::ByGain, fewest), |_, _| Ok::<(), ()>(()), |_, _| is_better).unwrap();
+        bench.complex.live_cells().count()
+    };
+    // Chords of 12 cells, then one of 10 across them, of 8 and of 6.
+    assert_eq!([left(1, true), left(40, true), left(43, true), left(1, false)], [6, 42, 54, 54]);
 }

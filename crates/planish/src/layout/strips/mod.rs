@@ -4,6 +4,8 @@
 //! What is left when all such rows are gone is the base complex of the quads (Bommes, Lempfer, Kobbelt, *Global Structure
 //! Optimization of Quadrilateral Meshes*, 2011).
 
+pub(super) mod chords;
+
 use super::complex::{Arc, Complex};
 use crate::mesh::NONE;
 use crate::network::imprint::Place;
