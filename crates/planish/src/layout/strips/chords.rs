@@ -4,10 +4,10 @@
 //!
 //! Daniels, Silva, Shepherd, Cohen, *Quadrilateral Mesh Simplification*, 2008 (there: polychord collapse).
 
-use super::super::complex::{Arc, Complex};
-use super::super::recut::{Bench, Change, Drawn, outline, replace};
-use super::super::shape::flat_cost;
-use super::super::slide::Slide;
+use crate::layout::complex::{Arc, Complex};
+use crate::layout::recut::{Bench, Change, Drawn, outline, replace};
+use crate::layout::shape::flat_cost;
+use crate::layout::slide::Slide;
 use crate::mesh::NONE;
 use crate::mesh::disjoint::disjoint;
 use crate::network::imprint::Place;
@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// What a patch costs, where corners that are all 45 degrees off square cost 1. Chosen: from 1.3 on a square sheet with a round hole
 /// has 4 patches, each between the hole and a side, in place of 8 that are more nearly square.
-pub(in super::super) const PATCH_COST: f64 = 2.0;
+pub(in crate::layout) const PATCH_COST: f64 = 2.0;
 
 /// Cells that may meet in a node away from lines.
 const VALENCES: std::ops::RangeInclusive<usize> = 3..=6;
@@ -52,7 +52,7 @@ impl Closing {
 
 /// Which chords are closed first.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in super::super) enum Order {
+pub(in crate::layout) enum Order {
     /// Those that promise to gain most.
     ByGain,
     /// Those that cross lines. Rings around bores, which cross none, stay as long as that makes others needless.
@@ -66,7 +66,7 @@ pub(in super::super) enum Order {
 /// * `is_better` - whether the second is taken rather than the first
 /// # Errors
 /// Those of `settle`.
-pub(in super::super) fn close<'a, E>(
+pub(in crate::layout) fn close<'a, E>(
     bench: &mut Bench<'a>,
     (order, fewest): (Order, usize),
     settle: impl Fn(&mut Bench<'a>, Vec<bool>) -> Result<(), E>,
