@@ -10,7 +10,7 @@
 
 use super::complex::Complex;
 use super::embed::{self, EmbedError};
-use super::fitness::{self, Cover, Price};
+use super::fitness::{self, Price};
 use super::integers::{self, IntegerMap, QuantizeError, Scale};
 use super::map::{self, Charts, Effort};
 use super::proxy::{self, Proxy, Sizing};
@@ -384,8 +384,8 @@ struct Draft {
     proxy: Rc<Proxy>,
     complex: Complex,
     worth: Worth,
-    /// Of its cells before rows that no grid needs went.
-    covers: Vec<Cover>,
+    /// True if most of its cells lay on open surface before rows that no grid needs went.
+    is_open: bool,
     deviation_deg: f64,
 }
 
@@ -420,7 +420,7 @@ impl Aligned {
                     let is_enough = draft.worth.is_enough();
                     let is_largest = Some(scale) == largest;
                     if is_largest && !is_enough {
-                        is_far = fitness::is_open(&draft.covers);
+                        is_far = draft.is_open;
                     } else if drafts.is_empty() && draft.worth.is_kept() && !is_enough {
                         scales.make_contiguous().sort_by_key(|&scale| (Some(scale) != largest, scale));
                     }
@@ -552,7 +552,7 @@ impl Aligned {
         }
         let complex = bench.complex;
         let worth = Worth::new(complex.live_cells().count(), asked(params), good_part);
-        Ok(Draft { proxy, complex, worth, covers, deviation_deg: mapped.deviation_deg })
+        Ok(Draft { proxy, complex, worth, is_open: fitness::is_open(&covers), deviation_deg: mapped.deviation_deg })
     }
 
     /// A good draft without the strips of cells that it is better without; `None` if there are none.
@@ -571,23 +571,22 @@ impl Aligned {
             let patches = bench.complex.live_cells().count();
             improve::settle_along_lines_around(bench, (patches, rounds), fresh, observer).map_err(|_| Cancelled)
         };
-        let is_better = |now: &Bench, then: &Bench| Price::of(then).is_below(Price::of(now));
         let close = |order: Order| {
             let mut bench = Bench::new(mesh, adjacency, draft.complex.clone()).ok_or(AlignError::Misplaced)?;
-            let has_overtaken = chords::close(&mut bench, (order, params.patches), settle, is_better)?;
+            let has_overtaken = chords::close(&mut bench, (order, params.patches), settle, Price::of)?;
             Ok::<_, AlignError>((bench, has_overtaken))
         };
         let (mut bench, has_overtaken) = close(Order::ByGain)?;
         if has_overtaken {
             let (other, _) = close(Order::RingsLast)?;
-            bench = if is_better(&bench, &other) { other } else { bench };
+            bench = if Price::of(&other) < Price::of(&bench) { other } else { bench };
         }
         let patches = bench.complex.live_cells().count();
         Ok((patches < draft.worth.patches).then(|| Draft {
             proxy: draft.proxy.clone(),
             complex: bench.complex,
             worth: Worth { patches, ..draft.worth },
-            covers: Vec::new(),
+            is_open: draft.is_open,
             deviation_deg: draft.deviation_deg,
         }))
     }

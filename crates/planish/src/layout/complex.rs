@@ -115,6 +115,29 @@ impl Complex {
         out.iter().map(|out| self.around(out)).collect()
     }
 
+    /// Makes the arcs of two half-arcs that leave a node one, from the end of `left` to that of `right`, and returns it: it has the number of
+    /// the first. The sides of cells are as before.
+    pub fn join_arcs(&mut self, left: u32, right: u32) -> u32 {
+        let chain = |h: u32| {
+            let mut chain: Vec<Place> = self.arc(h).chain.clone();
+            if h % 2 == 1 {
+                chain.reverse();
+            }
+            chain
+        };
+        let mut places = chain(left ^ 1);
+        places.extend(chain(right).into_iter().skip(1));
+        let arc = Arc {
+            nodes: [self.to(left), self.to(right)],
+            kind: self.arc(left).kind,
+            chain: places,
+            cells: [self.cell(left ^ 1), self.cell(left)],
+        };
+        self.arcs[right as usize / 2] = None;
+        self.arcs[left as usize / 2] = Some(arc);
+        left / 2
+    }
+
     /// Splits arc `a` at the inner place `at` of its chain, which must be a vertex; returns the new node.
     pub fn split_arc(&mut self, a: u32, at: usize) -> u32 {
         let Arc { nodes, kind, chain, cells } = self.arcs[a as usize].take().expect("a live arc");

@@ -9,6 +9,7 @@ use crate::mesh::TriMesh;
 use crate::network::CurveKind;
 use glam::DVec3;
 use rayon::prelude::*;
+use std::cmp::Ordering;
 use std::collections::HashSet;
 use std::f64::consts::FRAC_2_PI;
 
@@ -17,6 +18,10 @@ const KEPT: f64 = 0.9;
 
 /// The least flatness of a patch that a grid covers well: that of half a cylinder. What goes further around has limbs inside.
 const LEAST_FLATNESS: f64 = FRAC_2_PI;
+
+/// A patch with a corner further off square than this, in degrees, is worse than any number of patches. Chosen: corners of other quad
+/// layouts are up to 75 to 90 off.
+const MOST_CORNER_OFF_DEG: f64 = 55.0;
 
 /// What a grid meets on a patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,13 +134,10 @@ fn joined_sides(mesh: &TriMesh, complex: &Complex, a: u32, b: u32) -> Option<[Si
     ])
 }
 
-/// Corners of patches further off square than this make bad patches, however good the others are. Chosen.
-const MOST_OFF_SQUARE_DEG: f64 = 55.0;
-
 /// What a network costs where patches have a price.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Price {
-    /// Patches with a corner more than [`MOST_OFF_SQUARE_DEG`] off square.
+    /// Patches with a corner more than [`MOST_CORNER_OFF_DEG`] off square.
     bad: usize,
     /// [`PATCH_COST`] for each patch, and what its shape and its ground cost; its size does not matter.
     cost: f64,
@@ -148,14 +150,21 @@ impl Price {
         let shape = |s: &Shape| PATCH_COST + s.cost(s.area);
         let ground: f64 = covers.iter().map(|c| ground_cost(c.flatness)).sum();
         Price {
-            bad: covers.iter().filter(|c| c.corner_deg > MOST_OFF_SQUARE_DEG).count(),
+            bad: covers.iter().filter(|c| c.corner_deg > MOST_CORNER_OFF_DEG).count(),
             cost: ground + shapes.iter().flatten().map(shape).sum::<f64>(),
         }
     }
+}
 
-    /// True if this is taken rather than the other.
-    pub fn is_below(self, other: Price) -> bool {
-        self.bad <= other.bad && self.cost < other.cost
+impl PartialOrd for Price {
+    /// Less is what costs less and has no more bad patches; of two networks neither may be.
+    fn partial_cmp(&self, other: &Price) -> Option<Ordering> {
+        match self.cost.partial_cmp(&other.cost)? {
+            Ordering::Less if self.bad <= other.bad => Some(Ordering::Less),
+            Ordering::Greater if self.bad >= other.bad => Some(Ordering::Greater),
+            Ordering::Equal if self.bad == other.bad => Some(Ordering::Equal),
+            _ => None,
+        }
     }
 }
 
@@ -186,6 +195,14 @@ mod tests {
             [vec![cover(true); open], vec![cover(false); on_lines]].concat()
         };
         assert!(is_open(&cells(3, 2)) && !is_open(&cells(2, 2)) && !is_open(&[]));
+    }
+
+    #[test]
+    fn a_network_that_costs_less_is_better_unless_it_has_more_bad_patches() {
+        let price = |bad, cost| Price { bad, cost };
+        assert!(price(2, 9.0) < price(2, 10.0) && price(1, 9.0) < price(2, 10.0));
+        assert_eq!(price(3, 9.0).partial_cmp(&price(2, 10.0)), None);
+        assert!(price(2, 10.0) > price(2, 9.0) && price(2, 9.0) == price(2, 9.0));
     }
 
     #[test]

@@ -4,13 +4,13 @@
 //!
 //! Daniels, Silva, Shepherd, Cohen, *Quadrilateral Mesh Simplification*, 2008 (there: polychord collapse).
 
-use crate::layout::complex::{Arc, Complex};
+use super::apart;
+use crate::layout::complex::Complex;
 use crate::layout::recut::{Bench, Change, Drawn, outline, replace};
 use crate::layout::shape::flat_cost;
 use crate::layout::slide::Slide;
 use crate::mesh::NONE;
 use crate::mesh::disjoint::disjoint;
-use crate::network::imprint::Place;
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -63,16 +63,16 @@ pub(in crate::layout) enum Order {
 /// while others waited, so that another order may end elsewhere.
 /// * `fewest` - cells that are left at least
 /// * `settle` - draws cells anew around the nodes that are marked
-/// * `is_better` - whether the second is taken rather than the first
+/// * `price` - what a network costs; one that costs less is better
 /// # Errors
 /// Those of `settle`.
-pub(in crate::layout) fn close<'a, E>(
+pub(in crate::layout) fn close<'a, P: PartialOrd, E>(
     bench: &mut Bench<'a>,
     (order, fewest): (Order, usize),
     settle: impl Fn(&mut Bench<'a>, Vec<bool>) -> Result<(), E>,
-    is_better: impl Fn(&Bench, &Bench) -> bool,
+    price: impl Fn(&Bench) -> P,
 ) -> Result<bool, E> {
-    let mut has_overtaken = false;
+    let (mut has_overtaken, mut now) = (false, price(bench));
     let mut refused: BTreeSet<Vec<u32>> = BTreeSet::new();
     loop {
         let count = bench.complex.live_cells().count();
@@ -87,7 +87,9 @@ pub(in crate::layout) fn close<'a, E>(
             if let Some(mut closed) = closed(bench, closing) {
                 let marked = around(&closed.complex, closing);
                 settle(&mut closed, marked)?;
-                if is_better(bench, &closed) {
+                let then = price(&closed);
+                if then < now {
+                    now = then;
                     has_overtaken |= closing.is_ring && found[k + 1..].iter().any(|other| !other.is_ring);
                     next = Some(closed);
                     break;
@@ -134,8 +136,7 @@ fn chords(complex: &Complex) -> Vec<Vec<u32>> {
         seen.extend(rungs.iter().map(|h| h / 2));
         let cells: Vec<u32> = rungs.iter().map(|&h| complex.cell(h)).filter(|&c| c != NONE).collect();
         let nodes: Vec<u32> = rungs.iter().flat_map(|&h| [complex.from(h), complex.to(h)]).collect();
-        let apart = |list: Vec<u32>| list.iter().collect::<BTreeSet<_>>().len() == list.len();
-        if apart(cells) && apart(nodes) {
+        if apart(&cells) && apart(&nodes) {
             chords.push(rungs);
         }
     }
@@ -159,6 +160,7 @@ fn closings(bench: &Bench) -> Vec<Closing> {
             let gone = [first, 1 - first].into_iter().find(|&side| free[side])?;
             let [x, y] = [nodes[gone], nodes[1 - gone]].map(|n| &stars[n as usize]);
             let is_inner = |star: &[u32]| star.iter().all(|&h| complex.arc(h).kind.is_smooth());
+            // The rung goes, and on either side of it two arcs of the strip become one.
             let is_fit = !is_inner(x) || !is_inner(y) || VALENCES.contains(&(x.len() + y.len() - 4));
             is_fit.then_some(Contraction { node: nodes[gone], into: nodes[1 - gone], rung: h / 2 })
         });
@@ -223,7 +225,7 @@ impl<'a> Straight<'a> {
                 continue;
             }
             let nodes = nodes.map(moved);
-            if BTreeSet::from(nodes).len() < 4 {
+            if !apart(&nodes) {
                 return None;
             }
             gain -= cost(nodes);
@@ -279,8 +281,8 @@ fn closed<'a>(bench: &Bench<'a>, closing: &Closing) -> Option<Bench<'a>> {
     }
     let is_square = |c: u32| {
         let sides = copy.complex.loop_of(c);
-        let nodes: BTreeSet<u32> = sides.iter().map(|&h| copy.complex.from(h)).collect();
-        sides.len() == 4 && nodes.len() == 4
+        let nodes: Vec<u32> = sides.iter().map(|&h| copy.complex.from(h)).collect();
+        sides.len() == 4 && apart(&nodes)
     };
     let has_squares_alone = copy.complex.live_cells().all(is_square);
     has_squares_alone.then_some(copy)
@@ -306,10 +308,8 @@ fn plan(complex: &Complex, star: &[u32], &Contraction { into, rung, .. }: &Contr
         [complex.cell(half), complex.cell(half ^ 1)].into_iter().any(|c| c != NONE && has(c))
     };
     if star.iter().all(|&h| complex.arc(h).kind.is_smooth()) {
-        let mut cells: Vec<u32> = star.iter().map(|&h| complex.cell(h)).collect();
-        cells.sort_unstable();
-        cells.dedup();
-        if cells.len() != star.len() {
+        let cells: Vec<u32> = star.iter().map(|&h| complex.cell(h)).collect();
+        if !apart(&cells) {
             return None;
         }
         let removed = star.iter().map(|h| h / 2).collect();
@@ -323,7 +323,7 @@ fn plan(complex: &Complex, star: &[u32], &Contraction { into, rung, .. }: &Contr
     }
     let slide = Slide::new(complex, star)?;
     let cells = slide.cells();
-    if cells.iter().collect::<BTreeSet<_>>().len() < cells.len() {
+    if !apart(&cells) {
         return None;
     }
     let mut changes = Vec::new();
@@ -350,27 +350,14 @@ fn put(complex: &mut Complex, edit: &Edit) -> Vec<u32> {
     let mut touched: Vec<u32> =
         edit.changes.iter().flat_map(|(change, drawn)| replace(complex, change, drawn)).collect();
     if let Some([rung, ahead]) = edit.line {
-        let chain = |half: u32| {
-            let mut chain: Vec<Place> = complex.arc(half).chain.clone();
-            if half % 2 == 1 {
-                chain.reverse();
-            }
-            chain
-        };
-        let mut places = chain(rung ^ 1);
-        places.extend(chain(ahead).into_iter().skip(1));
-        let nodes = [complex.to(rung), complex.to(ahead)];
         let cells = [complex.cell(rung ^ 1), complex.cell(rung)];
-        let kind = complex.arc(rung).kind;
-        let merged = rung / 2;
+        let merged = complex.join_arcs(rung, ahead);
         for (side, [old, gone]) in [[rung ^ 1, ahead], [rung, ahead ^ 1]].into_iter().enumerate() {
             if let Some(sides) = complex.cells.get_mut(cells[side] as usize).and_then(Option::as_mut) {
                 sides.retain(|&h| h != gone);
                 sides.iter_mut().filter(|h| **h == old).for_each(|h| *h = 2 * merged + side as u32);
             }
         }
-        complex.arcs[ahead as usize / 2] = None;
-        complex.arcs[merged as usize] = Some(Arc { nodes, kind, chain: places, cells });
         touched.push(merged);
     }
     touched

@@ -6,9 +6,8 @@
 
 pub(super) mod chords;
 
-use super::complex::{Arc, Complex};
+use super::complex::Complex;
 use crate::mesh::NONE;
-use crate::network::imprint::Place;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A row of arcs between two strips.
@@ -115,32 +114,22 @@ fn row_of(complex: &Complex, stars: &[Vec<u32>], a: u32) -> Option<Row> {
     }
     let arcs: Vec<u32> = row.halves.iter().map(|h| h / 2).chain(row.across.iter().flatten().map(|h| h / 2)).collect();
     let cells: Vec<u32> = row.halves.iter().flat_map(|&h| [complex.cell(h), complex.cell(h ^ 1)]).collect();
-    let apart = |list: Vec<u32>| list.iter().collect::<BTreeSet<_>>().len() == list.len();
     let smooth = row.halves.iter().all(|&h| complex.arc(h).kind.is_smooth());
     // A strip as wide as its way around would get sides from a node to itself.
     let ends = row.across.iter().all(|&[left, right]| complex.to(left) != complex.to(right));
-    (smooth && ends && apart(arcs) && apart(cells)).then_some(row)
+    (smooth && ends && apart(&arcs) && apart(&cells)).then_some(row)
+}
+
+/// True if none of these is there twice.
+fn apart(list: &[u32]) -> bool {
+    list.iter().collect::<BTreeSet<_>>().len() == list.len()
 }
 
 /// Takes a row out: the arcs across it and the cells on both sides become one each.
 fn dissolve(complex: &mut Complex, row: &Row) {
     let mut name: BTreeMap<u32, u32> = BTreeMap::new();
     for &[left, right] in &row.across {
-        let merged = left / 2;
-        let chain = |h: u32| {
-            let mut chain: Vec<Place> = complex.arc(h).chain.clone();
-            if h % 2 == 1 {
-                chain.reverse();
-            }
-            chain
-        };
-        let mut places = chain(left ^ 1);
-        places.extend(chain(right).into_iter().skip(1));
-        let cells = [complex.cell(left ^ 1), complex.cell(left)];
-        let nodes = [complex.to(left), complex.to(right)];
-        let kind = complex.arc(left).kind;
-        complex.arcs[right as usize / 2] = None;
-        complex.arcs[merged as usize] = Some(Arc { nodes, kind, chain: places, cells });
+        let merged = complex.join_arcs(left, right);
         for (old, new) in [(left ^ 1, 0), (right, 0), (left, 1), (right ^ 1, 1)] {
             name.insert(old, 2 * merged + new);
         }
