@@ -308,7 +308,8 @@ fn plan(complex: &Complex, star: &[u32], &Contraction { into, rung, .. }: &Contr
         [complex.cell(half), complex.cell(half ^ 1)].into_iter().any(|c| c != NONE && has(c))
     };
     if star.iter().all(|&h| complex.arc(h).kind.is_smooth()) {
-        let cells: Vec<u32> = star.iter().map(|&h| complex.cell(h)).collect();
+        let mut cells: Vec<u32> = star.iter().map(|&h| complex.cell(h)).collect();
+        cells.sort_unstable();
         if !apart(&cells) {
             return None;
         }
