@@ -468,6 +468,7 @@ mod tests {
     use planish::contour::ContourParams;
     use planish::grid::GridParams;
     use planish::layout::LayoutParams;
+    use planish::mend::MendParams;
     use planish::mesh::{DecimateParams, SmoothParams};
     use planish::pipeline::ScanParams;
     use planish::surface::{FitParams, StitchParams};
@@ -531,7 +532,8 @@ mod tests {
 
     /// Fields of all stages.
     fn all_fields() -> Vec<Field> {
-        let mut all = fields::<LayoutParams>();
+        let mut all = fields::<MendParams>();
+        all.extend(fields::<LayoutParams>());
         all.extend(fields::<GridParams>());
         all.extend(fields::<FitParams>());
         all.extend(fields::<StitchParams>());

@@ -51,7 +51,7 @@ stages! {
     planish::pipeline::ScanParams => "scan", planish::contour::ContourParams => "contour",
     planish::field::GridParams => "volume", planish::mesh::SmoothParams => "smooth",
     planish::mesh::DecimateParams => "decimate", planish::mesh::CompareParams => "compare",
-    planish::layout::LayoutParams => "layout", planish::grid::GridParams => "grid",
+    planish::mend::MendParams => "mend", planish::layout::LayoutParams => "layout", planish::grid::GridParams => "grid",
     planish::surface::FitParams => "fit", planish::surface::StitchParams => "stitch",
     planish::curve::PaintParams => "paint", planish::curve::SnakeParams => "snake",
     planish::synthetic::ScannerParams => "scanner",
@@ -174,6 +174,7 @@ pub fn pipeline_params(
 /// Takes the parameters of all stages after the mesh.
 pub fn take_pipeline(given: &mut Given, base: PipelineParams) -> PyResult<PipelineParams> {
     Ok(PipelineParams {
+        mend: given.take_over(base.mend)?,
         layout: given.take_over(base.layout)?,
         grid: given.take_over(base.grid)?,
         fit: given.take_over(base.fit)?,

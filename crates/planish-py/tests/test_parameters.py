@@ -19,8 +19,8 @@ GROUPS = {f"_{stage.capitalize()}": [stage] for stage in planish.keywords()} | {
     "_VolumeMesh": ["volume", "contour"],
     "_CloudMesh": ["scan", "clean", "contour"],
     "_Project": ["clean", "points"],
-    "_Pipeline": ["layout", "grid", "fit", "stitch"],
-    "_CloudFit": ["points", "scan", "clean", "contour", "layout", "grid", "fit", "stitch"],
+    "_Pipeline": ["mend", "layout", "grid", "fit", "stitch"],
+    "_CloudFit": ["points", "scan", "clean", "contour", "mend", "layout", "grid", "fit", "stitch"],
 }
 CLASSES = {node.name: node for node in STUB.body if isinstance(node, ast.ClassDef)}
 
@@ -69,7 +69,7 @@ COMMANDS = {
     "smooth": ["smooth"],
     "decimate": ["decimate"],
     "layout": ["layout"],
-    "fit": ["layout", "grid", "fit", "stitch"],
+    "fit": ["mend", "layout", "grid", "fit", "stitch"],
     "demo": ["scanner"],
 }
 

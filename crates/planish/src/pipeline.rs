@@ -44,8 +44,8 @@ use crate::cloud::bricks::{BrickStore, CloudStore};
 use crate::cloud::{self, Cloud, CloudError, PointFacts};
 use crate::grid::{self, FeatureError, Grid, GridError, GridParams, Relaxer};
 use crate::layout::{self, Known, Layout, LayoutError, LayoutParams};
-use crate::mend::{self, Repairs};
-use crate::mesh::{CompareError, FeatureTags, MeshError, TriMesh};
+use crate::mend::{self, MendParams, Repairs};
+use crate::mesh::{CompareError, FeatureTags, MeshError, TriMesh, next};
 use crate::model::Model;
 use crate::network::{self, ImprintError, Network};
 use crate::observe::{Cancelled, Observer, Part};
@@ -60,6 +60,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PipelineParams {
+    /// What is done to the mesh before.
+    pub mend: MendParams,
     /// The automatic network.
     pub layout: LayoutParams,
     /// The grids.
@@ -320,11 +322,13 @@ fn fit_with(
     params: &PipelineParams,
     clock: &mut Clock,
 ) -> Result<Fitted, PipelineError> {
-    let (mesh, repairs) = repair(input, clock)?;
+    // A network that is given lies on the mesh as it is.
+    let mend = if network.is_some() { MendParams::default() } else { params.mend.clone() };
+    let Mended { mesh, sharp, repairs, evened } = mended(input, tags, &mend, clock)?;
     let (network, pieces) = match network {
         Some(network) => (network, Vec::new()),
         None => {
-            let Layout { network, pieces } = draw(input, tags, &mesh, &params.layout, clock)?;
+            let Layout { network, pieces } = draw(&mesh, &sharp, &params.layout, clock)?;
             (network, pieces)
         }
     };
@@ -339,6 +343,7 @@ fn fit_with(
     let mut measured =
         clock.stage("measure", |o| quality::measure(&model, &patches, &repairs, o), |m| [("seams", m.seams.len())])?;
     quality::method_figures(&pieces, &mut measured.quality, &mut measured.warnings);
+    quality::border_figures(evened, mend.even_border, &mut measured.quality, &mut measured.warnings);
     Ok(Fitted {
         model,
         stages: std::mem::take(&mut clock.records),
@@ -411,8 +416,8 @@ pub fn layout(
 ) -> Result<Drafted, PipelineError> {
     let mut clock = Clock::new(observer, &WEIGHTS[..2]);
     let draft = |clock: &mut Clock| {
-        let (mesh, repairs) = repair(input, clock)?;
-        let laid = draw(input, tags, &mesh, params, clock)?;
+        let Mended { mesh, sharp, repairs, .. } = mended(input, tags, &MendParams::default(), clock)?;
+        let laid = draw(&mesh, &sharp, params, clock)?;
         Ok::<_, PipelineError>((mesh, repairs, laid))
     };
     let (mesh, repairs, Layout { network, pieces }) = draft(&mut clock)?;
@@ -598,24 +603,49 @@ fn measure(model: &Model, clock: &mut Clock) -> Result<quality::Measured, Pipeli
     clock.stage("measure", |o| quality::measure(model, &patches, &repairs, o), |m| [("seams", m.seams.len())])
 }
 
-fn repair(input: &TriMesh, clock: &mut Clock) -> Result<(TriMesh, Repairs), PipelineError> {
-    Ok(clock.stage("repair", |o| mend::repair(input, o), |(mesh, _)| [("triangles", mesh.triangles.len())])?)
+/// A mesh that is ready for patches.
+struct Mended {
+    mesh: TriMesh,
+    /// For each half-edge whether it is tagged as sharp; empty without tags.
+    sharp: Vec<bool>,
+    repairs: Repairs,
+    /// Part of the area that went with ragged borders.
+    evened: f64,
+}
+
+fn mended(
+    input: &TriMesh,
+    tags: Option<&FeatureTags>,
+    params: &MendParams,
+    clock: &mut Clock,
+) -> Result<Mended, PipelineError> {
+    let work = |o: &dyn Observer| {
+        let (mut mesh, repairs) = mend::repair(input, o)?;
+        let mut sharp = tags.map(|tags| tags.half_edges(input, &mesh)).unwrap_or_default();
+        let mut evened = 0.0;
+        if params.even_border > 0.0 {
+            let ends = |h: usize| [mesh.origin(h as u32), mesh.origin(next(h as u32))];
+            let edges: Vec<[u32; 2]> = (0..sharp.len()).filter(|&h| sharp[h]).map(ends).collect();
+            let mut tags = FeatureTags::from_edges(mesh.points.len(), edges);
+            let radius = params.even_border * mesh.bounds().diagonal();
+            evened = mend::even_borders(&mut mesh, &mut tags, radius, o)?;
+            if !sharp.is_empty() {
+                sharp = tags.on(&mesh);
+            }
+        }
+        Ok::<_, PipelineError>(Mended { mesh, sharp, repairs, evened })
+    };
+    clock.stage("repair", work, |mended| [("triangles", mended.mesh.triangles.len())])
 }
 
 /// Patches that a layout is asked for at most; where more are wanted, each of fewer is divided. Layouts are made on a mesh of some
 /// thousand triangles, and its vertices are their corners: ten triangles are left for each patch then.
 const MOST_LAID: usize = 600;
 
-fn draw(
-    input: &TriMesh,
-    tags: Option<&FeatureTags>,
-    mesh: &TriMesh,
-    params: &LayoutParams,
-    clock: &mut Clock,
-) -> Result<Layout, PipelineError> {
-    let tagged = tags.map(|tags| tags.half_edges(input, mesh)).unwrap_or_default();
+/// * `sharp` - for each half-edge whether it is sharp, if that is known
+fn draw(mesh: &TriMesh, sharp: &[bool], params: &LayoutParams, clock: &mut Clock) -> Result<Layout, PipelineError> {
     let lay = |params: &LayoutParams, o: &dyn Observer| {
-        layout::layout(mesh, Known { sharp: &tagged, ..Known::default() }, params, Some(&trial::Coarse), o)
+        layout::layout(mesh, Known { sharp, ..Known::default() }, params, Some(&trial::Coarse), o)
     };
     let laid = |o: &dyn Observer| -> Result<Layout, PipelineError> {
         let by = (params.patches as f64 / MOST_LAID as f64).sqrt().ceil() as usize;

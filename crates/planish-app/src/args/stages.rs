@@ -11,6 +11,7 @@ use planish::contour::ContourParams;
 use planish::field;
 use planish::grid::GridParams;
 use planish::layout::LayoutParams;
+use planish::mend::MendParams;
 use planish::mesh::{DecimateParams, SmoothParams};
 use planish::network::Network;
 use planish::pipeline::{PipelineParams, RunParams, ScanParams};
@@ -20,6 +21,8 @@ use planish::synthetic::ScannerParams;
 /// Options of all stages.
 #[derive(Args, Clone, Debug)]
 pub struct AllStages {
+    #[command(flatten)]
+    mend: StageOptions<MendParams>,
     #[command(flatten)]
     layout: StageOptions<LayoutParams>,
     #[command(flatten)]
@@ -49,13 +52,21 @@ impl AllStages {
         seed: Option<u64>,
         scale: Scale,
     ) -> Result<PipelineParams, Failure> {
-        let idle = self.layout.first_given().or_else(|| self.grid.first_given().filter(|_| gridded));
+        let idle = self
+            .mend
+            .first_given()
+            .or_else(|| self.layout.first_given())
+            .or_else(|| self.grid.first_given().filter(|_| gridded));
         if let Some(flag) = idle {
             let kept = if gridded { "network and grids are" } else { "network is" };
             return Err(Failure::usage(flag, format!("does not go with this model, whose {kept} kept"))
                 .hint("fit its mesh: `planish export MODEL.planish --surface mesh -o MESH.ply`"));
         }
-        Ok(PipelineParams { layout: stored.layout.clone(), ..self.params_suiting(stored, seed, scale)? })
+        Ok(PipelineParams {
+            mend: stored.mend.clone(),
+            layout: stored.layout.clone(),
+            ..self.params_suiting(stored, seed, scale)?
+        })
     }
 
     /// The parameters of all stages: `suited` with the given options in place.
@@ -68,6 +79,7 @@ impl AllStages {
         scale: Scale,
     ) -> Result<PipelineParams, Failure> {
         let params = PipelineParams {
+            mend: self.mend.params_at(suited.mend, seed, scale)?,
             layout: self.layout.params_at(suited.layout, seed, scale)?,
             grid: self.grid.params_at(suited.grid, seed, scale)?,
             fit: self.fit.params_at(suited.fit, seed, scale)?,
@@ -98,7 +110,8 @@ impl AllStages {
     pub fn stored(json: &str) -> Result<PipelineParams, String> {
         let params: PipelineParams =
             serde_json::from_str(json).map_err(|e| format!("has parameters of another version ({e})"))?;
-        let checked = check_stored(&params.layout)
+        let checked = check_stored(&params.mend)
+            .and_then(|()| check_stored(&params.layout))
             .and_then(|()| check_stored(&params.grid))
             .and_then(|()| check_stored(&params.fit))
             .and_then(|()| check_stored(&params.stitch));
@@ -141,7 +154,8 @@ impl AllStages {
 
     /// True if no option of any stage is given.
     pub fn none_given(&self) -> bool {
-        self.layout.first_given().is_none()
+        self.mend.first_given().is_none()
+            && self.layout.first_given().is_none()
             && self.grid.first_given().is_none()
             && self.fit.first_given().is_none()
             && self.stitch.first_given().is_none()
@@ -196,6 +210,11 @@ impl StageParams for ScannerParams {
 impl StageParams for ProjectParams {
     const STAGE: &'static str = "points";
     const HEADING: &'static str = "Points that are written";
+}
+
+impl StageParams for MendParams {
+    const STAGE: &'static str = "mend";
+    const HEADING: &'static str = "Borders of open surfaces";
 }
 
 impl StageParams for LayoutParams {

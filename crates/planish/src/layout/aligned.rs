@@ -12,7 +12,7 @@ use super::complex::Complex;
 use super::embed::{self, EmbedError};
 use super::fitness::{self, Price};
 use super::integers::{self, IntegerMap, QuantizeError, Scale};
-use super::map::{self, Charts, Effort};
+use super::map::{self, Charts, ConeCare, Effort};
 use super::proxy::{self, Proxy, Sizing};
 use super::recut::Bench;
 use super::strips::chords::{self, Order};
@@ -83,7 +83,7 @@ impl Aligned {
         observer: &dyn Observer,
     ) -> Result<Option<Aligned>, AlignError> {
         let mut rounds = REFINEMENTS;
-        let (proxy, charts) = loop {
+        let (proxy, mut charts) = loop {
             let made = || proxy::proxy(mesh, sharp, &[], sizing, observer).map(Rc::new);
             let proxy = if sizing.is_even() { even.take().or_else(made) } else { made() };
             let Some(proxy) = proxy else { return Ok(None) };
@@ -94,8 +94,7 @@ impl Aligned {
             if proxy.mesh.triangles.len() > most {
                 return Err(AlignError::Dense { found: proxy.mesh.triangles.len(), most });
             }
-            let mut charts = charts(&proxy, attempt, observer)?;
-            charts.effort = effort.clone();
+            let charts = charts(&proxy, attempt, false, observer)?.with_effort(effort);
             let tight = charts.tight.iter().map(|&v| proxy.mesh.points[v as usize]);
             let halved = tight.map(|p| (p, sizing.at(p) / 2.0)).collect();
             if rounds == 0 || !sizing.shorten(halved) {
@@ -103,13 +102,23 @@ impl Aligned {
             }
             rounds -= 1;
         };
-        let mapped = map::seamless(&proxy.mesh, &proxy.adjacency, &proxy.lines, &charts, observer)?;
+        let map = |charts: &Charts| map::seamless(&proxy.mesh, &proxy.adjacency, &proxy.lines, charts, observer);
+        let mut mapped = map(&charts)?;
+        if mapped.as_ref().is_some_and(|mapped| !mapped.is_injective()) && !effort.is_spent() {
+            let settled = self::charts(&proxy, attempt, true, observer)?.with_effort(effort);
+            if let Some(other) =
+                map(&settled)?.filter(|other| mapped.as_ref().is_none_or(|m| other.faults() < m.faults()))
+            {
+                (charts, mapped) = (settled, Some(other));
+            }
+        }
         Ok(mapped.map(|mapped| Aligned { proxy, charts, mapped }))
     }
 }
 
 /// The charts of the field on a proxy.
-fn charts(proxy: &Proxy, attempt: &Attempt, observer: &dyn Observer) -> Result<Charts, Cancelled> {
+/// * `settled` - as [`ConeCare`] has it
+fn charts(proxy: &Proxy, attempt: &Attempt, settled: bool, observer: &dyn Observer) -> Result<Charts, Cancelled> {
     let Proxy { mesh, adjacency, lines, .. } = proxy;
     let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
     let side = (area / TYPICAL_PATCHES).sqrt();
@@ -120,7 +129,7 @@ fn charts(proxy: &Proxy, attempt: &Attempt, observer: &dyn Observer) -> Result<C
         pair_distance: PAIR_TO_SIDE * side,
     };
     let field = field::field(mesh, adjacency, lines, &params, observer)?;
-    Ok(Charts::new(mesh, adjacency, lines, &field, attempt.roomy))
+    Ok(Charts::new(mesh, adjacency, lines, &field, ConeCare { roomy: attempt.roomy, settled }))
 }
 
 /// A place with the length of edges that is wanted there.

@@ -79,7 +79,7 @@ const FINISH_TO_SIDE: f64 = 0.25;
 
 /// Patches of a typical layout; default ones of the measured meshes have 33 to 285. The scale of directions goes by their side, and
 /// pieces of less area than one are small.
-const TYPICAL_PATCHES: f64 = 100.0;
+pub(crate) const TYPICAL_PATCHES: f64 = 100.0;
 
 /// More patches along the form than this are not tried where nobody asked for them: where lines and cones alone need more, the
 /// partition does with fewer. Chosen.

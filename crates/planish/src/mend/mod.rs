@@ -2,6 +2,7 @@
 //!
 //! See `docs/methods/mend.md`.
 
+mod border;
 mod handles;
 mod holes;
 mod lids;
@@ -11,6 +12,7 @@ pub(crate) mod rims;
 mod slivers;
 mod trim;
 
+pub use border::{MendParams, even_borders};
 pub(crate) use holes::close_around;
 pub use holes::{close_hole, close_holes};
 pub use repair::{part_fans, repair, weld};

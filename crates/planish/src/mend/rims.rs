@@ -79,7 +79,19 @@ fn warmth(
         })
         .collect();
     let cold = cold?;
-    let mut warmth: Vec<f64> = cold.iter().map(|&c| if c { 0.0 } else { 1.0 }).collect();
+    let warmth = cold.iter().map(|&c| if c { 0.0 } else { 1.0 }).collect();
+    averaged(mesh, warmth, |v| cold[v], WARMING_ROUNDS, observer)
+}
+
+/// Values at vertices after rounds that take each half-way to the mean of its neighbours.
+/// * `is_held` - vertices that keep theirs
+pub(super) fn averaged(
+    mesh: &TriMesh,
+    mut values: Vec<f64>,
+    is_held: impl Fn(usize) -> bool + Sync,
+    rounds: usize,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, Cancelled> {
     let mut neighbours: Vec<[u32; 2]> =
         mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, a], [b, c], [c, b], [c, a], [a, c]]).collect();
     neighbours.par_sort_unstable();
@@ -87,21 +99,21 @@ fn warmth(
     let mut first = vec![0usize; mesh.points.len() + 1];
     neighbours.iter().for_each(|n| first[n[0] as usize + 1] += 1);
     (0..mesh.points.len()).for_each(|v| first[v + 1] += first[v]);
-    for _ in 0..WARMING_ROUNDS {
+    for _ in 0..rounds {
         observer.check()?;
-        warmth = (0..mesh.points.len())
+        values = (0..mesh.points.len())
             .into_par_iter()
             .map(|v| {
                 let around = &neighbours[first[v]..first[v + 1]];
-                if cold[v] || around.is_empty() {
-                    return warmth[v];
+                if is_held(v) || around.is_empty() {
+                    return values[v];
                 }
-                let sum: f64 = around.iter().map(|n| warmth[n[1] as usize]).sum();
-                0.5 * (warmth[v] + sum / around.len() as f64)
+                let sum: f64 = around.iter().map(|n| values[n[1] as usize]).sum();
+                0.5 * (values[v] + sum / around.len() as f64)
             })
             .collect();
     }
-    Ok(warmth)
+    Ok(values)
 }
 
 /// For each raw point the distance of its eighth neighbour; the middle one of those of its neighbours, so that a point that
@@ -130,7 +142,7 @@ fn reaches(tree: &KdTree, points: &[DVec3], observer: &dyn Observer) -> Result<V
 }
 
 /// Parts surfaces that touch in a point, as they do where what is known of a scan ends.
-fn part(mesh: &mut TriMesh, tags: &mut FeatureTags) {
+pub(super) fn part(mesh: &mut TriMesh, tags: &mut FeatureTags) {
     let (parted, source) = part_fans(mesh);
     if parted.points.len() == mesh.points.len() {
         return;

@@ -77,6 +77,7 @@ keys! {
     VOLUME_SAMPLES = "volume.samples", Plain, "Samples of the volume";
     VOLUME_SPACING = "volume.spacing", Length, "Distance of its samples";
     MESH_TRIANGLES = "mesh.triangles", Plain, "Triangles of the mesh after repair";
+    MESH_BORDER_CUT_SHARE = "mesh.border_cut_share", Share, "Area that went with ragged borders before patches were laid";
     MESH_VERTICES = "mesh.vertices", Plain, "Vertices of the mesh";
     MESH_COMPONENTS = "mesh.components", Plain, "Pieces of the mesh";
     MESH_WATERTIGHT = "mesh.watertight", Plain, "The mesh is closed";

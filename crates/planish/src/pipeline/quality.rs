@@ -295,6 +295,22 @@ pub(super) fn method_figures(pieces: &[(f64, Method)], quality: &mut Quality, wa
     warnings.push(Warning::new("layout_partition", message, ""));
 }
 
+/// What went with ragged borders.
+/// * `radius` - as a share of the diagonal
+pub(super) fn border_figures(evened: f64, radius: f64, quality: &mut Quality, warnings: &mut Vec<Warning>) {
+    if evened <= 0.0 {
+        return;
+    }
+    quality.insert(key::MESH_BORDER_CUT_SHARE.into(), Figure::Number(evened));
+    let text = format!(
+        "Ragged borders were cut even before patches were laid: {:.1} % of the area went, with all that is narrower than {:.2} % of \
+         the diagonal.",
+        100.0 * evened,
+        200.0 * radius
+    );
+    warnings.push(Warning::new("border_evened", text, "").with_step("--even-border 0"));
+}
+
 pub(super) fn network_figures(network: &Network, quality: &mut Quality) {
     let mut valence = vec![0usize; network.corners.len()];
     let mut boundary = vec![false; network.corners.len()];

@@ -10,7 +10,8 @@ use crate::contour::{self, ContourParams, Meshed, MeshingError, Sampling};
 use crate::field::{SampleField, Spacing};
 use crate::geom::Bvh;
 use crate::grid::GridParams;
-use crate::mend::finish;
+use crate::layout;
+use crate::mend::{MendParams, finish};
 use crate::mesh::sets::Sets;
 use crate::mesh::{FeatureTags, TriMesh};
 use crate::observe::{Cancelled, Observer, Part};
@@ -273,7 +274,10 @@ const FIT_SMOOTHING: f64 = 0.05;
 const GRID_POINTS: f64 = 3e5;
 const GRID_DENSITY: f64 = 6.0;
 
-/// The parameters that suit the mesh of a scan: how fine its grids are, and how closely surfaces are fitted to it.
+/// Half of the width that is kept everywhere where borders of scans are cut even, in sides of a patch of a typical layout. Chosen.
+const BORDER_TO_SIDE: f64 = 0.2;
+
+/// The parameters that suit the mesh of a scan: how even its borders are made, how fine its grids are, and how closely surfaces are fitted to it.
 pub fn params_for(made: &ScanMeshed) -> PipelineParams {
     let usual = PipelineParams::default();
     let noise = made.facts.noise / made.facts.diagonal;
@@ -284,7 +288,12 @@ pub fn params_for(made: &ScanMeshed) -> PipelineParams {
     let smoothing = (FIT_SMOOTHING * (noise / 1e-3).powi(2)).clamp(usual.fit.smoothing, 1.0);
     let vertices = made.meshed.extracted.mesh.points.len().max(1);
     let density = (GRID_POINTS / vertices as f64).min(GRID_DENSITY).max(usual.grid.density);
+    let mesh = &made.meshed.extracted.mesh;
+    let area: f64 = (0..mesh.triangles.len()).map(|f| mesh.area(f)).sum();
+    let side = (area / layout::TYPICAL_PATCHES).sqrt();
+    let even_border = (BORDER_TO_SIDE * side / mesh.bounds().diagonal()).min(1.0);
     PipelineParams {
+        mend: MendParams { even_border },
         fit: FitParams { resolution, smoothing, knots: KnotSpacing::Even, ..usual.fit },
         grid: GridParams { density, denser_rounds: 0, ..usual.grid },
         ..usual

@@ -32,17 +32,28 @@ pub(in crate::layout) struct Charts {
     pub effort: Effort,
 }
 
+/// What is done to the cones of a field.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(in crate::layout) struct ConeCare {
+    /// Those beside lines and each other are moved off ([`Room::move_off`]).
+    pub roomy: bool,
+    /// Those beside each other share what they turn by, and directions around all are made smooth ([`Room::settle`]).
+    pub settled: bool,
+}
+
 impl Charts {
-    /// The charts of `field`.
-    /// * `roomy` - whether cones beside lines are moved off
-    pub fn new(mesh: &TriMesh, adjacency: &Adjacency, lines: &[bool], field: &CrossField, roomy: bool) -> Charts {
+    /// The charts of `field`, with its cones treated as `care` says.
+    pub fn new(mesh: &TriMesh, adjacency: &Adjacency, lines: &[bool], field: &CrossField, care: ConeCare) -> Charts {
         let mut matching = Matching::new(adjacency, field);
         let mut index = matching.indices(mesh, adjacency);
         let mut theta = field.theta.clone();
         let room = Room::new(mesh, adjacency, lines);
         let tight = room.tight(&index);
-        if roomy {
+        if care.roomy {
             room.move_off(&tight, field, &mut matching, &mut index, &mut theta);
+        }
+        if care.settled {
+            room.settle(field, &mut matching, &mut index, &mut theta);
         }
         let Matching { turns, drift } = matching;
         let scale = conformal::scales(mesh, adjacency, lines, &drift);
@@ -62,6 +73,11 @@ impl Charts {
         let axis = theta.iter().zip(&turned).map(|(theta, &m)| theta + f64::from(m) * FRAC_PI_2).collect();
         let cut = prune(mesh, adjacency, &jump, &index, &tree);
         Charts { axis, jump, cut, index, sectors, tight, scale, effort: Effort::new(1.0) }
+    }
+
+    /// The same for maps that share the effort of others.
+    pub fn with_effort(self, effort: &Effort) -> Charts {
+        Charts { effort: effort.clone(), ..self }
     }
 
     /// Vertices where a map has to have a corner of a patch: cones, and places where lines end, meet or turn.

@@ -21,7 +21,7 @@ mod room;
 mod seams;
 mod untangle;
 
-pub(super) use cones::Charts;
+pub(super) use cones::{Charts, ConeCare};
 pub(super) use effort::Effort;
 
 use crate::geom::predicates::orient2d;
@@ -265,7 +265,7 @@ mod tests {
     fn charts(mesh: &TriMesh, lines: &[bool]) -> Charts {
         let adjacency = Adjacency::new(mesh);
         let field = field(mesh, &adjacency, lines, &PARAMS, &Silent).unwrap();
-        Charts::new(mesh, &adjacency, lines, &field, false)
+        Charts::new(mesh, &adjacency, lines, &field, ConeCare::default())
     }
 
     fn mapped(mesh: &TriMesh, lines: &[bool]) -> (Charts, Mapped) {

@@ -88,6 +88,33 @@ impl<'a> Room<'a> {
         }
     }
 
+    /// Lets vertices beside each other, off lines, share their indices evenly: opposite cones cancel, and one with two patches or
+    /// fewer becomes several. Then `theta` is made smooth around all cones: where crosses were averaged away to next to nothing
+    /// they may be a quarter turn off what any map can follow.
+    pub fn settle(&self, field: &CrossField, matching: &mut Matching, index: &mut [i32], theta: &mut [f64]) {
+        let mut touched: Vec<bool> = index.iter().map(|i| *i != 0).collect();
+        let ends = |h: u32| [self.mesh.origin(h) as usize, self.mesh.origin(next(h)) as usize];
+        let inner: Vec<u32> =
+            (0..self.bound_edge.len() as u32).filter(|&h| ends(h).iter().all(|&v| !self.on_line[v])).collect();
+        loop {
+            let mut is_done = true;
+            for &h in &inner {
+                let [a, b] = ends(h);
+                // The squares of the indices fall by each step, so there is a last one.
+                if index[a] - index[b] >= 2 {
+                    matching.turn(h as usize, self.adjacency.opposite[h as usize] as usize, -1);
+                    index[a] -= 1;
+                    index[b] += 1;
+                    (touched[a], touched[b], is_done) = (true, true, false);
+                }
+            }
+            if is_done {
+                break;
+            }
+        }
+        self.smooth(touched, field, matching, theta);
+    }
+
     /// The half-edges from a cone to the nearest vertex with room.
     fn way(&self, cone: u32, index: &[i32]) -> Option<Vec<u32>> {
         if self.on_line[cone as usize] {
@@ -154,20 +181,70 @@ mod tests {
     use crate::observe::Silent;
     use crate::synthetic::shapes;
 
-    #[test]
-    fn a_cone_beside_the_rim_moves_to_where_it_has_room_and_the_indices_keep_their_sum() {
+    /// A field on a square sheet without a cone, and how it matches.
+    fn calm() -> (TriMesh, Adjacency, CrossField, Matching) {
         let mesh = shapes::rectangle(1.0, 1.0, 16, 16);
         let (adjacency, lines) = (Adjacency::new(&mesh), vec![false; 3 * mesh.triangles.len()]);
         let params = FieldParams { curvature: 0.0, smoothing: 1.0, radius: 0.1, pair_distance: 0.0 };
         let field = field(&mesh, &adjacency, &lines, &params, &Silent).unwrap();
-        let mut matching = Matching::new(&adjacency, &field);
+        let matching = Matching::new(&adjacency, &field);
+        (mesh, adjacency, field, matching)
+    }
+
+    /// The vertex nearest to a place of the sheet, from 0 to 1 along its sides.
+    fn at(mesh: &TriMesh, x: f64, y: f64) -> u32 {
+        let place = mesh.bounds().min.truncate() + glam::DVec2::new(x, y);
+        let off = |v: &u32| mesh.points[*v as usize].truncate().distance_squared(place);
+        (0..mesh.points.len() as u32).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap()
+    }
+
+    #[test]
+    fn cones_beside_each_other_cancel_and_one_of_one_patch_becomes_three() {
+        let (mesh, adjacency, field, mut matching) = calm();
+        // Three quarter turns to one end of an edge and one to the other of the next, with their opposites far away.
+        let column: Vec<u32> = (4..=12).map(|k| at(&mesh, 0.5, f64::from(k) / 16.0)).collect();
+        for (k, pair) in column.windows(2).enumerate() {
+            let h = adjacency.fan(pair[0]).find(|&h| mesh.origin(next(h)) == pair[1]).unwrap();
+            matching.turn(h as usize, adjacency.opposite[h as usize] as usize, if k == 0 { 3 } else { 4 });
+        }
+        let mut index = matching.indices(&mesh, &adjacency);
+        assert_eq!([0, 1, 8].map(|k| index[column[k] as usize]), [3, 1, -4]);
+        let room = Room::new(&mesh, &adjacency, &vec![false; 3 * mesh.triangles.len()]);
+        let mut theta = field.theta.clone();
+        let sum = index.iter().sum::<i32>();
+        room.settle(&field, &mut matching, &mut index, &mut theta);
+        assert_eq!((index.iter().sum::<i32>(), &index), (sum, &matching.indices(&mesh, &adjacency)));
+        let cones = |sign: i32| (0..index.len()).filter(|&v| !room.on_line[v] && index[v] == sign).count();
+        assert_eq!((cones(1), cones(-1)), (4, 4));
+    }
+
+    #[test]
+    fn directions_around_a_pair_of_cones_turn_evenly_after_settling() {
+        let (mesh, adjacency, field, mut matching) = calm();
+        let column: Vec<u32> = (4..=12).map(|k| at(&mesh, 0.5, f64::from(k) / 16.0)).collect();
+        for pair in column.windows(2) {
+            let h = adjacency.fan(pair[0]).find(|&h| mesh.origin(next(h)) == pair[1]).unwrap();
+            matching.turn(h as usize, adjacency.opposite[h as usize] as usize, 1);
+        }
+        // All that the field turns by lies on the edges between the two.
+        let most = |matching: &Matching| matching.drift.iter().fold(0.0f64, |m, d| m.max(d.abs()));
+        assert!((most(&matching) - std::f64::consts::FRAC_PI_2).abs() < 1e-6);
+        let (mut index, mut theta) = (matching.indices(&mesh, &adjacency), field.theta.clone());
+        Room::new(&mesh, &adjacency, &vec![false; 3 * mesh.triangles.len()]).settle(
+            &field,
+            &mut matching,
+            &mut index,
+            &mut theta,
+        );
+        assert!(most(&matching) < 0.5, "{}", most(&matching));
+    }
+
+    #[test]
+    fn a_cone_beside_the_rim_moves_to_where_it_has_room_and_the_indices_keep_their_sum() {
+        let (mesh, adjacency, field, mut matching) = calm();
+        let lines = vec![false; 3 * mesh.triangles.len()];
         // A pair of cones, drawn apart: one beside the rim, the other far inside.
-        let at = |x: f64, y: f64| {
-            let near = |v: &u32| (mesh.points[*v as usize].truncate() - glam::DVec2::new(x, y)).length_squared();
-            (0..mesh.points.len() as u32).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap()
-        };
-        let middle = mesh.bounds().center();
-        let column: Vec<u32> = (1..=8).map(|k| at(middle.x, mesh.bounds().min.y + f64::from(k) / 16.0)).collect();
+        let column: Vec<u32> = (1..=8).map(|k| at(&mesh, 0.5, f64::from(k) / 16.0)).collect();
         for pair in column.windows(2) {
             let h = adjacency.fan(pair[0]).find(|&h| mesh.origin(next(h)) == pair[1]).unwrap();
             matching.turn(h as usize, adjacency.opposite[h as usize] as usize, 1);
