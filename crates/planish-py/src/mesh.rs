@@ -131,6 +131,23 @@ impl PyMesh {
         Ok(PyMesh::new(mesh, tags, json!(repairs)))
     }
 
+    /// Ragged borders cut even: what is narrower than twice `radius` (world units) goes, unless it is as large as 25 squares of it. For a
+    /// manifold mesh; a closed one stays as it is.
+    ///
+    /// Returns a mesh whose `facts` tell `cut_share`, the part of the area that went. Raises ValueError for a radius that is not above 0.
+    #[pyo3(signature = (radius, *, progress=None))]
+    fn even_borders(&self, py: Python, radius: f64, progress: Option<&Bound<PyAny>>) -> PyResult<PyMesh> {
+        if !(radius > 0.0 && radius.is_finite()) {
+            return Err(PyValueError::new_err(format!("radius={radius}: a number above 0 is needed")));
+        }
+        let mut mesh = self.body.mesh.clone();
+        let none = || FeatureTags::from_edges(mesh.points.len(), []);
+        let mut tags = self.body.tags.clone().unwrap_or_else(none);
+        let cut = watch::run(py, "borders", progress, |o| mend::even_borders(&mut mesh, &mut tags, radius, o.one()))?;
+        let tags = self.body.tags.is_some().then_some(tags);
+        Ok(PyMesh::new(mesh, tags, json!({ "cut_share": cut })))
+    }
+
     /// The mesh in tiles: cubes of side `size`, by their place: tile (i, j, k) is the cube from `size * (i, j, k)` on. Each triangle is in
     /// the tile of its middle; vertices on the border of two tiles are the same numbers in both. Raises ValueError.
     fn tiles<'py>(&self, py: Python<'py>, size: f64) -> PyResult<Bound<'py, PyDict>> {

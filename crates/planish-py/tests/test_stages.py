@@ -87,6 +87,24 @@ def test_repair_welds_a_soup_and_tells_what_it_did(box: planish.Mesh) -> None:
     assert mended.diagnose()["watertight"]
 
 
+def test_tatters_of_a_border_are_cut_off_and_closed_meshes_stay(box: planish.Mesh) -> None:
+    n = 40
+    ij = np.array([(i, j) for j in range(n) for i in range(n)])
+    cell = ij[:, 0] + ij[:, 1] * (n + 1)
+    quads = np.stack([cell, cell + 1, cell + n + 2, cell + n + 1], 1)
+    # A square of 20 by 40 cells with a strip of 4 by 20 beside it.
+    kept = (ij[:, 0] < 20) | (abs(ij[:, 1] - 20) < 2)
+    points = np.array([(i / n, j / n, 0.0) for j in range(n + 1) for i in range(n + 1)])
+    faces = np.concatenate([quads[kept][:, [0, 1, 2]], quads[kept][:, [0, 2, 3]]]).astype(np.uint32)
+    ragged = planish.Mesh(points, faces).repair()
+    even = ragged.even_borders(0.1)
+    assert even.bounds[1][0] < 0.55
+    assert abs(even.facts["cut_share"] - (1 - even.diagnose()["area"] / ragged.diagnose()["area"])) < 1e-9
+    assert box.even_borders(0.1).facts["cut_share"] == 0
+    with pytest.raises(ValueError, match="radius=0"):
+        box.even_borders(0)
+
+
 def test_remeshing_a_box_keeps_its_volume_and_its_edges(box: planish.Mesh) -> None:
     made = box.remesh(resolution=21)
     assert made.diagnose()["volume"] == pytest.approx(24.0, rel=1e-9)

@@ -173,8 +173,7 @@ mod tests {
                 used
             };
             FeatureTags::from_edges(mesh.points.len(), []).keep(&mut mesh, &stays);
-            let top = evened(mesh, 0.2).0.bounds().max.y - low.y;
-            top
+            evened(mesh, 0.2).0.bounds().max.y - low.y
         };
         assert!(tongue(0.3) < 1.05 && tongue(0.6) > 1.9, "{} {}", tongue(0.3), tongue(0.6));
     }
