@@ -303,8 +303,8 @@ pub(super) fn border_figures(evened: f64, radius: f64, quality: &mut Quality, wa
     }
     quality.insert(key::MESH_BORDER_CUT_SHARE.into(), Figure::Number(evened));
     let text = format!(
-        "Ragged borders were cut even before patches were laid: {:.1} % of the area went, with all that is narrower than {:.2} % of \
-         the diagonal.",
+        "Ragged borders were cut even before patches were laid: {:.1} % of the area went, tatters narrower than {:.2} % of the \
+         diagonal among it.",
         100.0 * evened,
         200.0 * radius
     );
