@@ -530,6 +530,50 @@ fn a_milled_slot_has_the_volume_of_its_formula_and_its_sharp_rim() {
     }
 }
 
+/// The prism over a convex outline in the xy-plane, counter-clockwise, turned any way.
+fn prism(outline: &[[f64; 2]], height: f64, seed: u64) -> TriMesh {
+    let r = |k: u64| random::unit(17, 8 * seed + k) - 0.5;
+    let turn = glam::DQuat::from_axis_angle(DVec3::new(r(0), r(1), r(2)).normalize(), std::f64::consts::TAU * r(3));
+    let n = outline.len() as u32;
+    let floor = |z: f64| outline.iter().map(move |&[x, y]| turn * DVec3::new(x, y, z));
+    let mut triangles: Vec<[u32; 3]> = (1..n - 1).flat_map(|k| [[0, k + 1, k], [n, n + k, n + k + 1]]).collect();
+    triangles.extend((0..n).flat_map(|k| {
+        let next = (k + 1) % n;
+        [[k, next, n + k], [next, n + next, n + k]]
+    }));
+    TriMesh::new(floor(0.0).chain(floor(height)).collect(), triangles)
+}
+
+/// Checks that a thin body comes back as one piece without handles; its volume as a share of the true one, and how well its edges are
+/// kept, with the size of a cell.
+fn thin_body(name: &str, source: &TriMesh, n: usize) -> (f64, zone::Zone, f64) {
+    let made = of_mesh(source, n);
+    let d = certified(name, &made.extracted.mesh);
+    println!("{name} {n} {} {:?} {:?}", d.components, d.genus, made.extracted.counts);
+    let cell = made.lattice.step.max_element();
+    let percent = 100.0 * cell / diagnose(source).bounds.diagonal();
+    (d.volume.unwrap() / diagnose(source).volume.unwrap(), zone::measure(source, &made.extracted.mesh, cell), percent)
+}
+
+#[test]
+fn knives_and_plates_thinner_than_a_cell_stay_in_one_piece_with_their_volume() {
+    for seed in 0..2 {
+        for deg in [10.0_f64, 20.0, 35.0] {
+            let half = (deg / 2.0).to_radians().tan();
+            let knife = prism(&[[0.0, 0.0], [1.0, -half], [1.0, half]], 0.8, seed);
+            for n in [33, 65, 129] {
+                println!("knife {deg} {seed} {n}: {:?}", thin_body("knife", &knife, n));
+            }
+        }
+        for width in [0.004, 0.015] {
+            let plate = prism(&[[0.0, 0.0], [1.0, 0.0], [1.0, width], [0.0, width]], 0.7, seed);
+            for n in [33, 65, 129] {
+                println!("plate {width} {seed} {n}: {:?}", thin_body("plate", &plate, n));
+            }
+        }
+    }
+}
+
 #[test]
 fn walls_thinner_than_a_cell_are_counted_with_their_width() {
     // A plate of a tenth of a cell that lies between two planes of nodes.

@@ -23,8 +23,10 @@ mod walk;
 
 use crate::contour::cell::face::FacePoints;
 use crate::contour::cell::patch::{FIRST_INNER, Patcher, Scratch, Sheet};
+use crate::contour::cell::twice::TwicePassed;
 use crate::contour::octree::Octree;
 use crate::contour::survey::Survey;
+use crate::field::directed::Hits;
 use crate::field::{Creases, Directed};
 use crate::mesh::{FeatureKind, FeatureTags, TriMesh};
 use crate::observe::{Cancelled, Observer};
@@ -146,7 +148,9 @@ pub fn extract(
 ) -> Result<Extracted, ContourError> {
     let creases = creases.filter(|_| !params.plain);
     let limits = thresholds(field, creases, params);
-    let hits = field.hit_count();
+    // The standard algorithm has a hit where two nodes differ, and nowhere else.
+    let twice = if params.plain { TwicePassed::default() } else { TwicePassed::new(field) };
+    let hits = field.hit_count() + field.twice_count();
     if hits as u64 >= FIRST_INNER as u64 {
         return Err(ContourError::TooLarge { vertices: hits });
     }
@@ -158,11 +162,14 @@ pub fn extract(
     // Standard cells have no features to keep, but no reason to bend either.
     let sharp = if params.plain { SMOOTH_COSINE } else { limits.faint };
     let tolerance = params.adaptive.filter(|t| *t > 0.0);
-    let octree = tolerance.map(|tolerance| larger_cells(field, &chunks, sharp, tolerance));
+    let octree = tolerance.map(|tolerance| larger_cells(field, &chunks, &twice, (sharp, tolerance)));
     let merged = |at: [usize; 3]| octree.as_ref().is_some_and(|o| o.is_merged(at));
+    let crowded = twice.cells(field);
     let surveys: Option<Vec<Survey>> = chunks
         .par_iter()
-        .map(|&layers| (!observer.cancelled()).then(|| survey::survey(field, &points, &limits, layers, merged)))
+        .map(|&layers| {
+            (!observer.cancelled()).then(|| survey::survey(field, &points, &limits, layers, (&twice, merged)))
+        })
         .collect();
     let surveys = surveys.ok_or(Cancelled)?;
     observer.progress(0.3);
@@ -170,16 +177,24 @@ pub fn extract(
         .par_iter()
         .map(|survey| {
             let cells = survey.others.iter().filter(|_| !params.plain).map(|(cell, _)| cell);
-            (!observer.cancelled()).then(|| face::face_points(field, &limits, creases, cells))
+            (!observer.cancelled()).then(|| face::face_points(field, &limits, creases, &twice, cells))
         })
         .collect();
-    let (faces, mut wishes) = FacePoints::join(field, parts.ok_or(Cancelled)?, hits as u32);
+    let mut parts = parts.ok_or(Cancelled)?;
+    parts.push(face::face_points(field, &limits, creases, &twice, crowded.iter()));
+    let (faces, mut wishes) = FacePoints::join(field, parts, hits as u32);
     observer.progress(0.6);
-    let patcher =
-        Patcher { field, points: &points, limits: &limits, faces: &faces, refine: creases, base: field.first_names() };
+    let (base, refine) = (field.first_names(), creases);
+    let patcher = Patcher { field, points: &points, limits: &limits, faces: &faces, refine, base, twice: &twice };
     let sheets = sheets(&patcher, &surveys, merged, observer);
     let mut sheets = sheets.ok_or(Cancelled)?;
     let mut surveys = surveys;
+    if !crowded.is_empty() {
+        let (mut sheet, mut scratch) = (Sheet::default(), Scratch::default());
+        crowded.iter().for_each(|cell| patcher.patch(cell, &mut scratch, &mut sheet));
+        sheets.push(sheet);
+        surveys.push(Survey::default());
+    }
     if let Some(octree) = &octree {
         // Larger cells come after all others.
         sheets.push(octree.patches());
@@ -207,7 +222,7 @@ pub fn extract(
             survey.merged_cells(sheet, first, &mut cells);
             first += (survey.triangles() + sheet.triangles.len()) as u32;
         }
-        if octree.is_some() {
+        if octree.is_some() || !crowded.is_empty() {
             cells.par_sort_unstable_by_key(|c| [c.0[2], c.0[1], c.0[0]]);
         }
         cells
@@ -247,13 +262,25 @@ fn sheets(
 
 /// The cells that flat ones are merged to.
 /// * `chunks` - layers of each task
-fn larger_cells<'a>(field: &'a Directed, chunks: &[(usize, usize)], sharp: f64, tolerance: f64) -> Octree<'a> {
+/// * `twice` - cells that stay as they are
+fn larger_cells<'a>(
+    field: &'a Directed,
+    chunks: &[(usize, usize)],
+    twice: &TwicePassed,
+    (sharp, tolerance): (f64, f64),
+) -> Octree<'a> {
     let cells = chunks.par_iter().flat_map_iter(|&(from, to)| {
         let (base, mut cells) = (field.first_names(), Vec::new());
-        walk::walk(field, from, to, |cell| cells.push(octree::candidate(cell, base)));
+        walk::walk(field, from, to, |cell| {
+            if !twice.contains(cell.at) {
+                cells.push(octree::candidate(cell, base));
+            }
+        });
         cells
     });
-    Octree::new(field, cells.collect(), sharp, tolerance)
+    let crowded = twice.cells(field).into_iter().map(|cell| (cell.at.map(|x| x as u32), None));
+    let cells: Vec<octree::Candidate> = cells.collect::<Vec<_>>().into_iter().chain(crowded).collect();
+    Octree::new(field, cells, sharp, tolerance)
 }
 
 /// All parts of a surface in one mesh.
@@ -312,23 +339,26 @@ fn in_order(mut tags: FeatureTags) -> FeatureTags {
 /// Rows whose hits a task places at once.
 const ROWS: usize = 4096;
 
-/// Positions of all hits, axis after axis.
+/// Positions of all hits by their names.
 fn hit_positions(field: &Directed) -> Vec<DVec3> {
     let rows = field.lattice.rows();
-    let tasks: Vec<(usize, usize)> = (0..3).flat_map(|axis| (0..rows).step_by(ROWS).map(move |r| (axis, r))).collect();
-    let parts: Vec<Vec<DVec3>> = tasks
-        .into_par_iter()
-        .map(|(axis, from)| {
-            let (start, to) = (&field.axes[axis].start, (from + ROWS).min(rows));
-            let mut points = Vec::with_capacity((start[to] - start[from]) as usize);
+    let tasks = |lists: &[Hits; 3]| -> Vec<(usize, usize)> {
+        let axes = (0..3).filter(|&axis| !lists[axis].is_empty());
+        axes.flat_map(|axis| (0..rows).step_by(ROWS).map(move |r| (axis, r))).collect()
+    };
+    let mut points = Vec::with_capacity(field.hit_count() + field.twice_count());
+    for lists in [&field.axes, &field.twice] {
+        let of = |(axis, from): (usize, usize)| {
+            let (hits, to) = (&lists[axis], (from + ROWS).min(rows));
+            let mut points = Vec::with_capacity((hits.start[to] - hits.start[from]) as usize);
             for row in from..to {
-                points.extend((start[row]..start[row + 1]).map(|n| field.position(axis, row, n as usize)));
+                points.extend((hits.start[row]..hits.start[row + 1]).map(|n| field.place(axis, row, hits, n as usize)));
             }
             points
-        })
-        .collect();
-    let mut points = Vec::with_capacity(field.hit_count());
-    parts.iter().for_each(|part| points.extend_from_slice(part));
+        };
+        let parts: Vec<Vec<DVec3>> = tasks(lists).into_par_iter().map(of).collect();
+        parts.iter().for_each(|part| points.extend_from_slice(part));
+    }
     points
 }
 

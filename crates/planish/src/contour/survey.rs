@@ -7,6 +7,7 @@
 use super::Thresholds;
 use super::cell::RING;
 use super::cell::patch::{Sheet, best_fan};
+use super::cell::twice::TwicePassed;
 use super::polish::local::CellRange;
 use super::walk::{Cell, walk};
 use crate::field::Directed;
@@ -28,18 +29,21 @@ const ROUNDING: f64 = 1e-9;
 
 /// Looks at the cells of the layers `from..to`.
 /// * `points` - positions of the hits
-/// * `merged` - cells to leave out
+/// * `twice`, `merged` - cells to leave out, and those to leave out where they are smooth
 pub fn survey(
     field: &Directed,
     points: &[DVec3],
     limits: &Thresholds,
     (from, to): (usize, usize),
-    merged: impl Fn([usize; 3]) -> bool,
+    (twice, merged): (&TwicePassed, impl Fn([usize; 3]) -> bool),
 ) -> Survey {
     let (mut found, base) = (Survey::default(), field.first_names());
     // Two normals this near to a third have a cosine above the threshold.
     let alike = ((1.0 + limits.faint) / 2.0).max(0.0).sqrt() + ROUNDING;
     walk(field, from, to, |cell| {
+        if twice.contains(cell.at) {
+            return;
+        }
         let before = found.triangles.len() as u32;
         let (count, edges) = &RING[cell.config as usize];
         let edges = &edges[..*count as usize];

@@ -103,7 +103,7 @@ pub fn complement(a: &Directed) -> Directed {
         inside.iter_mut().for_each(|w| *w = !*w);
         changes_of(&inside, &known, nodes)
     }));
-    for hit in all.axes.iter_mut().flat_map(|axis| &mut axis.hits) {
+    for hit in all.axes.iter_mut().chain(&mut all.twice).flat_map(|hits| &mut hits.hits) {
         hit.normal = -hit.normal;
     }
     all.values = None;

@@ -52,6 +52,9 @@ pub struct Directed {
     pub lattice: Lattice,
     /// Hits on edges along x, y and z.
     pub axes: [Hits; 3],
+    /// Hits on edges between two nodes of one side that the surface passes there and back, where the source can tell: two on each,
+    /// along it.
+    pub twice: [Hits; 3],
     /// Where sides change along the rows.
     pub sides: Sides,
     /// Angle by which the normals are off, degrees ([`super::Field::noise_deg`]).
@@ -139,6 +142,13 @@ impl Sides {
             self.unknown |= !known & below(nodes, w) != 0;
         }
         self.start.push(self.changes.len() as u32);
+    }
+
+    /// Side of node `at` of row `row`, as a [`code`].
+    pub fn at(&self, row: usize, at: usize) -> u32 {
+        let changes = &self.changes[self.start[row] as usize..self.start[row + 1] as usize];
+        let before = changes.partition_point(|c| (c >> 2) as usize <= at);
+        if before == 0 { 0 } else { changes[before - 1] & 3 }
     }
 
     /// Bits of row `row`: inside, and known.
@@ -271,11 +281,36 @@ impl Directed {
         [0, x, x + y]
     }
 
+    /// Number of hits on edges that the surface passes there and back.
+    pub fn twice_count(&self) -> usize {
+        self.twice.iter().map(Hits::len).sum()
+    }
+
+    /// Name of the first of [`Directed::twice`] of each axis: they come after all other hits.
+    pub fn first_twice_names(&self) -> [u32; 3] {
+        let first = self.hit_count() as u32;
+        let [x, y, _] = [0, 1, 2].map(|a| self.twice[a].len() as u32);
+        [first, first + x, first + x + y]
+    }
+
+    /// Normal of a hit by its name; `None` for other names.
+    pub fn normal(&self, name: u32) -> Option<DVec3> {
+        let all = self.first_names().into_iter().zip(&self.axes);
+        let all = all.chain(self.first_twice_names().into_iter().zip(&self.twice));
+        let (base, hits) = all.filter(|(base, _)| *base <= name).last()?;
+        hits.hits.get((name - base) as usize).map(|h| h.normal)
+    }
+
     /// Position of hit number `n` of `axis`, which lies in `row`.
     pub fn position(&self, axis: usize, row: usize, n: usize) -> DVec3 {
+        self.place(axis, row, &self.axes[axis], n)
+    }
+
+    /// Position of number `n` of some hits of `axis`, which lies in `row`.
+    pub fn place(&self, axis: usize, row: usize, hits: &Hits, n: usize) -> DVec3 {
         let (j, k) = (row % self.lattice.nodes(1), row / self.lattice.nodes(1));
-        let mut p = self.lattice.node(self.axes[axis].at[n] as usize, j, k);
-        p[axis] += self.axes[axis].hits[n].t * self.lattice.step[axis];
+        let mut p = self.lattice.node(hits.at[n] as usize, j, k);
+        p[axis] += hits.hits[n].t * self.lattice.step[axis];
         p
     }
 
@@ -358,7 +393,8 @@ impl Directed {
             }
             all
         });
-        Directed { lattice, axes, sides, noise_deg: 0.0, values: None, mended, thin: Thin::default() }
+        let twice = Default::default();
+        Directed { lattice, axes, twice, sides, noise_deg: 0.0, values: None, mended, thin: Thin::default() }
     }
 }
 

@@ -56,7 +56,8 @@ pub fn sample_grid(grid: &ScalarGrid, params: &GridParams, observer: &dyn Observ
     let axes = [x, y, z].map(Hits::joined);
     let (sides, thin) = (Sides::joined(sides), Thin::default());
     observer.progress(1.0);
-    Ok(Directed { lattice, axes, sides, noise_deg: 0.0, values: Some(levels), mended: 0, thin })
+    let twice = Default::default();
+    Ok(Directed { lattice, axes, twice, sides, noise_deg: 0.0, values: Some(levels), mended: 0, thin })
 }
 
 /// Sides and hits of the rows of a slab.

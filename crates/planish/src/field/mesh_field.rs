@@ -115,35 +115,50 @@ impl<'a> MeshField<'a> {
                 changes
             }))
         };
-        let axes = [0, 1, 2].map(|axis| self.hits(lattice, axis, &crossings[axis], normals));
+        let [(x, xx), (y, yy), (z, zz)] =
+            [0, 1, 2].map(|axis| self.hits(lattice, axis, &crossings[axis], normals).into());
         let missing = |axis: usize, [i, j, k]: [usize; 3]| self.nearest_normal(lattice, axis, [i, j, k]);
-        Directed::assemble(*lattice, sides, axes, &missing)
+        Directed { twice: [xx, yy, zz], ..Directed::assemble(*lattice, sides, [x, y, z], &missing) }
     }
 
-    /// One hit for each edge that has any: the last at which the winding number passes between in and out.
-    fn hits(&self, lattice: &Lattice, axis: usize, crossings: &[Crossing], normals: &[DVec3]) -> Hits {
-        let mut placed = Vec::with_capacity(crossings.len());
+    /// One hit for each edge that has any: the last at which the winding number passes between in and out. And where both ends
+    /// of an edge are on one side, the two between which it is on the other for longest.
+    fn hits(&self, lattice: &Lattice, axis: usize, crossings: &[Crossing], normals: &[DVec3]) -> [Hits; 2] {
+        let (mut placed, mut twice) = (Vec::with_capacity(crossings.len()), Vec::new());
         for line in crossings.chunk_by(|a, b| a.line == b.line) {
             let mut winding = 0;
             for run in line.chunk_by(|a, b| a.edge == b.edge) {
                 let mut chosen = None;
+                let mut passes: Vec<&Crossing> = Vec::new();
                 for c in run {
                     let before = winding > 0;
                     winding -= c.out * self.turn;
                     if (winding > 0) != before || chosen.is_none() {
                         chosen = Some(c);
                     }
+                    if (winding > 0) != before {
+                        passes.push(c);
+                    }
                 }
                 let Some(c) = chosen.filter(|c| c.edge >= 0 && (c.edge as usize) < lattice.cells[axis]) else {
                     continue;
                 };
                 let [i, j, k] = place(lattice, axis, c.line as usize, c.edge as usize);
-                let t = (c.x - lattice.coordinate(axis, c.edge as usize)) / lattice.step[axis];
-                let hit = Hit { t: directed::clear(t), normal: normals[c.face as usize] };
-                placed.push(Placed { row: lattice.row(j, k) as u32, at: i as u32, hit });
+                let part = |c: &Crossing| {
+                    directed::clear((c.x - lattice.coordinate(axis, c.edge as usize)) / lattice.step[axis])
+                };
+                let hit = |c: &Crossing| Hit { t: part(c), normal: normals[c.face as usize] };
+                let place = |hit: Hit| Placed { row: lattice.row(j, k) as u32, at: i as u32, hit };
+                placed.push(place(hit(c)));
+                if passes.len().is_multiple_of(2) {
+                    let width = |pair: &&[&Crossing]| part(pair[1]) - part(pair[0]);
+                    let widest = passes.chunks_exact(2).max_by(|a, b| width(a).total_cmp(&width(b)));
+                    let seen = widest.filter(|pair| width(pair) > directed::CLEARANCE);
+                    twice.extend(seen.into_iter().flatten().map(|c| place(hit(c))));
+                }
             }
         }
-        Hits::sorted(lattice.rows(), placed)
+        [placed, twice].map(|placed| Hits::sorted(lattice.rows(), placed))
     }
 
     /// The guess where counting gives two different sides but no crossing lies between them: the middle.
@@ -165,7 +180,11 @@ impl<'a> MeshField<'a> {
     ) -> Result<Directed, FieldError> {
         let winding = Winding::new(self.mesh);
         let sides = super::sample::sides(&winding, lattice, observer)?;
-        let axes = [0, 1, 2].map(|axis| self.hits(lattice, axis, &crossings[axis], normals));
+        let axes = [0, 1, 2].map(|axis| {
+            // Counting tells nothing of what lies between two nodes here.
+            let [hits, _] = self.hits(lattice, axis, &crossings[axis], normals);
+            hits
+        });
         let missing = |axis: usize, at: [usize; 3]| super::sample::hit_on_edge(&winding, lattice, axis, at);
         Ok(Directed::assemble(*lattice, sides, axes, &missing))
     }

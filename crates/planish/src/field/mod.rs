@@ -31,6 +31,7 @@ mod sample_field;
 mod scalar_grid;
 mod solid;
 mod sweep;
+mod twice;
 mod winding;
 
 pub use creases::MeshCreases;

@@ -4,6 +4,7 @@
 //! that the surface does not cross them, so the work grows with the surface.
 
 use super::directed::{self, Directed, Hit, Hits, Sides};
+use super::twice::{self, Near};
 use super::{Field, FieldError, Lattice, Side};
 use crate::geom::Aabb;
 use crate::observe::{Cancelled, Observer};
@@ -22,7 +23,9 @@ const FEW: usize = 2;
 /// # Errors
 /// [`FieldError::Cancelled`].
 pub fn sample(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> Result<Directed, FieldError> {
-    let sides = sides(field, lattice, observer)?;
+    // What passes an edge twice is told by exact fields: in others it would be noise.
+    let is_exact = field.noise_deg() == 0.0 && !field.in_batches();
+    let (sides, near) = sides_and_near(field, lattice, is_exact, observer)?;
     observer.check()?;
     let none = || Hits { start: vec![0; lattice.rows() + 1], ..Hits::default() };
     if field.in_batches() {
@@ -58,6 +61,7 @@ pub fn sample(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> 
     }
     found.mended = 0;
     found.noise_deg = field.noise_deg();
+    found.twice = twice::hits(field, lattice, near, observer)?;
     observer.progress(1.0);
     Ok(found)
 }
@@ -66,26 +70,36 @@ pub fn sample(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> 
 /// # Errors
 /// [`FieldError::Cancelled`].
 pub fn sides(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> Result<Sides, FieldError> {
+    Ok(sides_and_near(field, lattice, false, observer)?.0)
+}
+
+/// The sides of all nodes, and those near the surface if they are wanted.
+fn sides_and_near(
+    field: &dyn Field,
+    lattice: &Lattice,
+    is_wanted: bool,
+    observer: &dyn Observer,
+) -> Result<(Sides, Vec<Near>), Cancelled> {
     let (ny, nz) = (lattice.nodes(1), lattice.nodes(2));
     let slabs = nz.div_ceil(BRICK);
     let done = AtomicUsize::new(0);
-    let rows: Vec<Option<Vec<Vec<u32>>>> = (0..slabs)
+    let slabs_of: Vec<Option<(Vec<Vec<u32>>, Vec<Near>)>> = (0..slabs)
         .into_par_iter()
         .map(|s| {
             if observer.cancelled() {
                 return None;
             }
-            let slab = Slab { field, lattice, observer, k0: s * BRICK, k1: ((s + 1) * BRICK).min(nz) };
-            let rows = slab.sides()?;
+            let slab = Slab { field, lattice, observer, k0: s * BRICK, k1: ((s + 1) * BRICK).min(nz), is_wanted };
+            let found = slab.sides()?;
             let n = done.fetch_add(1, Ordering::Relaxed);
             observer.progress(0.7 * (n + 1) as f64 / slabs as f64);
-            Some(rows)
+            Some(found)
         })
         .collect();
-    let rows: Option<Vec<Vec<Vec<u32>>>> = rows.into_iter().collect();
-    let rows = rows.ok_or(Cancelled)?;
+    let found: Option<Vec<(Vec<Vec<u32>>, Vec<Near>)>> = slabs_of.into_iter().collect();
+    let (rows, near): (Vec<_>, Vec<_>) = found.ok_or(Cancelled)?.into_iter().unzip();
     debug_assert_eq!(rows.iter().map(Vec::len).sum::<usize>(), ny * nz);
-    Ok(Sides::from_rows(rows.into_iter().flatten()))
+    Ok((Sides::from_rows(rows.into_iter().flatten()), near.into_iter().flatten().collect()))
 }
 
 /// A few planes of nodes.
@@ -95,13 +109,16 @@ struct Slab<'a> {
     observer: &'a dyn Observer,
     k0: usize,
     k1: usize,
+    /// True to tell the nodes near the surface, too.
+    is_wanted: bool,
 }
 
 impl Slab<'_> {
-    fn sides(&self) -> Option<Vec<Vec<u32>>> {
+    fn sides(&self) -> Option<(Vec<Vec<u32>>, Vec<Near>)> {
         let (nx, ny, words) = (self.lattice.nodes(0), self.lattice.nodes(1), self.lattice.words());
         let rows = ny * (self.k1 - self.k0);
-        let mut bits = Bits { inside: vec![0; rows * words], known: vec![!0; rows * words], words, ny };
+        let (inside, known) = (vec![0; rows * words], vec![!0; rows * words]);
+        let mut bits = Bits { inside, known, words, ny, near: Vec::new() };
         let group = GROUPS[0] * BRICK;
         for j in (0..ny).step_by(group) {
             if self.observer.cancelled() {
@@ -115,7 +132,7 @@ impl Slab<'_> {
             let (a, b) = (r * words, (r + 1) * words);
             directed::changes_of(&bits.inside[a..b], &bits.known[a..b], nx)
         };
-        Some((0..rows).map(row).collect())
+        Some(((0..rows).map(row).collect(), std::mem::take(&mut bits.near)))
     }
 
     /// Settles the nodes `from..to` of all planes of the slab; `field` is good for them.
@@ -187,6 +204,9 @@ impl Slab<'_> {
         }
         let mut values = vec![0.0; points.len()];
         field.values(&points, &mut values);
+        if self.is_wanted {
+            twice::add_near(self.lattice, from, to, &values, &mut bits.near);
+        }
         let mut values = values.into_iter();
         for k in from[2]..to[2] {
             for j in from[1]..to[1] {
@@ -203,6 +223,7 @@ struct Bits {
     known: Vec<u64>,
     words: usize,
     ny: usize,
+    near: Vec<Near>,
 }
 
 impl Bits {
@@ -238,12 +259,12 @@ pub fn hit_on_edge(field: &dyn Field, lattice: &Lattice, axis: usize, [i, j, k]:
 }
 
 /// The way out along an edge whose lower end has the value `f0`: 1 or -1.
-fn outward(f0: f64) -> f64 {
+pub(super) fn outward(f0: f64) -> f64 {
     if f0 < 0.0 { 1.0 } else { -1.0 }
 }
 
 /// The normal of a hit; at a flat spot from inside to outside along its edge.
-fn steady(gradient: DVec3, axis: usize, outward: f64) -> DVec3 {
+pub(super) fn steady(gradient: DVec3, axis: usize, outward: f64) -> DVec3 {
     if gradient != DVec3::ZERO && gradient.is_finite() {
         return gradient;
     }
@@ -265,7 +286,7 @@ pub fn root(f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
 }
 
 /// Where `f` passes zero between 0 and 1, to `precision`.
-fn root_within(precision: f64, f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
+pub(super) fn root_within(precision: f64, f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
     let mut bracket = Bracket::new(precision, f0, f1);
     while let Some(x) = bracket.ask() {
         bracket.tell(x, f(x));

@@ -38,7 +38,8 @@ pub const FACE_POINT: u8 = u8::MAX;
 /// A patch over one loop, or over two that a tunnel joins.
 struct Patch {
     loops: Vec<usize>,
-    regions: u8,
+    /// Bits of its regions.
+    regions: u64,
     depth: usize,
 }
 
@@ -61,10 +62,10 @@ pub fn caps(
 ) {
     let middle = (corners[0] + corners[7]) / 2.0;
     let boundary = Boundary::new(corners, config, loops);
-    let Boundary { region, sides, .. } = &boundary;
+    let Boundary { sides, .. } = &boundary;
     // Regions that are reached from `start` without passing a loop for which `stop` holds.
     let reach = |start: usize, stop: &dyn Fn(usize) -> bool| {
-        let mut seen = 1u8 << start;
+        let mut seen = 1u64 << start;
         loop {
             let before = seen;
             for (l, [a, b]) in sides.iter().enumerate() {
@@ -80,10 +81,7 @@ pub fn caps(
     let root = match tunnel {
         // Any region but the one between the two.
         Some([l, m]) => sides[l].into_iter().find(|r| !sides[m].contains(r)).unwrap_or(sides[l][0]),
-        None => {
-            let size = |r: usize| region.iter().filter(|&&x| x == r).count();
-            (0..8).filter(|&r| size(r) > 0).max_by_key(|&r| (size(r), 8 - r)).unwrap_or(0)
-        }
+        None => boundary.largest(),
     };
     let mut patches: Vec<Patch> = Vec::new();
     for l in 0..loops.len() {
@@ -116,8 +114,8 @@ pub fn caps(
 struct Boundary<'a> {
     loops: &'a [&'a [Corner]],
     pieces: Vec<Piece>,
-    /// As of [`regions`].
-    region: [usize; 8],
+    /// For each piece the region of the boundary that it is part of, named by its first piece.
+    region: Vec<usize>,
     /// The two regions beside each loop: that of the body and that of free space.
     sides: Vec<[usize; 2]>,
 }
@@ -128,6 +126,12 @@ struct Piece {
     /// Corners of the cell among its vertices.
     corners: Vec<usize>,
     outline: Vec<Node>,
+    /// True if it lies in the body.
+    inside: bool,
+    /// Loops along it.
+    loops: Vec<usize>,
+    /// Its parts of the edges of the cell, by the keys of their ends.
+    rims: Vec<[u64; 2]>,
 }
 
 #[derive(Clone, Copy)]
@@ -141,71 +145,102 @@ fn node(c: &Corner) -> Node {
     Node { key: c.id as u64 + 8, p: c.p }
 }
 
-/// Cuts every face along its segments.
-fn pieces(corners: &[DVec3; 8], loops: &[&[Corner]]) -> Vec<Piece> {
-    let mut pieces = Vec::new();
-    for f in 0..6 {
-        // The segments of the face: from an entering edge to a leaving one, over face points.
-        let mut chains: Vec<Vec<Corner>> = Vec::new();
-        for l in loops {
-            for start in 0..l.len() {
-                if l[start].edge == FACE_POINT || l[start].face as usize != f {
-                    continue;
-                }
-                let mut chain = vec![l[start]];
-                let mut at = (start + 1) % l.len();
-                while l[at].edge == FACE_POINT {
-                    chain.push(l[at]);
-                    at = (at + 1) % l.len();
-                }
-                chain.push(l[at]);
-                chains.push(chain);
-            }
-        }
-        // Walk the outline; at a hit, either follow its segment or stay on the outline.
-        let mut ring: Vec<(Node, Option<usize>, Option<usize>)> = Vec::new();
-        for m in 0..4 {
-            let c = FACES[f][m];
-            ring.push((Node { key: c as u64, p: corners[c] }, Some(c), None));
-            let e = FACE_EDGES[f][m] as u8;
-            for (n, chain) in chains.iter().enumerate() {
-                for end in [chain.first(), chain.last()].into_iter().flatten() {
-                    if end.edge == e {
-                        ring.push((node(end), None, Some(n)));
-                    }
-                }
-            }
-        }
-        let mut used = [false; 4];
-        for m in 0..4 {
-            if used[m] {
+/// A vertex on the outline of a face.
+struct OnRing {
+    node: Node,
+    /// The corner of the cell that it is.
+    corner: Option<usize>,
+    /// The segment that it ends.
+    segment: Option<usize>,
+}
+
+/// A segment of a face: from a hit over face points to a hit, and its loop.
+type Segment = (Vec<Corner>, usize);
+
+/// The segments of a face.
+fn segments(face: usize, loops: &[&[Corner]]) -> Vec<Segment> {
+    let mut segments: Vec<Segment> = Vec::new();
+    for (number, l) in loops.iter().enumerate() {
+        for start in 0..l.len() {
+            if l[start].edge == FACE_POINT || l[start].face as usize != face {
                 continue;
             }
-            let mut piece = Piece { face: f, corners: Vec::new(), outline: Vec::new() };
-            let start = ring.iter().position(|r| r.1 == Some(FACES[f][m])).unwrap_or(0);
+            let mut chain = vec![l[start]];
+            let mut at = (start + 1) % l.len();
+            while l[at].edge == FACE_POINT {
+                chain.push(l[at]);
+                at = (at + 1) % l.len();
+            }
+            chain.push(l[at]);
+            segments.push((chain, number));
+        }
+    }
+    segments
+}
+
+/// The outline of a face, counter-clockwise.
+fn ring(corners: &[DVec3; 8], face: usize, segments: &[Segment]) -> Vec<OnRing> {
+    let mut ring: Vec<OnRing> = Vec::new();
+    for m in 0..4 {
+        let c = FACES[face][m];
+        ring.push(OnRing { node: Node { key: c as u64, p: corners[c] }, corner: Some(c), segment: None });
+        let (e, first) = (FACE_EDGES[face][m] as u8, ring.len());
+        for (n, (chain, _)) in segments.iter().enumerate() {
+            for end in [chain.first(), chain.last()].into_iter().flatten().filter(|end| end.edge == e) {
+                ring.push(OnRing { node: node(end), corner: None, segment: Some(n) });
+            }
+        }
+        let from = |n: &OnRing| n.node.p.distance_squared(corners[c]);
+        ring[first..].sort_by(|a, b| from(a).total_cmp(&from(b)));
+    }
+    ring
+}
+
+/// Cuts every face along its segments.
+fn pieces(corners: &[DVec3; 8], config: u8, loops: &[&[Corner]]) -> Vec<Piece> {
+    let mut pieces = Vec::new();
+    for face in 0..6 {
+        let segments = segments(face, loops);
+        let ring = ring(corners, face, &segments);
+        // Whether the outline after each vertex lies in the body.
+        let mut is_inside = false;
+        let inside: Vec<bool> = (ring.iter())
+            .map(|n| {
+                is_inside = n.corner.map_or(!is_inside, |c| config >> c & 1 != 0);
+                is_inside
+            })
+            .collect();
+        let mut used = vec![false; ring.len()];
+        for start in 0..ring.len() {
+            if used[start] {
+                continue;
+            }
+            let (outline, corners, loops, rims) = Default::default();
+            let mut piece = Piece { face, corners, outline, inside: inside[start], loops, rims };
             let mut at = start;
             loop {
-                let (n, corner, chain) = ring[at];
-                piece.outline.push(n);
-                if let Some(c) = corner {
-                    piece.corners.push(c);
-                    used[FACES[f].iter().position(|&x| x == c).unwrap_or(0)] = true;
-                }
-                if let Some(c) = chain {
-                    // Across to the other end of the segment.
-                    let chain = &chains[c];
-                    let forward = node(&chain[0]).key == n.key;
-                    let inner: Vec<&Corner> = chain[1..chain.len() - 1].iter().collect();
-                    if forward {
-                        piece.outline.extend(inner.iter().map(|c| node(c)));
+                // Along the outline; at a hit across, to the other end of its segment.
+                used[at] = true;
+                piece.outline.push(ring[at].node);
+                piece.corners.extend(ring[at].corner);
+                let next = (at + 1) % ring.len();
+                let ends = [ring[at].node.key, ring[next].node.key];
+                piece.rims.push([ends[0].min(ends[1]), ends[0].max(ends[1])]);
+                at = next;
+                if let Some((chain, own)) = ring[at].segment.map(|n| &segments[n]) {
+                    piece.loops.push(*own);
+                    piece.outline.push(ring[at].node);
+                    let is_forward = node(&chain[0]).key == ring[at].node.key;
+                    let inner = chain[1..chain.len() - 1].iter().map(node);
+                    let other = if is_forward {
+                        piece.outline.extend(inner);
+                        &chain[chain.len() - 1]
                     } else {
-                        piece.outline.extend(inner.iter().rev().map(|c| node(c)));
-                    }
-                    let other = node(if forward { &chain[chain.len() - 1] } else { &chain[0] });
-                    piece.outline.push(other);
-                    at = ring.iter().position(|r| r.0.key == other.key).unwrap_or(at);
+                        piece.outline.extend(inner.rev());
+                        &chain[0]
+                    };
+                    at = ring.iter().position(|n| n.node.key == node(other).key).unwrap_or(at);
                 }
-                at = (at + 1) % ring.len();
                 if at == start {
                     break;
                 }
@@ -216,15 +251,17 @@ fn pieces(corners: &[DVec3; 8], loops: &[&[Corner]]) -> Vec<Piece> {
     pieces
 }
 
-/// For each corner of the cell the region of the boundary it lies in, named by its least corner.
-fn regions(pieces: &[Piece]) -> [usize; 8] {
-    let mut region = [0, 1, 2, 3, 4, 5, 6, 7];
+/// For each piece its region: pieces of two faces with a common part of an edge are of one.
+fn regions(pieces: &[Piece]) -> Vec<usize> {
+    let mut region: Vec<usize> = (0..pieces.len()).collect();
     loop {
-        let before = region;
-        for piece in pieces {
-            let least = piece.corners.iter().map(|&c| region[c]).min().unwrap_or(0);
-            for &c in &piece.corners {
-                region[c] = least;
+        let before = region.clone();
+        for (p, piece) in pieces.iter().enumerate() {
+            for (q, other) in pieces[..p].iter().enumerate() {
+                if piece.rims.iter().any(|rim| other.rims.contains(rim)) {
+                    let least = region[p].min(region[q]);
+                    (region[p], region[q]) = (least, least);
+                }
             }
         }
         if region == before {
@@ -233,25 +270,10 @@ fn regions(pieces: &[Piece]) -> [usize; 8] {
     }
 }
 
-/// Regions on the body's side and on the free side of a loop.
-fn beside(l: &[Corner], pieces: &[Piece], region: &[usize; 8], config: u8) -> [usize; 2] {
-    let mut sides = [0, 0];
-    for piece in pieces {
-        let touches = |c: &Corner| {
-            c.edge != FACE_POINT && c.face as usize == piece.face && piece.outline.iter().any(|n| n.key == node(c).key)
-        };
-        if l.iter().any(touches) {
-            for &c in &piece.corners {
-                sides[(config >> c & 1 == 0) as usize] = region[c];
-            }
-        }
-    }
-    sides
-}
-
-/// For each corner of the cell its region between the loops.
-pub fn regions_of(corners: &[DVec3; 8], loops: &[&[Corner]]) -> [usize; 8] {
-    regions(&pieces(corners, loops))
+/// For each corner of the cell its region between the loops, named by its least corner.
+pub fn regions_of(corners: &[DVec3; 8], config: u8, loops: &[&[Corner]]) -> [usize; 8] {
+    let boundary = Boundary::new(corners, config, loops);
+    std::array::from_fn(|c| boundary.least_corner(boundary.at_corner(c)).unwrap_or(c))
 }
 
 /// The two loops that lie between two regions next to a common third: those that a tunnel between the regions joins.
@@ -262,10 +284,10 @@ pub fn loops_between(
     from: usize,
     to: usize,
 ) -> Option<[usize; 2]> {
-    let Boundary { region, sides, .. } = Boundary::new(corners, config, loops);
-    let (from, to) = (region[from], region[to]);
-    for (l, a) in sides.iter().enumerate() {
-        for (m, b) in sides.iter().enumerate() {
+    let boundary = Boundary::new(corners, config, loops);
+    let (from, to) = (boundary.at_corner(from), boundary.at_corner(to));
+    for (l, a) in boundary.sides.iter().enumerate() {
+        for (m, b) in boundary.sides.iter().enumerate() {
             if l != m
                 && a.contains(&from)
                 && b.contains(&to)
@@ -280,10 +302,35 @@ pub fn loops_between(
 
 impl<'a> Boundary<'a> {
     fn new(corners: &[DVec3; 8], config: u8, loops: &'a [&'a [Corner]]) -> Boundary<'a> {
-        let pieces = pieces(corners, loops);
+        let pieces = pieces(corners, config, loops);
         let region = regions(&pieces);
-        let sides = loops.iter().map(|l| beside(l, &pieces, &region, config)).collect();
+        let mut sides = vec![[0, 0]; loops.len()];
+        for (piece, &own) in pieces.iter().zip(&region) {
+            piece.loops.iter().for_each(|&l| sides[l][usize::from(!piece.inside)] = own);
+        }
         Boundary { loops, pieces, region, sides }
+    }
+
+    /// The region of a corner of the cell.
+    fn at_corner(&self, corner: usize) -> usize {
+        let piece = self.pieces.iter().position(|piece| piece.corners.contains(&corner));
+        piece.map_or(0, |p| self.region[p])
+    }
+
+    /// The corners of the cell in a region, some more than once.
+    fn corners_of(&self, region: usize) -> impl Iterator<Item = usize> + '_ {
+        let own = self.pieces.iter().zip(&self.region).filter(move |(_, r)| **r == region);
+        own.flat_map(|(piece, _)| piece.corners.iter().copied())
+    }
+
+    fn least_corner(&self, region: usize) -> Option<usize> {
+        self.corners_of(region).min()
+    }
+
+    /// The region with most corners of the cell.
+    fn largest(&self) -> usize {
+        let size = |&r: &usize| (self.corners_of(r).count(), self.least_corner(r).map(std::cmp::Reverse));
+        self.region.iter().copied().max_by_key(size).unwrap_or(0)
     }
 
     /// Makes a patch: its caps, shrunk towards the middle, and the collars around them.
@@ -316,9 +363,8 @@ impl<'a> Boundary<'a> {
         // The side on which the loops see the patch: a cap of the body is seen from the middle.
         let Some(first) = patch.loops.first().map(|&l| self.sides[l]) else { return };
         let body = patch.regions >> first[0] & 1 != 0;
-        for piece in &self.pieces {
-            let own = piece.corners.first().is_some_and(|&c| patch.regions >> self.region[c] & 1 != 0);
-            if !own {
+        for (piece, &region) in self.pieces.iter().zip(&self.region) {
+            if patch.regions >> region & 1 == 0 {
                 continue;
             }
             let axis = piece.face / 2;

@@ -7,7 +7,8 @@
 
 use super::caps::FACE_POINT;
 use super::crossings::{edge_point, joined};
-use super::{AMBIGUOUS, FACE_EDGES, links};
+use super::twice::{Pass, TwicePassed, low_segments};
+use super::{AMBIGUOUS, Chain, FACE_EDGES, links};
 use crate::contour::Thresholds;
 use crate::contour::walk::Cell;
 use crate::field::{Creases, Directed};
@@ -54,60 +55,131 @@ const CROSSING: f64 = 0.02;
 const FARTHEST_MEETING: f64 = 0.75;
 
 /// Face points of the three faces at the least node of each cell.
+/// * `twice` - cells with edges that are passed twice
 pub fn face_points<'a>(
     field: &Directed,
     limits: &Thresholds,
     refine: Option<&dyn Creases>,
+    twice: &TwicePassed,
     cells: impl Iterator<Item = &'a Cell>,
 ) -> Part {
     let (mut part, base) = (Part::default(), field.first_names());
     for cell in cells {
         // The three faces at the least node; every face between two cells is one of these.
+        if twice.contains(cell.at) {
+            points_of_crowded_faces(field, limits, refine, (cell, twice), &mut part);
+            continue;
+        }
         let ambiguous = AMBIGUOUS[cell.config as usize];
         let low = ambiguous & 0b010101;
         let links = links(cell.config, if low == 0 { 0 } else { joined(field, cell, low) });
         for axis in 0..3 {
-            let face = 2 * axis;
-            let mut found: [Option<(FacePoint, Option<DVec3>)>; 2] = [None, None];
-            let mut segments = 0;
-            for &e in &FACE_EDGES[face] {
-                if links.next[e] == FACE_POINT || links.face[e] as usize != face {
-                    continue;
-                }
-                segments += 1;
-                let next = links.next[e] as usize;
-                let [a, b] = [e, next].map(|e| {
-                    let hit = &field.axes[e / 4].hits[cell.hit[e] as usize];
-                    (base[e / 4] + cell.hit[e], edge_point(field, cell, e, hit.t), hit.normal)
-                });
-                let cosine = a.2.dot(b.2);
-                let found_at = if cosine < limits.sharp {
-                    place(field, cell, axis, refine, (a.1, a.2), (b.1, b.2)).map(|(p, wish)| (p, wish, true))
-                } else if cosine < limits.faint {
-                    faint(field, cell, axis, refine, (a.1, a.2), (b.1, b.2)).map(|(p, tagged)| (p, None, tagged))
-                } else {
-                    None
-                };
-                if let Some((p, wish, tagged)) = found_at {
-                    let hits = [a.0.min(b.0), a.0.max(b.0)];
-                    let point = FacePoint { at: cell.at[0] as u32, hits, p, tagged };
-                    found[segments - 1] = Some((point, wish));
-                }
+            let segments = segments(field, cell, &base, &links, 2 * axis);
+            let seek = |&[a, b]: &[Pass; 2]| point(field, cell, axis, (limits, refine), (&a, &b));
+            let mut found: Vec<Option<Found>> = segments.iter().map(seek).collect();
+            if segments.len() == 2 && !apart(axis, &segments, &found) {
+                found.fill(None);
             }
-            if segments == 2 && !apart(field, cell, axis, &links.next, &found) {
-                found = [None, None];
-            }
-            let row = field.lattice.row(cell.at[1], cell.at[2]) as u32;
-            for (point, wish) in found.into_iter().flatten() {
-                part.points[axis].push((row, point));
-                if let Some(wish) = wish {
-                    part.wishes.push((axis, row, point.at, point.hits, wish));
-                }
-            }
+            part.add(field, cell, axis, found);
         }
     }
     part
 }
+
+/// A face point and where it belongs, if that is elsewhere.
+type Found = (FacePoint, Option<DVec3>);
+
+impl Part {
+    fn add(&mut self, field: &Directed, cell: &Cell, axis: usize, found: Vec<Option<Found>>) {
+        let row = field.lattice.row(cell.at[1], cell.at[2]) as u32;
+        for (point, wish) in found.into_iter().flatten() {
+            self.points[axis].push((row, point));
+            if let Some(wish) = wish {
+                self.wishes.push((axis, row, point.at, point.hits, wish));
+            }
+        }
+    }
+}
+
+/// The segments of a face of a cell without edges that are passed twice.
+fn segments(field: &Directed, cell: &Cell, base: &[u32; 3], links: &Chain, face: usize) -> Vec<[Pass; 2]> {
+    let is_here = |e: &&usize| links.next[**e] != FACE_POINT && links.face[**e] as usize == face;
+    let pass = |e: usize| {
+        let hit = &field.axes[e / 4].hits[cell.hit[e] as usize];
+        let id = base[e / 4] + cell.hit[e];
+        Pass { id, edge: e as u8, p: edge_point(field, cell, e, hit.t), n: hit.normal }
+    };
+    FACE_EDGES[face].iter().filter(is_here).map(|&e| [e, links.next[e] as usize].map(pass)).collect()
+}
+
+/// The face point of a segment, if it has one.
+fn point(
+    field: &Directed,
+    cell: &Cell,
+    axis: usize,
+    (limits, refine): (&Thresholds, Option<&dyn Creases>),
+    (a, b): (&Pass, &Pass),
+) -> Option<Found> {
+    let cosine = a.n.dot(b.n);
+    let (p, wish, tagged) = if cosine < limits.sharp {
+        place(field, cell, axis, refine, (a.p, a.n), (b.p, b.n)).map(|(p, wish)| (p, wish, true))?
+    } else if cosine < limits.faint {
+        faint(field, cell, axis, refine, (a.p, a.n), (b.p, b.n)).map(|(p, tagged)| (p, None, tagged))?
+    } else {
+        return None;
+    };
+    let hits = [a.id.min(b.id), a.id.max(b.id)];
+    Some((FacePoint { at: cell.at[0] as u32, hits, p, tagged }, wish))
+}
+
+/// Face points of the faces at the least node of a cell with edges that are passed twice. A segment between two hits on one edge
+/// has one always: halfway between them and as far into the face as half their distance, if their tangents do not meet there. What would
+/// meet others comes nearer to its edge, or goes.
+fn points_of_crowded_faces(
+    field: &Directed,
+    limits: &Thresholds,
+    refine: Option<&dyn Creases>,
+    (cell, twice): (&Cell, &TwicePassed),
+    part: &mut Part,
+) {
+    let hits = twice.hits(field, cell);
+    let [i, j, k] = cell.at;
+    let middle = (field.lattice.node(i, j, k) + field.lattice.node(i + 1, j + 1, k + 1)) / 2.0;
+    for axis in 0..3 {
+        let segments = low_segments(field, cell, &hits, axis);
+        let is_tip = |s: &[Pass; 2]| s[0].edge == s[1].edge;
+        let own = |s: &[Pass; 2]| {
+            let found = point(field, cell, axis, (limits, refine), (&s[0], &s[1]));
+            if found.is_some() || !is_tip(s) {
+                return found;
+            }
+            let [a, b] = s;
+            let between = (a.p + b.p) / 2.0;
+            let mut inwards = middle - between;
+            (inwards[axis], inwards[a.edge as usize / 4]) = (0.0, 0.0);
+            let p = between + inwards.normalize_or_zero() * (a.p.distance(b.p) / 2.0).min(inwards.length());
+            let hits = [a.id.min(b.id), a.id.max(b.id)];
+            Some((FacePoint { at: cell.at[0] as u32, hits, p, tagged: a.n.dot(b.n) < limits.sharp }, None))
+        };
+        let mut found: Vec<Option<Found>> = segments.iter().map(own).collect();
+        if !apart(axis, &segments, &found) {
+            (found.iter_mut().zip(&segments)).filter(|(_, s)| !is_tip(s)).for_each(|(found, _)| *found = None);
+        }
+        for _ in 0..MOST_HALVINGS {
+            if apart(axis, &segments, &found) {
+                break;
+            }
+            for ((point, wish), [a, b]) in found.iter_mut().zip(&segments).filter_map(|(f, s)| Some((f.as_mut()?, s))) {
+                *wish = wish.or(Some(point.p));
+                point.p = point.p.lerp((a.p + b.p) / 2.0, 0.5);
+            }
+        }
+        part.add(field, cell, axis, found);
+    }
+}
+
+/// Halvings after which a point is as near to its edge as numbers can tell.
+const MOST_HALVINGS: usize = 24;
 
 /// Where a bend that only the source knows passes the face, and whether it is a feature.
 fn faint(
@@ -184,35 +256,20 @@ fn place(
     Some((kept, Some(wish)))
 }
 
-/// True if the two polylines of a face do not meet.
-fn apart(
-    field: &Directed,
-    cell: &Cell,
-    axis: usize,
-    next: &[u8; 12],
-    found: &[Option<(FacePoint, Option<DVec3>)>; 2],
-) -> bool {
-    let face = 2 * axis;
-    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-    let flat = |p: DVec3| DVec2::new(p[u], p[v]);
-    let mut lines: Vec<Vec<DVec2>> = Vec::new();
-    for &e in &FACE_EDGES[face] {
-        let to = next[e] as usize;
-        if to >= 12 || !FACE_EDGES[face].contains(&to) || lines.len() == 2 {
-            continue;
-        }
-        let at = |e: usize| flat(edge_point(field, cell, e, field.axes[e / 4].hits[cell.hit[e] as usize].t));
-        let mut line = vec![at(e)];
-        line.extend(found[lines.len()].map(|f| flat(f.0.p)));
-        line.push(at(to));
-        lines.push(line);
-    }
-    let [a, b] = &lines[..] else { return true };
-    a.windows(2).all(|s| b.windows(2).all(|t| !segments_meet(s[0], s[1], t[0], t[1])))
+/// True if no two polylines of a face meet.
+fn apart(axis: usize, segments: &[[Pass; 2]], found: &[Option<Found>]) -> bool {
+    let flat = |p: DVec3| DVec2::new(p[(axis + 1) % 3], p[(axis + 2) % 3]);
+    let line = |([a, b], found): (&[Pass; 2], &Option<Found>)| -> Vec<DVec2> {
+        [Some(a.p), found.map(|f| f.0.p), Some(b.p)].into_iter().flatten().map(flat).collect()
+    };
+    let lines: Vec<Vec<DVec2>> = segments.iter().zip(found).map(line).collect();
+    let meet =
+        |a: &[DVec2], b: &[DVec2]| a.windows(2).any(|s| b.windows(2).any(|t| segments_meet(s[0], s[1], t[0], t[1])));
+    (1..lines.len()).all(|n| lines[..n].iter().all(|other| !meet(&lines[n], other)))
 }
 
 impl FacePoints {
-    /// Puts the parts of consecutive layers together; names begin at `first`.
+    /// Puts parts together; names begin at `first`.
     pub fn join(field: &Directed, parts: Vec<Part>, first: u32) -> (FacePoints, Vec<Wish>) {
         let mut all = FacePoints::default();
         let rows = field.lattice.rows();
@@ -220,9 +277,11 @@ impl FacePoints {
         for axis in 0..3 {
             all.base[axis] = name;
             let mut start = vec![0u32; rows + 1];
-            for (row, point) in parts.iter().flat_map(|p| &p.points[axis]) {
-                start[*row as usize + 1] += 1;
-                all.points[axis].push(*point);
+            let mut points: Vec<(u32, FacePoint)> = parts.iter().flat_map(|p| &p.points[axis]).copied().collect();
+            points.sort_by_key(|(row, point)| (*row, point.at));
+            for (row, point) in points {
+                start[row as usize + 1] += 1;
+                all.points[axis].push(point);
             }
             for r in 0..rows {
                 start[r + 1] += start[r];

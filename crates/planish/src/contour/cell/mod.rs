@@ -13,6 +13,7 @@ pub(crate) mod face;
 pub(crate) mod feature;
 pub(crate) mod patch;
 pub(crate) mod topology;
+pub(crate) mod twice;
 
 /// Corners of each edge.
 pub const EDGES: [[usize; 2]; 12] =

@@ -13,6 +13,7 @@ use super::crossings::{joined, values};
 use super::face::{FacePoints, Wish};
 use super::feature::{Shape, classify, solve};
 use super::topology::Trilinear;
+use super::twice::{Passes, TwicePassed};
 use super::{AMBIGUOUS, CROSSED, EDGE_FACES, links};
 use crate::contour::Thresholds;
 use crate::contour::polish::local::CellRange;
@@ -65,6 +66,8 @@ pub struct Patcher<'a> {
     pub refine: Option<&'a dyn Creases>,
     /// First name of the hits of each axis.
     pub base: [u32; 3],
+    /// Cells with edges that are passed twice.
+    pub twice: &'a TwicePassed,
 }
 
 /// Buffers that are used again for every cell.
@@ -155,6 +158,9 @@ impl Patcher<'_> {
     fn loops(&self, cell: &Cell, scratch: &mut Scratch) {
         scratch.corners.clear();
         scratch.ends.clear();
+        if self.twice.contains(cell.at) {
+            return self.loops_over(cell, &self.twice.passes(self.field, cell), scratch);
+        }
         let ambiguous = AMBIGUOUS[cell.config as usize];
         let joined = if ambiguous == 0 { 0 } else { joined(self.field, cell, ambiguous) };
         let chain = links(cell.config, joined);
@@ -176,6 +182,33 @@ impl Patcher<'_> {
         }
     }
 
+    /// The same with edges that are passed twice; points between two hits on one edge are in the loops already.
+    fn loops_over(&self, cell: &Cell, Passes { hits, next }: &Passes, scratch: &mut Scratch) {
+        let mut is_left = vec![true; hits.len()];
+        while let Some(first) = is_left.iter().position(|left| *left) {
+            let mut at = first;
+            while is_left[at] {
+                is_left[at] = false;
+                let (hit, (to, face)) = (&hits[at], next[at]);
+                let faces = EDGE_FACES[hit.edge as usize];
+                let own = Corner { id: hit.id, p: hit.p, n: hit.n, faces, edge: hit.edge, face, tagged: false };
+                scratch.corners.push(own);
+                if hits[to].edge == hit.edge {
+                    scratch.corners.extend(self.face_point(cell, &own, hits[to].id));
+                }
+                at = to;
+            }
+            scratch.ends.push(scratch.corners.len());
+        }
+    }
+
+    /// The point of a face between two hits, if there is one.
+    fn face_point(&self, cell: &Cell, from: &Corner, to: u32) -> Option<Corner> {
+        let (id, p, tagged) = self.faces.find(self.field, cell, from.face as usize, from.id, to)?;
+        let (n, face) = (DVec3::ZERO, from.face);
+        Some(Corner { id, p, n, faces: 1 << face, edge: FACE_POINT, face, tagged })
+    }
+
     /// Name, position and normal of the hit on edge `e`.
     fn hit(&self, cell: &Cell, e: usize) -> (u32, DVec3, DVec3) {
         let axis = e / 4;
@@ -190,11 +223,8 @@ impl Patcher<'_> {
         for (k, c) in l.iter().enumerate() {
             out.push(*c);
             let next = &l[(k + 1) % l.len()];
-            if c.n.dot(next.n) < self.limits.faint
-                && let Some((id, p, tagged)) = self.faces.find(self.field, cell, c.face as usize, c.id, next.id)
-            {
-                let n = DVec3::ZERO;
-                out.push(Corner { id, p, n, faces: 1 << c.face, edge: FACE_POINT, face: c.face, tagged });
+            if c.edge != FACE_POINT && next.edge != FACE_POINT && c.n.dot(next.n) < self.limits.faint {
+                out.extend(self.face_point(cell, c, next.id));
             }
         }
         out
@@ -211,13 +241,12 @@ impl Patcher<'_> {
         features: bool,
     ) {
         scratch.normals.clear();
-        scratch.normals.extend(l.iter().map(|c| c.n));
+        let is_hit = |c: &&Corner| c.edge != FACE_POINT;
+        scratch.normals.extend(l.iter().filter(is_hit).map(|c| c.n));
         let mut shape = classify(&scratch.normals, self.limits.sharp, self.limits.corner);
         if shape == Shape::Smooth {
             // A bend that only the source knows.
-            if self.limits.faint > self.limits.sharp
-                && (0..l.len()).any(|k| l[k].n.dot(l[(k + 1) % l.len()].n) < self.limits.faint)
-            {
+            if self.limits.faint > self.limits.sharp && bends(l, self.limits.faint) {
                 let with = self.with_face_points(cell, l);
                 if with.len() > l.len() {
                     *l = with;
@@ -232,7 +261,7 @@ impl Patcher<'_> {
             return;
         }
         scratch.planes.clear();
-        scratch.planes.extend(l.iter().map(|c| (c.p, c.n)));
+        scratch.planes.extend(l.iter().filter(is_hit).map(|c| (c.p, c.n)));
         *l = self.with_face_points(cell, l);
         let points: Vec<DVec3> = l.iter().filter(|c| c.tagged).map(|c| c.p).collect();
         let hits = scratch.planes.iter().map(|p| p.0).sum::<DVec3>() / scratch.planes.len() as f64;
@@ -346,7 +375,7 @@ impl Patcher<'_> {
             loops.push(&scratch.corners[first..end]);
             first = end;
         }
-        let region = caps::regions_of(&cell_corners(low, high), &loops);
+        let region = caps::regions_of(&cell_corners(low, high), cell.config, &loops);
         // Euler number of the part of the boundary below: each region is a sphere with a hole per loop on its boundary.
         let below = boundary_euler(cell.config, &region, loops.len());
         if 2 * trilinear.euler_below() - below >= loops.len() as i32 {
@@ -394,6 +423,13 @@ pub fn inside(p: DVec3, low: DVec3, high: DVec3) -> (DVec3, bool) {
 
 /// Fraction of [`CELL_MARGIN`] from which on a vertex is left alone.
 const UNMOVED_SHARE: f64 = 1e-3;
+
+/// True if the normals of two hits that follow each other have a cosine below `faint`.
+fn bends(l: &[Corner], faint: f64) -> bool {
+    let pairs = (0..l.len()).map(|k| [&l[k], &l[(k + 1) % l.len()]]);
+    let mut of_hits = pairs.filter(|pair| pair.iter().all(|c| c.edge != FACE_POINT));
+    of_hits.any(|[a, b]| a.n.dot(b.n) < faint)
+}
 
 fn within(p: DVec3, low: DVec3, high: DVec3, reach: f64) -> bool {
     let slack = (high - low) * reach;

@@ -43,8 +43,6 @@ pub struct Local<'a> {
     /// The mesh. Merged triangles stay as [`GONE`].
     pub mesh: &'a mut TriMesh,
     field: &'a Directed,
-    /// First name of the hits of each axis.
-    base: [u32; 3],
     /// Cells along the axes.
     size: [usize; 3],
     /// Cells in the order of z, y, x.
@@ -147,7 +145,6 @@ impl<'a> Local<'a> {
         Local {
             mesh,
             field,
-            base: field.first_names(),
             size,
             cells,
             rows,
@@ -550,8 +547,7 @@ impl<'a> Local<'a> {
 
     /// Normal of a hit; none for other vertices.
     pub fn normal(&self, v: u32) -> Option<DVec3> {
-        let axis = (0..3).rev().find(|&a| v >= self.base[a])?;
-        self.field.axes[axis].hits.get((v - self.base[axis]) as usize).map(|h| h.normal)
+        self.field.normal(v)
     }
 
     /// True if the changed triangles, as they are now, meet nothing and not each other.
