@@ -136,15 +136,23 @@ fn a_decimation_that_cannot_go_as_far_as_asked_is_told_and_targets_that_are_none
 }
 
 #[test]
-fn a_plate_thinner_than_the_voxel_is_told_with_the_voxel_that_it_needs() {
+fn a_fin_thinner_than_the_voxel_is_kept_and_two_in_one_cell_are_told_with_the_voxel_that_they_need() {
     let folder = tempfile::tempdir().unwrap();
-    let part = "[solid.block]\nbox = { size = [4, 4, 4] }\n[solid.fin]\nbox = { size = [10, 4, 0.03] }\n[solid.part]\nunion = [\"block\", \"fin\"]\n";
-    fs::write(folder.path().join("fin.toml"), part).unwrap();
-    done(&["mesh", "fin.toml", "-o", "fin.ply", "--voxel", "0.012", "-q", "--memory", "4"], folder.path());
-    let output = planish(&["mesh", "fin.ply", "-o", "out.ply", "--voxel", "0.2"], folder.path());
-    assert_eq!(output.status.code(), Some(0));
-    let told = text(&output.stderr);
-    assert!(told.contains("thinner than the voxel") && told.contains("0.03"), "{told}");
+    let block = "[solid.block]\nbox = { size = [4, 4, 4] }\n[solid.fin]\nbox = { size = [10, 4, 0.03] }\n";
+    let other = "[solid.other]\nbox = { size = [10, 4, 0.03] }\nmove = [0, 0, 0.06]\n";
+    let told = |name: &str, part: String| {
+        fs::write(folder.path().join("fin.toml"), part).unwrap();
+        let made = format!("{name}.ply");
+        done(&["mesh", "fin.toml", "-o", &made, "--voxel", "0.012", "-q", "--memory", "4"], folder.path());
+        let output = planish(&["mesh", &made, "-o", "out.ply", "--voxel", "0.2", "--force"], folder.path());
+        assert_eq!(output.status.code(), Some(0));
+        let mesh = planish_io::read_mesh(folder.path().join("out.ply")).unwrap();
+        (text(&output.stderr), mesh.bounds().size().x, planish::mesh::diagnose(&mesh).components)
+    };
+    let (warned, length, pieces) = told("fin", format!("{block}[solid.part]\nunion = [\"block\", \"fin\"]\n"));
+    assert!(!warned.contains("too thin") && (length - 10.0).abs() < 0.1 && pieces == 1, "{length} {pieces}: {warned}");
+    let (warned, ..) = told("fins", format!("{block}{other}[solid.part]\nunion = [\"block\", \"fin\", \"other\"]\n"));
+    assert!(warned.contains("too thin for the voxel") && warned.contains("0.03"), "{warned}");
 }
 
 /// A dome, scanned: the unit sphere above z = -.2 without a spot of .07 around, which is small enough to be closed.

@@ -544,10 +544,29 @@ fn prism(outline: &[[f64; 2]], height: f64, seed: u64) -> TriMesh {
     TriMesh::new(floor(0.0).chain(floor(height)).collect(), triangles)
 }
 
+/// A convex body as what its planes have in common.
+fn half_spaces(mesh: &TriMesh) -> Solid {
+    let mut planes: Vec<(DVec3, f64)> = Vec::new();
+    for t in 0..mesh.triangles.len() {
+        let (normal, p) = (mesh.normal(t), mesh.corners(t)[0]);
+        if planes.iter().all(|(m, _)| m.dot(normal) < 1.0 - 1e-12) {
+            planes.push((normal, normal.dot(p)));
+        }
+    }
+    let mut parts: Vec<Solid> = planes.into_iter().map(|(normal, offset)| Solid::Plane { normal, offset }).collect();
+    parts.push(box_of(DVec3::splat(4.0)));
+    Solid::Intersection(parts)
+}
+
 /// Checks that a thin body comes back as one piece without handles; its volume as a share of the true one, and how well its edges are
 /// kept, with the size of a cell.
-fn thin_body(name: &str, source: &TriMesh, n: usize) -> (f64, zone::Zone, f64) {
-    let made = of_mesh(source, n);
+fn thin_body(name: &str, source: &TriMesh, n: usize, is_solid: bool) -> (f64, zone::Zone, f64) {
+    let made = if is_solid {
+        let sampling = Sampling { spacing: Spacing::Voxel(of_mesh(source, n).lattice.step.x), memory: 4 << 30 };
+        contour::from_part(&Part::Solid(half_spaces(source)), sampling, &ContourParams::default(), &Silent).unwrap()
+    } else {
+        of_mesh(source, n)
+    };
     let d = certified(name, &made.extracted.mesh);
     println!("{name} {n} {} {:?} {:?}", d.components, d.genus, made.extracted.counts);
     let cell = made.lattice.step.max_element();
@@ -557,21 +576,50 @@ fn thin_body(name: &str, source: &TriMesh, n: usize) -> (f64, zone::Zone, f64) {
 
 #[test]
 fn knives_and_plates_thinner_than_a_cell_stay_in_one_piece_with_their_volume() {
-    for seed in 0..2 {
-        for deg in [10.0_f64, 20.0, 35.0] {
-            let half = (deg / 2.0).to_radians().tan();
-            let knife = prism(&[[0.0, 0.0], [1.0, -half], [1.0, half]], 0.8, seed);
-            for n in [33, 65, 129] {
-                println!("knife {deg} {seed} {n}: {:?}", thin_body("knife", &knife, n));
+    for is_solid in [false, true] {
+        for seed in 0..2 {
+            for deg in [10.0_f64, 20.0, 35.0] {
+                let half = (deg / 2.0).to_radians().tan();
+                let knife = prism(&[[0.0, 0.0], [1.0, -half], [1.0, half]], 0.8, seed);
+                for n in [33, 65, 129] {
+                    println!("{is_solid} knife {deg} {seed} {n}: {:?}", thin_body("knife", &knife, n, is_solid));
+                }
             }
-        }
-        for width in [0.004, 0.015] {
-            let plate = prism(&[[0.0, 0.0], [1.0, 0.0], [1.0, width], [0.0, width]], 0.7, seed);
-            for n in [33, 65, 129] {
-                println!("plate {width} {seed} {n}: {:?}", thin_body("plate", &plate, n));
+            for width in [0.004, 0.015] {
+                let plate = prism(&[[0.0, 0.0], [1.0, 0.0], [1.0, width], [0.0, width]], 0.7, seed);
+                for n in [33, 65, 129] {
+                    println!("{is_solid} plate {width} {seed} {n}: {:?}", thin_body("plate", &plate, n, is_solid));
+                }
             }
         }
     }
+}
+
+#[test]
+fn fins_a_third_of_a_cell_thick_stand_on_their_base_in_one_piece() {
+    let cuboid = |low: DVec3, high: DVec3| {
+        let planes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|n| {
+            [(n, n.dot(high)), (-n, -n.dot(low))].map(|(normal, offset)| Solid::Plane { normal, offset })
+        });
+        Solid::Intersection(planes.chain([box_of(DVec3::splat(4.0))]).collect())
+    };
+    let width = 0.01;
+    let mut parts = vec![cuboid(DVec3::new(0.0, 0.0, 0.0), DVec3::new(1.0, 0.6, 0.1))];
+    for k in 0..8 {
+        let x = 0.05 + 0.123 * k as f64;
+        parts.push(cuboid(DVec3::new(x, 0.0, 0.05), DVec3::new(x + width, 0.6, 0.5)));
+    }
+    let made = of_solid(&Solid::Union(parts), 33);
+    let d = certified("fins", &made.extracted.mesh);
+    let volume = 0.06 + 8.0 * width * 0.6 * 0.4;
+    println!(
+        "{} {:?} {} {:?} cell {}",
+        d.components,
+        d.genus,
+        d.volume.unwrap() / volume,
+        made.extracted.counts,
+        made.lattice.step.x
+    );
 }
 
 #[test]
@@ -583,7 +631,12 @@ fn walls_thinner_than_a_cell_are_counted_with_their_width() {
     let directed = planish::field::MeshField::new(&plate).unwrap().sample(&lattice, &Silent).unwrap();
     assert_eq!(directed.hit_count(), 0);
     assert_eq!(directed.thin.edges, 64, "one edge along z for each node above the plate");
-    assert!((directed.thin.width - 0.1).abs() < 1e-9 && directed.thin.share == 1.0, "{:?}", directed.thin);
+    assert!((directed.thin.width - 0.1).abs() < 1e-9 && directed.thin.lost == 0, "{:?}", directed.thin);
+    assert_eq!(directed.twice_count(), 128, "two hits on each");
+    // Without a face the sides are told by winding numbers, and nothing is known between two nodes.
+    plate.triangles.pop();
+    let directed = planish::field::MeshField::new(&plate).unwrap().sample(&lattice, &Silent).unwrap();
+    assert!(directed.twice_count() == 0 && directed.thin.lost > 60 && directed.thin.lost_share > 0.9);
     let thick = planish::synthetic::shapes::cuboid(DVec3::splat(8.3), 4);
     let directed = planish::field::MeshField::new(&thick).unwrap().sample(&lattice, &Silent).unwrap();
     assert_eq!(directed.thin.edges, 0);

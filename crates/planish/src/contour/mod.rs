@@ -128,8 +128,9 @@ pub struct Thresholds {
     pub faint: f64,
 }
 
-/// Layers of cells that a task takes at once.
+/// Layers of cells that a task takes at once, and cells with edges that are passed twice.
 const LAYERS_PER_TASK: usize = 8;
+const CROWDED_PER_TASK: usize = 256;
 /// Normals within one merged cell of the standard algorithm differ by less than this (cosine).
 const SMOOTH_COSINE: f64 = 0.9;
 /// Normals that differ by less than so many times their noise are no evidence of a feature.
@@ -173,28 +174,28 @@ pub fn extract(
         .collect();
     let surveys = surveys.ok_or(Cancelled)?;
     observer.progress(0.3);
-    let parts: Option<Vec<face::Part>> = surveys
-        .par_iter()
-        .map(|survey| {
-            let cells = survey.others.iter().filter(|_| !params.plain).map(|(cell, _)| cell);
-            (!observer.cancelled()).then(|| face::face_points(field, &limits, creases, &twice, cells))
-        })
-        .collect();
-    let mut parts = parts.ok_or(Cancelled)?;
-    parts.push(face::face_points(field, &limits, creases, &twice, crowded.iter()));
-    let (faces, mut wishes) = FacePoints::join(field, parts, hits as u32);
+    let of_others = surveys.par_iter().map(|survey| {
+        let cells = survey.others.iter().filter(|_| !params.plain).map(|(cell, _)| cell);
+        (!observer.cancelled()).then(|| face::face_points(field, &limits, creases, &twice, cells))
+    });
+    let of_crowded = crowded
+        .par_chunks(CROWDED_PER_TASK)
+        .map(|cells| (!observer.cancelled()).then(|| face::face_points(field, &limits, creases, &twice, cells.iter())));
+    let parts: Option<Vec<face::Part>> = of_others.chain(of_crowded).collect();
+    let (faces, mut wishes) = FacePoints::join(field, parts.ok_or(Cancelled)?, hits as u32);
     observer.progress(0.6);
     let (base, refine) = (field.first_names(), creases);
     let patcher = Patcher { field, points: &points, limits: &limits, faces: &faces, refine, base, twice: &twice };
     let sheets = sheets(&patcher, &surveys, merged, observer);
     let mut sheets = sheets.ok_or(Cancelled)?;
     let mut surveys = surveys;
-    if !crowded.is_empty() {
+    let of_crowded = |cells: &[walk::Cell]| {
         let (mut sheet, mut scratch) = (Sheet::default(), Scratch::default());
-        crowded.iter().for_each(|cell| patcher.patch(cell, &mut scratch, &mut sheet));
-        sheets.push(sheet);
-        surveys.push(Survey::default());
-    }
+        cells.iter().for_each(|cell| patcher.patch(cell, &mut scratch, &mut sheet));
+        sheet
+    };
+    sheets.par_extend(crowded.par_chunks(CROWDED_PER_TASK).map(of_crowded));
+    surveys.resize_with(sheets.len(), Survey::default);
     if let Some(octree) = &octree {
         // Larger cells come after all others.
         sheets.push(octree.patches());

@@ -329,6 +329,27 @@ impl Creases for MeshCreases {
         here.next().is_none().then_some((found.p, found.tagged))
     }
 
+    fn tip_point(
+        &self,
+        axis: usize,
+        [low, high]: [DVec3; 2],
+        _way: DVec3,
+        a: (DVec3, DVec3),
+        b: (DVec3, DVec3),
+    ) -> Option<DVec3> {
+        let plane = ((low[axis] - self.lattice.origin[axis]) / self.lattice.step[axis]).round() as i64;
+        let [_, v, u] = key(&self.lattice, axis, plane, (low + high) / 2.0);
+        let cuts = &self.cuts[axis];
+        let first = cuts.partition_point(|c| c.key < [plane, v, u]);
+        let here = || cuts[first..].iter().take_while(|c| c.key == [plane, v, u]).filter(|c| c.tagged);
+        // Where the surface of a hit ends: it may be one line for both.
+        let end = |(p, n): (DVec3, DVec3)| {
+            let own = here().filter(|c| c.normals.iter().any(|m| m.dot(n) > AGREE)).map(|c| c.p);
+            own.min_by(|x, y| x.distance_squared(p).total_cmp(&y.distance_squared(p)))
+        };
+        Some((end(a)? + end(b)?) / 2.0)
+    }
+
     fn bend(&self, guess: DVec3, low: DVec3, high: DVec3) -> Option<DVec3> {
         let cell = cell_of(&self.lattice, (low + high) / 2.0);
         let first = self.knots.partition_point(|c| c.0 < cell);

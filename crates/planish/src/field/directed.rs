@@ -72,8 +72,10 @@ pub struct Directed {
 pub struct Thin {
     /// Edges of the lattice that the surface passes more than once.
     pub edges: usize,
-    /// Their share in all edges that it passes.
-    pub share: f64,
+    /// Those of them of which passes are left out: all but one, or all but two where it passes there and back.
+    pub lost: usize,
+    /// Share of these in all edges that it passes.
+    pub lost_share: f64,
     /// Median width between two passes, along the edge, world units.
     pub width: f64,
 }

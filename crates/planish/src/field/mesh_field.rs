@@ -93,7 +93,7 @@ impl<'a> MeshField<'a> {
         } else {
             self.by_winding(lattice, &crossings, &normals, observer)?
         };
-        field.thin = thin(&crossings);
+        field.thin = thin(&crossings, self.balanced);
         observer.progress(1.0);
         Ok(field)
     }
@@ -191,17 +191,20 @@ impl<'a> MeshField<'a> {
 }
 
 /// What the surface does between two nodes: edges that it passes there and back.
-fn thin(crossings: &[Vec<Crossing>; 3]) -> Thin {
-    let (mut widths, mut edges, mut all) = (Vec::new(), 0, 0);
+/// * `keeps_two` - two passes of an edge are kept
+fn thin(crossings: &[Vec<Crossing>; 3], keeps_two: bool) -> Thin {
+    let (mut widths, mut edges, mut lost, mut all) = (Vec::new(), 0, 0, 0);
     for run in crossings.iter().flat_map(|c| c.chunk_by(|a, b| (a.line, a.edge) == (b.line, b.edge))) {
         let before = widths.len();
         widths.extend(run.windows(2).filter(|p| p[0].out != p[1].out).map(|p| p[1].x - p[0].x));
-        edges += (widths.len() > before) as usize;
+        let is_thin = widths.len() > before;
+        edges += is_thin as usize;
+        lost += (is_thin && !(keeps_two && run.len() == 2)) as usize;
         all += 1;
     }
     let middle = widths.len() / 2;
     let width = if widths.is_empty() { 0.0 } else { *widths.select_nth_unstable_by(middle, f64::total_cmp).1 };
-    Thin { edges, share: edges as f64 / f64::max(all as f64, 1.0), width }
+    Thin { edges, lost, lost_share: lost as f64 / f64::max(all as f64, 1.0), width }
 }
 
 /// True if for every pair of positions as many edges run one way as the other.

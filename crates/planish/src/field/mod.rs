@@ -210,6 +210,19 @@ pub trait Creases: Sync {
         None
     }
 
+    /// Where what lies between two hits on one side of the square from `low` to `high`, which is perpendicular to `axis`, ends inside
+    /// of it; `None` if the source cannot tell. `way` is the unit vector from that side into the square.
+    fn tip_point(
+        &self,
+        _axis: usize,
+        _square: [DVec3; 2],
+        _way: DVec3,
+        _a: (DVec3, DVec3),
+        _b: (DVec3, DVec3),
+    ) -> Option<DVec3> {
+        None
+    }
+
     /// The place of a bend inside the cell from `low` to `high` nearest to `guess`.
     fn bend(&self, _guess: DVec3, _low: DVec3, _high: DVec3) -> Option<DVec3> {
         None

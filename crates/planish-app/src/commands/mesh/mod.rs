@@ -403,8 +403,8 @@ fn figures(made: &Meshed, report: &mut Report) {
     }
 }
 
-/// A surface passes so many of its lattice edges more than once at sharp edges alone; beyond, walls are too thin.
-const THIN_SHARE: f64 = 0.02;
+/// A surface passes so many of its lattice edges more often than is kept at sharp edges alone; beyond, walls are too thin.
+const LOST_SHARE: f64 = 0.02;
 
 /// Tells of walls and gaps of a mesh that are thinner than the voxel.
 fn thin_walls(made: &Meshed, input: &TriMesh, report: &mut Report) {
@@ -419,13 +419,13 @@ fn thin_walls(made: &Meshed, input: &TriMesh, report: &mut Report) {
         _ => None,
     });
     let broken = facts.watertight && pieces.is_some_and(|n| n != facts.components as u64);
-    if thin.edges == 0 || !(broken || thin.share > THIN_SHARE) {
+    if thin.edges == 0 || !(broken || thin.lost_share > LOST_SHARE) {
         return;
     }
     let unit = report.input.units.as_str();
     let mut text = format!(
-        "Walls or gaps thinner than the voxel: the surface passes {} edges of the lattice more than once, {} {unit} apart in the median.",
-        count(thin.edges as u64),
+        "Walls or gaps too thin for the voxel: the surface passes {} edges of the lattice more often than can be kept; passes are {} {unit} apart in the median.",
+        count(thin.lost as u64),
         number(thin.width)
     );
     if let (true, Some(n)) = (broken, pieces) {

@@ -133,8 +133,8 @@ fn point(
 }
 
 /// Face points of the faces at the least node of a cell with edges that are passed twice. A segment between two hits on one edge
-/// has one always: halfway between them and as far into the face as half their distance, if their tangents do not meet there. What would
-/// meet others comes nearer to its edge, or goes.
+/// has one always: where the source says that what lies between them ends, or where their tangents meet, or else as far into the face as
+/// half their distance. What would meet others comes nearer to its edge, or goes.
 fn points_of_crowded_faces(
     field: &Directed,
     limits: &Thresholds,
@@ -144,22 +144,32 @@ fn points_of_crowded_faces(
 ) {
     let hits = twice.hits(field, cell);
     let [i, j, k] = cell.at;
-    let middle = (field.lattice.node(i, j, k) + field.lattice.node(i + 1, j + 1, k + 1)) / 2.0;
+    let (low, far) = (field.lattice.node(i, j, k), field.lattice.node(i + 1, j + 1, k + 1));
+    let middle = (low + far) / 2.0;
     for axis in 0..3 {
+        let mut high = far;
+        high[axis] = low[axis];
         let segments = low_segments(field, cell, &hits, axis);
         let is_tip = |s: &[Pass; 2]| s[0].edge == s[1].edge;
         let own = |s: &[Pass; 2]| {
-            let found = point(field, cell, axis, (limits, refine), (&s[0], &s[1]));
-            if found.is_some() || !is_tip(s) {
-                return found;
-            }
             let [a, b] = s;
+            let met = || point(field, cell, axis, (limits, refine), (a, b));
+            if !is_tip(s) {
+                return met();
+            }
             let between = (a.p + b.p) / 2.0;
             let mut inwards = middle - between;
             (inwards[axis], inwards[a.edge as usize / 4]) = (0.0, 0.0);
-            let p = between + inwards.normalize_or_zero() * (a.p.distance(b.p) / 2.0).min(inwards.length());
-            let hits = [a.id.min(b.id), a.id.max(b.id)];
-            Some((FacePoint { at: cell.at[0] as u32, hits, p, tagged: a.n.dot(b.n) < limits.sharp }, None))
+            let way = inwards.normalize_or_zero();
+            let of = |p: DVec3| {
+                let hits = [a.id.min(b.id), a.id.max(b.id)];
+                Some((FacePoint { at: cell.at[0] as u32, hits, p, tagged: a.n.dot(b.n) < limits.sharp }, None))
+            };
+            let told = refine.and_then(|r| r.tip_point(axis, [low, high], way, (a.p, a.n), (b.p, b.n)));
+            match told.filter(|p| is_clear(axis, [low, high], *p)) {
+                Some(p) => of(p),
+                None => met().or_else(|| of(between + way * (a.p.distance(b.p) / 2.0).min(inwards.length()))),
+            }
         };
         let mut found: Vec<Option<Found>> = segments.iter().map(own).collect();
         if !apart(axis, &segments, &found) {
@@ -195,11 +205,15 @@ fn faint(
     high[axis] = low[axis];
     let (mut p, tagged) = refine?.faint_point(axis, low, high, a, b)?;
     p[axis] = low[axis];
-    let clear = (0..3).filter(|&u| u != axis).all(|u| {
+    is_clear(axis, [low, high], p).then_some((p, tagged))
+}
+
+/// True if a point of a face is clear of its sides.
+fn is_clear(axis: usize, [low, high]: [DVec3; 2], p: DVec3) -> bool {
+    (0..3).filter(|&u| u != axis).all(|u| {
         let margin = FACE_MARGIN * (high[u] - low[u]);
         p[u] > low[u] + margin && p[u] < high[u] - margin
-    });
-    clear.then_some((p, tagged))
+    })
 }
 
 /// Where the tangents of two hits meet in the plane of the face, kept in the face; and where they meet indeed, if that is

@@ -85,6 +85,21 @@ impl Creases for FieldCreases<'_> {
         found
     }
 
+    fn tip_point(
+        &self,
+        _axis: usize,
+        [low, high]: [DVec3; 2],
+        way: DVec3,
+        a: (DVec3, DVec3),
+        b: (DVec3, DVec3),
+    ) -> Option<DVec3> {
+        // The first change of side half-way between both.
+        let from = (a.0 + b.0) / 2.0;
+        let at = |t: f64| from + way * (way.abs().dot(high - low) * t);
+        let (f0, f1) = (self.field.value(from), self.field.value(at(1.0)));
+        ((f0 < 0.0) != (f1 < 0.0)).then(|| at(root(|t| self.field.value(at(t)), f0, f1)))
+    }
+
     fn inner_point(
         &self,
         guess: DVec3,
