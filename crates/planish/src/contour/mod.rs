@@ -25,6 +25,7 @@ use crate::contour::cell::face::FacePoints;
 use crate::contour::cell::patch::{FIRST_INNER, Patcher, Scratch, Sheet};
 use crate::contour::cell::twice::TwicePassed;
 use crate::contour::octree::Octree;
+use crate::contour::polish::local::CellRange;
 use crate::contour::survey::Survey;
 use crate::field::directed::Hits;
 use crate::field::{Creases, Directed};
@@ -151,7 +152,8 @@ pub fn extract(
     let limits = thresholds(field, creases, params);
     // The standard algorithm has a hit where two nodes differ, and nowhere else.
     let twice = if params.plain { TwicePassed::default() } else { TwicePassed::new(field) };
-    let hits = field.hit_count() + field.twice_count();
+    let lists = if params.plain { vec![&field.axes] } else { vec![&field.axes, &field.twice] };
+    let hits: usize = lists.iter().copied().flatten().map(Hits::len).sum();
     if hits as u64 >= FIRST_INNER as u64 {
         return Err(ContourError::TooLarge { vertices: hits });
     }
@@ -159,7 +161,7 @@ pub fn extract(
     let chunks: Vec<(usize, usize)> =
         (0..layers).step_by(LAYERS_PER_TASK).map(|from| (from, (from + LAYERS_PER_TASK).min(layers))).collect();
 
-    let mut points = hit_positions(field);
+    let mut points = hit_positions(field, &lists);
     // Standard cells have no features to keep, but no reason to bend either.
     let sharp = if params.plain { SMOOTH_COSINE } else { limits.faint };
     let tolerance = params.adaptive.filter(|t| *t > 0.0);
@@ -217,17 +219,7 @@ pub fn extract(
     if triangles == 0 {
         return Err(ContourError::Nothing { cells: field.lattice.cells });
     }
-    let cells = || {
-        let (mut cells, mut first) = (Vec::new(), 0);
-        for (survey, sheet) in surveys.iter().zip(&sheets) {
-            survey.merged_cells(sheet, first, &mut cells);
-            first += (survey.triangles() + sheet.triangles.len()) as u32;
-        }
-        if octree.is_some() || !crowded.is_empty() {
-            cells.par_sort_unstable_by_key(|c| [c.0[2], c.0[1], c.0[0]]);
-        }
-        cells
-    };
+    let cells = || cells_of(&surveys, &sheets, octree.is_none() && crowded.is_empty());
     let source = polish::Source { creases, sharp: limits.sharp };
     let polished = polish::polish(&mut mesh, &mut tags, field, &wishes, cells, &source);
     (counts.moved, counts.kept) = (polished.moved, polished.kept);
@@ -241,6 +233,20 @@ pub fn extract(
     extracted.tags.mark(&mut extracted.mesh);
     observer.progress(1.0);
     Ok(extracted)
+}
+
+/// All cells with their triangles, in the order of z, y, x.
+/// * `is_ordered` - those of the surveys are in that order
+fn cells_of(surveys: &[Survey], sheets: &[Sheet], is_ordered: bool) -> Vec<CellRange> {
+    let (mut cells, mut first) = (Vec::new(), 0);
+    for (survey, sheet) in surveys.iter().zip(sheets) {
+        survey.merged_cells(sheet, first, &mut cells);
+        first += (survey.triangles() + sheet.triangles.len()) as u32;
+    }
+    if !is_ordered {
+        cells.par_sort_unstable_by_key(|c| [c.0[2], c.0[1], c.0[0]]);
+    }
+    cells
 }
 
 /// What is cut out of the cells of each survey that are neither standard nor in a larger cell; `None` where the observer stops it.
@@ -341,14 +347,14 @@ fn in_order(mut tags: FeatureTags) -> FeatureTags {
 const ROWS: usize = 4096;
 
 /// Positions of all hits by their names.
-fn hit_positions(field: &Directed) -> Vec<DVec3> {
+fn hit_positions(field: &Directed, lists: &[&[Hits; 3]]) -> Vec<DVec3> {
     let rows = field.lattice.rows();
     let tasks = |lists: &[Hits; 3]| -> Vec<(usize, usize)> {
         let axes = (0..3).filter(|&axis| !lists[axis].is_empty());
         axes.flat_map(|axis| (0..rows).step_by(ROWS).map(move |r| (axis, r))).collect()
     };
-    let mut points = Vec::with_capacity(field.hit_count() + field.twice_count());
-    for lists in [&field.axes, &field.twice] {
+    let mut points = Vec::with_capacity(lists.iter().copied().flatten().map(Hits::len).sum());
+    for lists in lists {
         let of = |(axis, from): (usize, usize)| {
             let (hits, to) = (&lists[axis], (from + ROWS).min(rows));
             let mut points = Vec::with_capacity((hits.start[to] - hits.start[from]) as usize);
