@@ -101,8 +101,9 @@ fn faces_edges_and_pieces_have_their_numbers_as_names_and_faces_the_colours_of_t
     has("=MANIFOLD_SOLID_BREP('piece 1',");
     has("=OPEN_SHELL('piece 2',");
     let colors = planish::render::even_colors(8);
-    for [r, g, b] in &colors {
-        has(&format!("=COLOUR_RGB('',{:?},{:?},{:?});", *r as f64 / 255.0, *g as f64 / 255.0, *b as f64 / 255.0));
+    for color in &colors {
+        let [r, g, b] = color.map(|byte| format!("{:?}", byte as f64 / 255.0).replace("1.0", "1."));
+        has(&format!("=COLOUR_RGB('',{r},{g},{b});"));
     }
     assert_eq!((count(&text, "STYLED_ITEM"), count(&text, "COLOUR_RGB")), (8, 8));
     let faces = text.lines().filter(|l| l.contains("=ADVANCED_FACE(")).map(|l| l.split('=').next().unwrap());
@@ -116,7 +117,13 @@ fn faces_edges_and_pieces_have_their_numbers_as_names_and_faces_the_colours_of_t
 
 #[test]
 fn a_hundred_faces_of_24_x_24_take_less_than_6_mb() {
-    let many = (0..7).map(|_| torus(24)).reduce(both).unwrap();
+    // Sizes of their own, or equal points would be written once.
+    let sized = |k: u32| {
+        let (network, mut surfaces) = torus(24);
+        surfaces.iter_mut().flat_map(|s| &mut s.control).for_each(|p| *p *= 1.0 + f64::from(k) / 7.0);
+        (network, surfaces)
+    };
+    let many = (0..7).map(sized).reduce(both).unwrap();
     let (summary, text) = write(&many).unwrap();
     println!("{} faces of 24 x 24: {} bytes", summary.faces, text.len());
     assert!(text.len() * 100 < 6_000_000 * summary.faces);
