@@ -1,5 +1,7 @@
 //! The pictures of a report: one point of view, from the input to the zebra stripes.
 
+mod quality;
+
 use crate::failure::Failure;
 use planish::DVec3;
 use planish::geom::Bvh;
@@ -15,6 +17,8 @@ use rayon::prelude::*;
 
 /// Pixels of a picture: two stand side by side on a page, sharp on screens of twice the usual density.
 const SIZE: (usize, usize) = (1200, 900);
+/// Pixels of a picture that is as wide as the page.
+const WIDE: (usize, usize) = (2000, 1500);
 /// Pixels of one of the six sides: three stand side by side.
 const SIDE: (usize, usize) = (720, 540);
 /// Numbers that are drawn: more would be a grey cloud.
@@ -44,6 +48,9 @@ const CUTS_PER_SPAN: usize = 8;
 /// Steps of the colour table: finer than a byte of colour can show.
 const COLORS: usize = 1024;
 
+/// Titles of the pictures that are as wide as the page.
+const ZEBRA: &str = "Zebra stripes";
+const COMBS: &str = "Combs of curvature";
 /// Titles of the two pictures under a slider.
 const SLIDER: [&str; 2] = ["Surfaces", "Displaced"];
 
@@ -87,11 +94,12 @@ pub fn pictures(model: &Model, raw: Option<&Raw>, report: &Report, up: Up) -> Re
     let (up, toward) = view(up);
     let camera = close_up(Camera::fit(&model.mesh.bounds(), toward, up, ASPECT), &model.mesh);
     // The page is the ground, light or dark.
-    let draw = |mesh: &TriMesh, look: Look| {
+    let draw_as = |mesh: &TriMesh, look: Look, size: (usize, usize)| {
         let look = Look { background: None, ..look };
-        let image = render::render(mesh, &look, &camera, SIZE.0, SIZE.1).map_err(Failure::fault)?;
+        let image = render::render(mesh, &look, &camera, size.0, size.1).map_err(Failure::fault)?;
         png(&image)
     };
+    let draw = |mesh: &TriMesh, look: Look| draw_as(mesh, look, SIZE);
     // One quad per sample is as fine as can be seen.
     let cuts = (QUADS / pipeline::span_count(model).max(1)).isqrt().clamp(1, CUTS_PER_SPAN);
     let base = pipeline::surface_mesh_cut(model, cuts, &crate::progress::Interrupt).map_err(Failure::fault)?;
@@ -99,7 +107,11 @@ pub fn pictures(model: &Model, raw: Option<&Raw>, report: &Report, up: Up) -> Re
     let unit = report.input.units.as_str();
     let mut pictures = Vec::new();
     let mut add = |title: &str, caption: String, png: Vec<u8>| {
-        let place = if SLIDER.contains(&title) { Place::Slider } else { Place::Gallery };
+        let place = match title {
+            _ if SLIDER.contains(&title) => Place::Slider,
+            ZEBRA | COMBS => Place::Wide,
+            _ => Place::Gallery,
+        };
         pictures.push(Picture { title: title.into(), caption, png, scale: None, place });
     };
 
@@ -147,10 +159,21 @@ pub fn pictures(model: &Model, raw: Option<&Raw>, report: &Report, up: Up) -> Re
     let look = Look { paint: Paint::PerVertex(&colors), hollows: 0.0, ..Look::default() };
     add("Deviation", caption.into(), draw(&model.mesh, look)?);
 
+    let (own, normals) = quality::with_normals(model, cuts).map_err(Failure::fault)?;
     let paint = Paint::Zebra { stripes: STRIPES };
-    let caption = "Reflected stripes on the surfaces. Where the surface bends across a seam a stripe jumps; where only \
-                   its curvature changes it has a kink.";
-    add("Zebra stripes", caption.into(), draw(&base, Look { paint, hollows: 0.0, ..Look::default() })?);
+    let caption = "Reflected stripes on the surfaces, by their own normals. Where the surface bends across a seam a stripe jumps; \
+                   where only its curvature changes it has a kink.";
+    let look = Look { paint, normals: Some(&normals), hollows: 0.0, ..Look::default() };
+    add(ZEBRA, caption.into(), draw_as(&own, look, WIDE)?);
+    let quality::Combs { lines, radius } = quality::combs(model);
+    let caption = format!(
+        "Combs along the seams and along the middles of the patches: the longer a tooth, the more the surface bends along the curve; \
+         blue outwards, orange inwards. Where the ends of the teeth step at a seam, the curvature does. A tooth of 1/50 of the diagonal \
+         is a radius of {} {unit}.",
+        number(radius)
+    );
+    let look = Look { paint: Paint::Plain(CLAY), normals: Some(&normals), lines, hollows: 0.0, ..Look::default() };
+    add(COMBS, caption, draw_as(&own, look, WIDE)?);
     let steps = (0..=SCALE_STEPS).map(|k| render::field_color(k as f64 / SCALE_STEPS as f64));
     let labels = [0.0, 0.5, 1.0].map(|x| format!("{} {unit}", number(x * top)));
     if let Some(picture) = pictures.iter_mut().find(|p| p.title == "Deviation") {
