@@ -48,9 +48,6 @@ const CUTS_PER_SPAN: usize = 8;
 /// Steps of the colour table: finer than a byte of colour can show.
 const COLORS: usize = 1024;
 
-/// Titles of the pictures that are as wide as the page.
-const ZEBRA: &str = "Zebra stripes";
-const COMBS: &str = "Combs of curvature";
 /// Titles of the two pictures under a slider.
 const SLIDER: [&str; 2] = ["Surfaces", "Displaced"];
 
@@ -107,11 +104,7 @@ pub fn pictures(model: &Model, raw: Option<&Raw>, report: &Report, up: Up) -> Re
     let unit = report.input.units.as_str();
     let mut pictures = Vec::new();
     let mut add = |title: &str, caption: String, png: Vec<u8>| {
-        let place = match title {
-            _ if SLIDER.contains(&title) => Place::Slider,
-            ZEBRA | COMBS => Place::Wide,
-            _ => Place::Gallery,
-        };
+        let place = if SLIDER.contains(&title) { Place::Slider } else { Place::Gallery };
         pictures.push(Picture { title: title.into(), caption, png, scale: None, place });
     };
 
@@ -159,28 +152,42 @@ pub fn pictures(model: &Model, raw: Option<&Raw>, report: &Report, up: Up) -> Re
     let look = Look { paint: Paint::PerVertex(&colors), hollows: 0.0, ..Look::default() };
     add("Deviation", caption.into(), draw(&model.mesh, look)?);
 
-    let (own, normals) = quality::with_normals(model, cuts).map_err(Failure::fault)?;
-    let paint = Paint::Zebra { stripes: STRIPES };
-    let caption = "Reflected stripes on the surfaces, by their own normals. Where the surface bends across a seam a stripe jumps; \
-                   where only its curvature changes it has a kink.";
-    let look = Look { paint, normals: Some(&normals), hollows: 0.0, ..Look::default() };
-    add(ZEBRA, caption.into(), draw_as(&own, look, WIDE)?);
-    let quality::Combs { lines, radius } = quality::combs(model);
-    let caption = format!(
-        "Combs along the seams and along the middles of the patches: the longer a tooth, the more the surface bends along the curve; \
-         blue outwards, orange inwards. Where the ends of the teeth step at a seam, the curvature does. A tooth of 1/50 of the diagonal \
-         is a radius of {} {unit}.",
-        number(radius)
-    );
-    let look = Look { paint: Paint::Plain(CLAY), normals: Some(&normals), lines, hollows: 0.0, ..Look::default() };
-    add(COMBS, caption, draw_as(&own, look, WIDE)?);
     let steps = (0..=SCALE_STEPS).map(|k| render::field_color(k as f64 / SCALE_STEPS as f64));
     let labels = [0.0, 0.5, 1.0].map(|x| format!("{} {unit}", number(x * top)));
     if let Some(picture) = pictures.iter_mut().find(|p| p.title == "Deviation") {
         picture.scale = Some(Scale { colors: steps.collect(), labels: labels.into() });
     }
+    pictures.extend(seams(model, cuts, |mesh, look| draw_as(mesh, look, WIDE))?);
     pictures.extend(sides(&displaced, up)?);
     Ok(pictures)
+}
+
+/// What shows how surfaces meet: stripes and combs.
+/// * `cuts` - quads per knot span
+fn seams(
+    model: &Model,
+    cuts: usize,
+    draw: impl Fn(&TriMesh, Look) -> Result<Vec<u8>, Failure>,
+) -> Result<[Picture; 2], Failure> {
+    let (mesh, normals) = quality::with_normals(model, cuts).map_err(Failure::fault)?;
+    let picture = |title: &str, caption: String, look: Look| {
+        let png = draw(&mesh, Look { normals: Some(&normals), hollows: 0.0, ..look })?;
+        Ok(Picture { title: title.into(), caption, png, scale: None, place: Place::Wide })
+    };
+    let stripes = "Reflected stripes on the surfaces, by their own normals. Where the surface bends across a seam a stripe jumps; \
+                   where only its curvature changes it has a kink.";
+    let paint = Paint::Zebra { stripes: STRIPES };
+    let zebra = picture("Zebra stripes", stripes.into(), Look { paint, ..Look::default() })?;
+    let quality::Combs { lines, radius } = quality::combs(model);
+    let teeth = format!(
+        "Combs along the seams and along the middles of the patches: the longer a tooth, the more the surface bends along the curve; \
+         blue outwards, orange inwards. Where the ends of the teeth step at a seam, the curvature does. A tooth of 1/50 of the diagonal \
+         is a radius of {} {}.",
+        number(radius),
+        model.units.symbol()
+    );
+    let combs = picture("Combs of curvature", teeth, Look { paint: Paint::Plain(CLAY), lines, ..Look::default() })?;
+    Ok([zebra, combs])
 }
 
 /// A shape from its six sides.
