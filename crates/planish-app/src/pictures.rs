@@ -1,5 +1,7 @@
 //! The pictures of a report: one point of view, from the input to the zebra stripes.
 
+mod quality;
+
 use crate::failure::Failure;
 use planish::DVec3;
 use planish::geom::Bvh;
@@ -15,6 +17,8 @@ use rayon::prelude::*;
 
 /// Pixels of a picture: two stand side by side on a page, sharp on screens of twice the usual density.
 const SIZE: (usize, usize) = (1200, 900);
+/// Pixels of a picture that is as wide as the page.
+const WIDE: (usize, usize) = (2000, 1500);
 /// Pixels of one of the six sides: three stand side by side.
 const SIDE: (usize, usize) = (720, 540);
 /// Numbers that are drawn: more would be a grey cloud.
@@ -87,11 +91,12 @@ pub fn pictures(model: &Model, raw: Option<&Raw>, report: &Report, up: Up) -> Re
     let (up, toward) = view(up);
     let camera = close_up(Camera::fit(&model.mesh.bounds(), toward, up, ASPECT), &model.mesh);
     // The page is the ground, light or dark.
-    let draw = |mesh: &TriMesh, look: Look| {
+    let draw_as = |mesh: &TriMesh, look: Look, size: (usize, usize)| {
         let look = Look { background: None, ..look };
-        let image = render::render(mesh, &look, &camera, SIZE.0, SIZE.1).map_err(Failure::fault)?;
+        let image = render::render(mesh, &look, &camera, size.0, size.1).map_err(Failure::fault)?;
         png(&image)
     };
+    let draw = |mesh: &TriMesh, look: Look| draw_as(mesh, look, SIZE);
     // One quad per sample is as fine as can be seen.
     let cuts = (QUADS / pipeline::span_count(model).max(1)).isqrt().clamp(1, CUTS_PER_SPAN);
     let base = pipeline::surface_mesh_cut(model, cuts, &crate::progress::Interrupt).map_err(Failure::fault)?;
@@ -147,17 +152,42 @@ pub fn pictures(model: &Model, raw: Option<&Raw>, report: &Report, up: Up) -> Re
     let look = Look { paint: Paint::PerVertex(&colors), hollows: 0.0, ..Look::default() };
     add("Deviation", caption.into(), draw(&model.mesh, look)?);
 
-    let paint = Paint::Zebra { stripes: STRIPES };
-    let caption = "Reflected stripes on the surfaces. Where the surface bends across a seam a stripe jumps; where only \
-                   its curvature changes it has a kink.";
-    add("Zebra stripes", caption.into(), draw(&base, Look { paint, hollows: 0.0, ..Look::default() })?);
     let steps = (0..=SCALE_STEPS).map(|k| render::field_color(k as f64 / SCALE_STEPS as f64));
     let labels = [0.0, 0.5, 1.0].map(|x| format!("{} {unit}", number(x * top)));
     if let Some(picture) = pictures.iter_mut().find(|p| p.title == "Deviation") {
         picture.scale = Some(Scale { colors: steps.collect(), labels: labels.into() });
     }
+    pictures.extend(seams(model, cuts, |mesh, look| draw_as(mesh, look, WIDE))?);
     pictures.extend(sides(&displaced, up)?);
     Ok(pictures)
+}
+
+/// What shows how surfaces meet: stripes and combs.
+/// * `cuts` - quads per knot span
+fn seams(
+    model: &Model,
+    cuts: usize,
+    draw: impl Fn(&TriMesh, Look) -> Result<Vec<u8>, Failure>,
+) -> Result<[Picture; 2], Failure> {
+    let (mesh, normals) = quality::with_normals(model, cuts).map_err(Failure::fault)?;
+    let picture = |title: &str, caption: String, look: Look| {
+        let png = draw(&mesh, Look { normals: Some(&normals), hollows: 0.0, ..look })?;
+        Ok(Picture { title: title.into(), caption, png, scale: None, place: Place::Wide })
+    };
+    let stripes = "Reflected stripes on the surfaces, by their own normals. Where the surface bends across a seam a stripe jumps; \
+                   where only its curvature changes it has a kink.";
+    let paint = Paint::Zebra { stripes: STRIPES };
+    let zebra = picture("Zebra stripes", stripes.into(), Look { paint, ..Look::default() })?;
+    let quality::Combs { lines, radius } = quality::combs(model);
+    let teeth = format!(
+        "Combs along the seams and along the middles of the patches: the longer a tooth, the more the surface bends along the curve; \
+         blue outwards, orange inwards. Where the ends of the teeth step at a seam, the curvature does. A tooth of 1/50 of the diagonal \
+         is a radius of {} {}.",
+        number(radius),
+        model.units.symbol()
+    );
+    let combs = picture("Combs of curvature", teeth, Look { paint: Paint::Plain(CLAY), lines, ..Look::default() })?;
+    Ok([zebra, combs])
 }
 
 /// A shape from its six sides.

@@ -19,7 +19,8 @@ fn write(case: &Case, units: Units) -> Result<(IgesSummary, String), WriteError>
     Ok((summary, std::fs::read_to_string(path).unwrap()))
 }
 
-/// The directory: type and form, first line of the parameters and their number, the number behind the label.
+/// The directory: type and form, first line of the parameters and their number, the number behind the label. An entity is named by
+/// 2 k + 1 if it is the `k`-th.
 fn directory(text: &str) -> Vec<[usize; 5]> {
     let lines: Vec<&str> = text.lines().filter(|l| l.as_bytes()[72] == b'D').collect();
     let field = |line: &str, k: usize| line[8 * k..8 * k + 8].trim().parse::<usize>().unwrap();
@@ -107,6 +108,35 @@ fn open_components_are_bare_surfaces_and_two_balls_are_two_solids() {
     // A globe has a seam with two sides and two poles without any length.
     let (_, text) = write(&globe(), Units::M).unwrap();
     assert_eq!([186, 126, 508].map(|kind| count(&text, kind)), [1, 1, 1]);
+}
+
+#[test]
+fn faces_and_pieces_point_to_their_names_and_faces_to_the_colours_of_the_pictures() {
+    let (_, text) = write(&both(ball(5, DVec3::ZERO), sheet()), Units::Mm).unwrap();
+    let entities = directory(&text);
+    let values = |entity: [usize; 5]| parameters(&text, entity).0;
+    let of = |pointer: &str| values(entities[pointer.parse::<usize>().unwrap() / 2]);
+    let name = |entity: [usize; 5]| {
+        let own = values(entity);
+        let (pointer, before) = own.split_last().unwrap();
+        assert_eq!(before[before.len() - 2..], ["0", "1"]);
+        of(pointer)[..3].join(" ")
+    };
+    // The six faces of the solid and the two bare surfaces.
+    let shown: Vec<usize> = (0..entities.len()).filter(|&k| entities[k][0] == 510 || entities[k][0] == 128).collect();
+    let shown: Vec<usize> = shown.into_iter().filter(|&k| entities[k][0] == 510 || entities[k][4] > 5).collect();
+    let colors = planish::render::even_colors(8);
+    let lines: Vec<&str> = text.lines().filter(|l| l.as_bytes()[72] == b'D').collect();
+    assert_eq!(shown.len(), 8);
+    for (p, &k) in shown.iter().enumerate() {
+        assert_eq!(name(entities[k]), format!("406 1 7Hpatch {p}"));
+        let color = of(lines[2 * k + 1][16..24].trim().strip_prefix('-').unwrap());
+        let percent: Vec<f64> = color[1..].iter().map(|x| x.parse().unwrap()).collect();
+        let bytes = colors[p].map(|byte| f64::from(byte) / 2.55);
+        assert_eq!((color[0].as_str(), percent), ("314", bytes.to_vec()));
+    }
+    let solid = *entities.iter().find(|e| e[0] == 186).unwrap();
+    assert_eq!(name(solid), "406 1 7Hpiece 1");
 }
 
 #[test]

@@ -93,6 +93,43 @@ fn globe_with_poles_is_a_solid_of_one_face_with_one_edge_and_144_faces_take_less
 }
 
 #[test]
+fn faces_edges_and_pieces_have_their_numbers_as_names_and_faces_the_colours_of_the_pictures() {
+    let (_, text) = write(&both(ball(5, DVec3::ZERO), sheet())).unwrap();
+    let has = |words: &str| assert!(text.contains(words), "{words}");
+    (0..8).for_each(|p| has(&format!("=ADVANCED_FACE('patch {p}',")));
+    (0..19).for_each(|c| has(&format!("=EDGE_CURVE('curve {c}',")));
+    has("=MANIFOLD_SOLID_BREP('piece 1',");
+    has("=OPEN_SHELL('piece 2',");
+    let colors = planish::render::even_colors(8);
+    for color in &colors {
+        let [r, g, b] = color.map(|byte| format!("{:?}", byte as f64 / 255.0).replace("1.0", "1."));
+        has(&format!("=COLOUR_RGB('',{r},{g},{b});"));
+    }
+    assert_eq!((count(&text, "STYLED_ITEM"), count(&text, "COLOUR_RGB")), (8, 8));
+    let faces = text.lines().filter(|l| l.contains("=ADVANCED_FACE(")).map(|l| l.split('=').next().unwrap());
+    for face in faces {
+        assert_eq!(
+            text.lines().filter(|l| l.contains("=STYLED_ITEM(") && l.ends_with(&format!(",{face});"))).count(),
+            1
+        );
+    }
+}
+
+#[test]
+fn a_hundred_faces_of_24_x_24_take_less_than_6_mb() {
+    // Sizes of their own, or equal points would be written once.
+    let sized = |k: u32| {
+        let (network, mut surfaces) = torus(24);
+        surfaces.iter_mut().flat_map(|s| &mut s.control).for_each(|p| *p *= 1.0 + f64::from(k) / 7.0);
+        (network, surfaces)
+    };
+    let many = (0..7).map(sized).reduce(both).unwrap();
+    let (summary, text) = write(&many).unwrap();
+    println!("{} faces of 24 x 24: {} bytes", summary.faces, text.len());
+    assert!(text.len() * 100 < 6_000_000 * summary.faces);
+}
+
+#[test]
 fn every_reference_names_an_entity_and_the_bytes_are_the_same_twice() {
     let case = both(torus(6), tube());
     let (_, text) = write(&case).unwrap();

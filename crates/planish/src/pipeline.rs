@@ -15,11 +15,13 @@
 
 mod bricks;
 mod deform;
+mod hint;
 pub mod key;
 mod quality;
 mod record;
 mod rework;
 mod scan;
+mod sound;
 mod trial;
 mod truth;
 

@@ -2,7 +2,7 @@
 //!
 //! US PRO, *Initial Graphics Exchange Specification 5.3* (1996): surfaces 128 with curves 126; for a closed component a solid
 //! 186 of one shell 514 of faces 510 with a loop 508 each, one list of edges 504 and one of vertices 502. Every edge brings its
-//! line 110 in the parameters of the faces beside it.
+//! line 110 in the parameters of the faces beside it. Names are properties 406 of form 15, colours definitions 314.
 //!
 //! Patches of an open component are surfaces 128 by themselves: none of them is trimmed, and the format's trimmed
 //! surfaces 143 and 144 share no edges either.
@@ -14,8 +14,9 @@ use crate::{Place, WriteError, atomic};
 use planish::Units;
 use planish::geom::Aabb;
 use planish::network::Network;
+use planish::render;
 use planish::surface::Surface;
-use records::{Records, Role, coordinates, real, text};
+use records::{Mark, Records, Role, coordinates, real, text};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -48,7 +49,8 @@ pub struct IgesSummary {
     pub surfaces: usize,
 }
 
-/// Writes patches as IGES 5.3. Normals point outside. The time in the file is fixed, so that the same model gives the same
+/// Writes patches as IGES 5.3. Names and colours are those of [`crate::write_step`], but for edges, which the format gives none;
+/// their curves have labels. Normals point outside. The time in the file is fixed, so that the same model gives the same
 /// bytes. The file appears whole or not at all.
 /// # Errors
 /// As [`crate::write_step`], and `WriteError::Value` for more than the format can count.
@@ -56,14 +58,17 @@ pub fn write_iges(path: impl AsRef<Path>, input: &IgesInput) -> Result<IgesSumma
     let topology = Topology::new(input.network, input.surfaces)?;
     let mut records = Records::default();
     let mut summary = IgesSummary::default();
-    for Component { patches, closed } in &topology.components {
+    let marks = marks(&mut records, input.surfaces.len());
+    for (number, Component { patches, closed }) in (1..).zip(&topology.components) {
         if *closed {
-            solid(&mut records, input, &topology, patches)?;
+            let shell = shell(&mut records, input, &topology, (patches, &marks))?;
+            let mark = Mark { name: Some(name(&mut records, &format!("piece {number}"))), ..Mark::default() };
+            records.add([186, 0], Role::Free, mark, &[shell.to_string(), "1".into(), "0".into()]);
             summary.solids += 1;
             summary.faces += patches.len();
         } else {
             for &p in patches {
-                surface(&mut records, &input.surfaces[p], p, Role::Free);
+                surface(&mut records, &input.surfaces[p], marks[p], Role::Free);
                 summary.surfaces += 1;
             }
         }
@@ -99,13 +104,36 @@ fn global(input: &IgesInput, gap_max: f64) -> Vec<String> {
     values
 }
 
-/// A closed component.
-fn solid(records: &mut Records, input: &IgesInput, topology: &Topology, patches: &[usize]) -> Result<(), WriteError> {
+/// Label, name and colour of every patch.
+fn marks(records: &mut Records, count: usize) -> Vec<Mark> {
+    let mut colors = BTreeMap::new();
+    let mark = |(p, color): (usize, [u8; 3])| {
+        let percent = color.map(|byte| real(f64::from(byte) / 2.55));
+        let color =
+            *colors.entry(color).or_insert_with(|| records.add([314, 0], Role::Definition, Mark::default(), &percent));
+        let name = name(records, &format!("patch {p}"));
+        Mark { label: Some(("PATCH", p)), color: Some(color), name: Some(name) }
+    };
+    render::even_colors(count).into_iter().enumerate().map(mark).collect()
+}
+
+/// A name that entities may point to.
+fn name(records: &mut Records, words: &str) -> usize {
+    records.add([406, 15], Role::Definition, Mark::default(), &["1".into(), text(words)])
+}
+
+/// The shell of a closed component.
+fn shell(
+    records: &mut Records,
+    input: &IgesInput,
+    topology: &Topology,
+    (patches, marks): (&[usize], &[Mark]),
+) -> Result<usize, WriteError> {
     let list = edges(records, input, topology, patches)?;
     let lines = side_lines(records);
     let mut shell = vec![patches.len().to_string()];
     for &p in patches {
-        let on = surface(records, &input.surfaces[p], p, Role::Part);
+        let on = surface(records, &input.surfaces[p], Mark { name: None, ..marks[p] }, Role::Part);
         let sides = input.network.patches[p].sides.iter().enumerate();
         // A collapsed side is a point, which its neighbours already end at.
         let uses: Vec<_> = sides.filter_map(|(k, side)| Some((k, side, *list.numbers.get(&side.curve)?))).collect();
@@ -117,13 +145,11 @@ fn solid(records: &mut Records, input: &IgesInput, topology: &Topology, patches:
             ring.extend(["0".into(), list.pointer.to_string(), number.to_string(), agrees.into()]);
             ring.extend(["1".into(), "0".into(), lines[k].to_string()]);
         }
-        let ring = records.add([508, 1], Role::Part, None, &ring);
+        let ring = records.add([508, 1], Role::Part, Mark::default(), &ring);
         let face = [on.to_string(), "1".into(), "1".into(), ring.to_string()];
-        shell.extend([records.add([510, 1], Role::Part, Some(p), &face).to_string(), "1".into()]);
+        shell.extend([records.add([510, 1], Role::Part, marks[p], &face).to_string(), "1".into()]);
     }
-    let shell = records.add([514, 1], Role::Part, None, &shell);
-    records.add([186, 0], Role::Free, None, &[shell.to_string(), "1".into(), "0".into()]);
-    Ok(())
+    Ok(records.add([514, 1], Role::Part, Mark::default(), &shell))
 }
 
 /// A list of edges.
@@ -160,19 +186,19 @@ fn edges(
         })?;
         vertices.extend(coordinates(place));
     }
-    let vertices = records.add([502, 1], Role::Part, None, &vertices);
+    let vertices = records.add([502, 1], Role::Part, Mark::default(), &vertices);
     let mut values = vec![numbers.len().to_string()];
     for &c in numbers.keys() {
         let Some(row) = &topology.curves[c as usize] else { continue };
-        values.push(curve(records, row).to_string());
+        values.push(curve(records, row, c as usize).to_string());
         for corner in input.network.curves[c as usize].corners {
             values.extend([vertices.to_string(), corners[&corner].to_string()]);
         }
     }
-    Ok(Edges { pointer: records.add([504, 1], Role::Part, None, &values), numbers })
+    Ok(Edges { pointer: records.add([504, 1], Role::Part, Mark::default(), &values), numbers })
 }
 
-fn curve(records: &mut Records, row: &topology::Row) -> usize {
+fn curve(records: &mut Records, row: &topology::Row, number: usize) -> usize {
     let closed = if row.is_closed() { "1" } else { "0" };
     let mut values = vec![(row.control.len() - 1).to_string(), "3".into()];
     // Not planar as far as anybody knows, closed or not, polynomial, not periodic.
@@ -181,11 +207,12 @@ fn curve(records: &mut Records, row: &topology::Row) -> usize {
     values.extend(row.control.iter().map(|_| real(1.0)));
     values.extend(row.control.iter().flat_map(|&p| coordinates(p)));
     values.extend([row.knots[0], row.knots[row.knots.len() - 1], 0.0, 0.0, 0.0].map(real));
-    records.add([126, 0], Role::Part, None, &values)
+    let mark = Mark { label: Some(("CURVE", number)), ..Mark::default() };
+    records.add([126, 0], Role::Part, mark, &values)
 }
 
 /// A B-spline surface with its knots: control points with `u` fastest, as ours.
-fn surface(records: &mut Records, surface: &Surface, patch: usize, role: Role) -> usize {
+fn surface(records: &mut Records, surface: &Surface, mark: Mark, role: Role) -> usize {
     let flag = |closed: bool| if closed { "1" } else { "0" };
     let (closed_u, closed_v) = topology::closed(surface);
     let mut values = vec![(surface.cols - 1).to_string(), (surface.rows - 1).to_string()];
@@ -196,7 +223,7 @@ fn surface(records: &mut Records, surface: &Surface, patch: usize, role: Role) -
     values.extend(surface.control.iter().flat_map(|&p| coordinates(p)));
     let (u, v) = (&surface.knots_u, &surface.knots_v);
     values.extend([u[3], u[surface.cols], v[3], v[surface.rows]].map(real));
-    records.add([128, 0], role, Some(patch), &values)
+    records.add([128, 0], role, mark, &values)
 }
 
 /// The sides of the square of parameters along the way around a patch.
@@ -205,6 +232,6 @@ fn side_lines(records: &mut Records) -> [usize; 4] {
     std::array::from_fn(|k| {
         let ends = [CORNERS[k], CORNERS[(k + 1) % 4]];
         let values: Vec<String> = ends.iter().flat_map(|[u, v]| [*u, *v, 0.0]).map(real).collect();
-        records.add([110, 0], Role::Flat, None, &values)
+        records.add([110, 0], Role::Flat, Mark::default(), &values)
     })
 }

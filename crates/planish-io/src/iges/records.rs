@@ -20,6 +20,8 @@ pub(super) enum Role {
     Part,
     /// It lives in the parameters of a surface and is a part of another entity.
     Flat,
+    /// It says what others point to: a colour, a name.
+    Definition,
 }
 
 impl Role {
@@ -29,8 +31,20 @@ impl Role {
             Role::Free => "00000000",
             Role::Part => "00010000",
             Role::Flat => "00010500",
+            Role::Definition => "00010200",
         }
     }
+}
+
+/// What people see of an entity.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Mark {
+    /// A word of up to eight letters and the number behind it.
+    pub label: Option<(&'static str, usize)>,
+    /// Pointer to its colour.
+    pub color: Option<usize>,
+    /// Pointer to its name.
+    pub name: Option<usize>,
 }
 
 /// Directory and parameters as they grow.
@@ -45,13 +59,15 @@ pub(super) struct Records {
 impl Records {
     /// Adds an entity; returns what others name it by: the number of its line in the directory.
     /// * `kind` - its type and form
-    /// * `label` - the number behind the label `PATCH`, for what is one patch
-    pub fn add(&mut self, kind: [u32; 2], role: Role, label: Option<usize>, values: &[String]) -> usize {
+    pub fn add(&mut self, kind: [u32; 2], role: Role, mark: Mark, values: &[String]) -> usize {
         let pointer = 2 * self.entities + 1;
         self.entities += 1;
         let first = self.lines + 1;
         let number = kind[0].to_string();
-        let all: Vec<&str> = std::iter::once(&number).chain(values).map(String::as_str).collect();
+        // Behind the parameters of the entity: no associations, one property.
+        let name: Vec<String> =
+            mark.name.map(|p| ["0".into(), "1".into(), p.to_string()]).into_iter().flatten().collect();
+        let all: Vec<&str> = std::iter::once(&number).chain(values).chain(&name).map(String::as_str).collect();
         for line in packed(&all, PARAMETERS) {
             self.lines += 1;
             // Writing to a string does not fail.
@@ -59,7 +75,9 @@ impl Records {
         }
         let count = self.lines + 1 - first;
         let (kind, form) = (kind[0], kind[1]);
-        let (name, number) = label.map_or((String::new(), 0), |p| ("PATCH".into(), p));
+        let (label, number) = mark.label.unwrap_or(("", 0));
+        // A colour that is defined is pointed to by a negative number.
+        let color = mark.color.map_or("0".into(), |p| format!("-{p}"));
         let _ = writeln!(
             self.directory,
             "{kind:>8}{first:>8}{zero:>8}{zero:>8}{zero:>8}{zero:>8}{zero:>8}{zero:>8}{status}D{pointer:>7}",
@@ -68,7 +86,7 @@ impl Records {
         );
         let _ = writeln!(
             self.directory,
-            "{kind:>8}{zero:>8}{zero:>8}{count:>8}{form:>8}{blank:>8}{blank:>8}{name:>8}{number:>8}D{:>7}",
+            "{kind:>8}{zero:>8}{color:>8}{count:>8}{form:>8}{blank:>8}{blank:>8}{label:>8}{number:>8}D{:>7}",
             pointer + 1,
             zero = 0,
             blank = "",

@@ -24,6 +24,8 @@ pub struct Picture {
 pub enum Place {
     /// Beside the others.
     Gallery,
+    /// By itself, as wide as the page.
+    Wide,
     /// Under a slider with the next one of this kind.
     Slider,
     /// Among the six sides.
@@ -49,7 +51,10 @@ pub fn gallery(page: &mut String, pictures: &[Picture]) {
     );
     let of = |place: Place| pictures.iter().enumerate().filter(move |(_, p)| p.place == place);
     for (k, picture) in of(Place::Gallery) {
-        figure(page, k, picture);
+        figure(page, k, picture, "");
+    }
+    for (k, picture) in of(Place::Wide) {
+        figure(page, k, picture, " class=\"wide\"");
     }
     if let [(_, below), (_, above)] = of(Place::Slider).collect::<Vec<_>>()[..] {
         slider(page, below, above);
@@ -57,16 +62,17 @@ pub fn gallery(page: &mut String, pictures: &[Picture]) {
     page.push_str("</div>\n");
     if of(Place::Side).next().is_some() {
         page.push_str("<h2>From six sides</h2>\n<div class=\"pictures sides\">\n");
-        of(Place::Side).for_each(|(k, picture)| figure(page, k, picture));
+        of(Place::Side).for_each(|(k, picture)| figure(page, k, picture, ""));
         page.push_str("</div>\n");
     }
 }
 
-fn figure(page: &mut String, k: usize, picture: &Picture) {
+/// * `class` - attribute of the figure
+fn figure(page: &mut String, k: usize, picture: &Picture, class: &str) {
     let title = escape(&picture.title);
     let _ = write!(
         page,
-        "<figure id=\"picture-{k}\"><a class=\"open\" href=\"#picture-{k}\"><img alt=\"{title}\" \
+        "<figure{class} id=\"picture-{k}\"><a class=\"open\" href=\"#picture-{k}\"><img alt=\"{title}\" \
          src=\"data:image/png;base64,{}\"></a><a class=\"close\" href=\"#pictures\" aria-label=\"back\"></a>\n\
          <figcaption><b>{title}</b><span>{}</span>",
         STANDARD.encode(&picture.png),

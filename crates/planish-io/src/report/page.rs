@@ -53,7 +53,7 @@ const TRUTH_FIGURES: [&str; 12] = [
 ];
 
 /// Figures of quality.
-const FIGURES: [&str; 35] = [
+const FIGURES: [&str; 39] = [
     key::MESH_TRIANGLES,
     key::MESH_WATERTIGHT,
     key::MESH_MANIFOLD,
@@ -67,6 +67,10 @@ const FIGURES: [&str; 35] = [
     key::GRID_FOLDS,
     key::GRID_SPACING_CV,
     key::SURFACE_CONTROL_POINTS,
+    key::SURFACE_TURNED,
+    key::SURFACE_UNPROVEN,
+    key::SURFACE_CROSSINGS,
+    key::SURFACE_CROSSING_DEPTH,
     key::SURFACE_RMS,
     key::SURFACE_P95,
     key::SURFACE_MAX,

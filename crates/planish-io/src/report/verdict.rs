@@ -93,6 +93,9 @@ pub fn state_of(report: &Report, key: &str) -> Option<State> {
                 _ => State::Look,
             }
         }
+        key::SURFACE_CROSSINGS if value > 0.0 => State::Broken,
+        key::SURFACE_TURNED if value > 0.0 => State::Look,
+        key::SURFACE_CROSSINGS | key::SURFACE_TURNED => State::Good,
         key::SCAN_CONFIDENCE => {
             if value < SURE {
                 State::Look
@@ -106,12 +109,14 @@ pub fn state_of(report: &Report, key: &str) -> Option<State> {
 }
 
 /// Figures that decide, the gravest first.
-const DECISIVE: [&str; 8] = [
+const DECISIVE: [&str; 10] = [
     key::MESH_MANIFOLD,
     key::DISPLACED_RMS,
     key::SEAM_GAP_MAX,
     key::SEAM_FOLDED,
+    key::SURFACE_CROSSINGS,
     key::GRID_FOLDS,
+    key::SURFACE_TURNED,
     key::SCAN_CONFIDENCE,
     key::SEAM_INNER_ANGLE_MAX_DEG,
     key::MESH_WATERTIGHT,
@@ -157,6 +162,10 @@ fn reason(report: &Report, key: &str) -> String {
             let are = if value == 1.0 { "cell is" } else { "cells are" };
             format!("{} grid {are} folded ({})", count(value as u64), percent(value / cells))
         }
+        key::SURFACE_CROSSINGS if value == 1.0 => "surfaces cross in one place".into(),
+        key::SURFACE_CROSSINGS => format!("{} pairs of surfaces cross", count(value as u64)),
+        key::SURFACE_TURNED if value == 1.0 => "one surface turns over somewhere".into(),
+        key::SURFACE_TURNED => format!("{} surfaces turn over somewhere", count(value as u64)),
         key::SCAN_CONFIDENCE => format!("only {} of the evidence agrees on which side is outside", percent(value)),
         key::SEAM_INNER_ANGLE_MAX_DEG => format!("a smooth seam bends by {}°", number(value)),
         _ => "the shape is open: a shell, no solid".into(),
@@ -192,6 +201,10 @@ mod tests {
             ("grid.folds", 6196.0),
             ("grid.points", 20_000.0),
         ]);
+        let crossed = report(&[("surface.crossings", 2.0), ("surface.turned", 1.0)]);
+        let (state, reasons) = verdict(&crossed);
+        assert_eq!((state, reasons.len()), (State::Broken, 2));
+        assert!(reasons[0].1.contains("2 pairs") && reasons[1].0 == State::Look, "{reasons:?}");
         let (state, reasons) = verdict(&broken);
         let order: Vec<State> = reasons.iter().map(|r| r.0).collect();
         assert_eq!((state, order), (State::Broken, vec![State::Broken, State::Broken, State::Broken, State::Look]));

@@ -2,6 +2,7 @@
 //! are (`read`).
 
 mod read;
+mod style;
 mod text;
 mod write;
 

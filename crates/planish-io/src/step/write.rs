@@ -4,16 +4,18 @@
 //! 2. patches joined by curves form components; one without a free curve is a solid, the others open shells
 //! 3. one face per patch, one edge per curve, one vertex per corner, shared by all that meet there
 //! 4. every edge brings its curve in the parameters of both surfaces (PCURVE), so no kernel has to project it
+//! 5. faces, edges and components have the numbers of the report as names, and faces the colours of its picture
 //!
 //! The edge's curve is the boundary row of control points of the first patch along it, so a seam whose two
 //! rows are equal has no gap at all, and no kernel has to sew or to loosen a tolerance.
 
+use super::style;
 use super::text::{Entities, list, real, text};
 use crate::topology::{self, Component, Topology};
 use crate::{Place, WriteError, atomic};
 use planish::Units;
 use planish::geom::Aabb;
-use planish::network::{Network, Patch};
+use planish::network::Network;
 use planish::surface::Surface;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -54,7 +56,9 @@ pub struct StepSummary {
 }
 
 /// Writes patches as AP242: a `MANIFOLD_SOLID_BREP` per closed component, a `SHELL_BASED_SURFACE_MODEL` for the
-/// open ones. Normals point outside. The file appears whole or not at all.
+/// open ones. Faces are named `patch 17`, edges `curve 12`, by their numbers in the network, solids and shells `piece 1`, in the
+/// order of their first patch; faces have the colours of [`planish::render::even_colors`]. Normals point outside. The file
+/// appears whole or not at all.
 /// # Errors
 /// `WriteError::Nothing` without surfaces; `WriteError::Inconsistent` if surfaces and network do not belong
 /// together, a curve has more than two sides, its two patches run along it in the same direction, or they have
@@ -112,21 +116,21 @@ fn document(input: &StepInput, topology: &Topology) -> Result<(String, StepSumma
             .collect();
         let kind = if uses[c].len() == 2 && uses[c][0].0 == uses[c][1].0 { "SEAM_CURVE" } else { "SURFACE_CURVE" };
         let curve = e.add(format!("{kind}('',#{spline},{},.CURVE_3D.)", list(&on_surfaces)));
-        edges[c] = Some(e.add(format!("EDGE_CURVE('',#{start},#{end},#{curve},.T.)")));
+        edges[c] = Some(e.add(format!("EDGE_CURVE('curve {c}',#{start},#{end},#{curve},.T.)")));
     }
-    let faces: Vec<usize> =
-        (0..surfaces.len()).map(|p| face(&mut e, &input.network.patches[p], surfaces[p], &edges)).collect();
+    let faces: Vec<usize> = (0..surfaces.len()).map(|p| face(&mut e, input.network, p, surfaces[p], &edges)).collect();
     let mut solids = Vec::new();
     let mut shells = Vec::new();
-    for Component { patches, closed } in &topology.components {
+    for (number, Component { patches, closed }) in (1..).zip(&topology.components) {
         let ids: Vec<usize> = patches.iter().map(|&p| faces[p]).collect();
         if *closed {
             let shell = e.add(format!("CLOSED_SHELL('',{})", list(&ids)));
-            solids.push(e.add(format!("MANIFOLD_SOLID_BREP({},#{shell})", text(input.name))));
+            solids.push(e.add(format!("MANIFOLD_SOLID_BREP('piece {number}',#{shell})")));
         } else {
-            shells.push(e.add(format!("OPEN_SHELL('',{})", list(&ids))));
+            shells.push(e.add(format!("OPEN_SHELL('piece {number}',{})", list(&ids))));
         }
     }
+    style::color(&mut e, &faces, context);
     let summary = StepSummary {
         solids: solids.len(),
         shells: shells.len(),
@@ -239,9 +243,9 @@ fn side_lines(e: &mut Entities) -> [[usize; 2]; 4] {
 }
 
 /// One patch as a face: its sides run counter-clockwise seen from where its normal points.
-fn face(e: &mut Entities, patch: &Patch, surface: usize, edges: &[Option<usize>]) -> usize {
+fn face(e: &mut Entities, network: &Network, patch: usize, surface: usize, edges: &[Option<usize>]) -> usize {
     let mut sides = Vec::new();
-    for side in &patch.sides {
+    for side in &network.patches[patch].sides {
         // A collapsed side is a point, which its neighbours already end at.
         if let Some(edge) = edges[side.curve as usize] {
             let direction = if side.reversed { ".F." } else { ".T." };
@@ -250,7 +254,7 @@ fn face(e: &mut Entities, patch: &Patch, surface: usize, edges: &[Option<usize>]
     }
     let ring = e.add(format!("EDGE_LOOP('',{})", list(&sides)));
     let bound = e.add(format!("FACE_OUTER_BOUND('',#{ring},.T.)"));
-    e.add(format!("ADVANCED_FACE('',(#{bound}),#{surface},.T.)"))
+    e.add(format!("ADVANCED_FACE('patch {patch}',(#{bound}),#{surface},.T.)"))
 }
 
 /// Distinct knots and how often each stands, as STEP lists.

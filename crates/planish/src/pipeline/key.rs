@@ -116,6 +116,10 @@ keys! {
     GRID_FOLDS = "grid.folds", Plain, "Folded grid cells";
     GRID_SPACING_CV = "grid.spacing_cv", Share, "Unevenness of grid spacing (deviation over mean)";
     SURFACE_CONTROL_POINTS = "surface.control_points", Plain, "Control points of all surfaces";
+    SURFACE_TURNED = "surface.turned", Plain, "Patches whose surface points against its grid somewhere";
+    SURFACE_UNPROVEN = "surface.unproven", Plain, "Patches of which neither that nor the contrary is proven";
+    SURFACE_CROSSINGS = "surface.crossings", Plain, "Pairs of patches that cross, and patches that cross themselves";
+    SURFACE_CROSSING_DEPTH = "surface.crossing_depth", Length, "Crossings less deep than this may be missed";
     SURFACE_FOLDS = "surface.folds", Plain, "Patches whose surface folds over";
     SURFACE_RMS = "surface.rms", Length, "Surface to input, root mean square";
     SURFACE_RMS_REL = "surface.rms_rel", Share, "The same, as a share of the diagonal";

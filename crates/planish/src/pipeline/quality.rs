@@ -2,8 +2,9 @@
 //!
 //! See `docs/methods/measuring.md`; the keys are in `docs/guide/report.md`.
 
-use super::key;
+use super::hint::{across, few, in_script, relax_near};
 use super::{Figure, PipelineError, Quality, Warning};
+use super::{key, sound};
 use crate::geom::is_positive;
 use crate::grid::{self, Grid};
 use crate::layout::Method;
@@ -50,6 +51,7 @@ pub(super) fn measure(
     observer.check()?;
     grid_figures(model, patches, &mut quality, &mut warnings, observer)?;
     let seams = seam_figures(model, diagonal, &mut quality, &mut warnings, observer)?;
+    sound::figures(model, &mut quality, &mut warnings, observer)?;
     observer.progress(0.1);
 
     let control: usize = model.surfaces.iter().map(|s| s.control.len()).sum();
@@ -358,13 +360,6 @@ fn grid_figures(
     Ok(())
 }
 
-/// The step of a script that draws an iso-curve through the middle of a grid.
-fn across(grid: &Grid) -> String {
-    let pick = |row: usize| in_script(grid.points[row * grid.cols + grid.cols / 2]);
-    let picks = [0, grid.rows / 2, grid.rows - 1].map(pick).join(", ");
-    format!("[[step]]\nedit = \"feature\"\nmode = \"geodesic\"\npicks = [{picks}]")
-}
-
 fn seam_figures(
     model: &Model,
     diagonal: f64,
@@ -501,17 +496,6 @@ fn angle_p95(model: &Model) -> f64 {
     reached.map_or(0.0, |p| p.angle_deg)
 }
 
-/// A coordinate as a script has it: what is left out is far below what moves a curve.
-fn in_script(p: DVec3) -> String {
-    let [x, y, z] = p.to_array().map(|x| (x * 1e6).round() / 1e6);
-    format!("[{x}, {y}, {z}]")
-}
-
-/// The step of a script that lets the curve near a place come to rest.
-fn relax_near(at: DVec3) -> String {
-    format!("[[step]]\nedit = \"relax\"\ncurve = {{ near = {} }}", in_script(at))
-}
-
 fn relief_figures(
     model: &Model,
     diagonal: f64,
@@ -546,13 +530,6 @@ fn relief_figures(
         );
     }
     Ok(())
-}
-
-/// The first few of a list, in words.
-fn few(names: &[String]) -> String {
-    const SHOWN: usize = 8;
-    let head = names[..names.len().min(SHOWN)].join(", ");
-    if names.len() > SHOWN { format!("{head} and {} more", names.len() - SHOWN) } else { head }
 }
 
 #[cfg(test)]

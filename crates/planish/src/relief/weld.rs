@@ -12,7 +12,7 @@ use crate::mesh::{Attribute, TriMesh};
 use crate::network::Network;
 use crate::observe::{Cancelled, Observer};
 use crate::surface::basis::uniform_parameters;
-use crate::surface::{FitError, Surface, check, node};
+use crate::surface::{Facet, FitError, Surface, check, node};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -40,6 +40,22 @@ impl PatchedMesh {
             }
         }
         values
+    }
+
+    /// For each triangle its patch and the parameters of its middle, if the nodes are even steps in the parameters.
+    pub fn facets(&self) -> Vec<Facet> {
+        let one = |(p, patch): (usize, &PatchNodes)| {
+            let middle = |t: &[u32; 3], of: &dyn Fn(usize) -> usize, count: usize| {
+                t.iter().map(|&n| of(n as usize)).sum::<usize>() as f64 / (3 * (count - 1)) as f64
+            };
+            let facet = |t: &[u32; 3]| {
+                let u = middle(t, &|n| n % patch.cols, patch.cols);
+                let v = middle(t, &|n| n / patch.cols, patch.rows);
+                Facet { patch: p as u32, place: [u, v] }
+            };
+            patch.triangles.iter().map(facet).collect::<Vec<_>>()
+        };
+        self.patches.iter().enumerate().flat_map(one).collect()
     }
 
     /// Vectors of the vertices as vectors of the nodes of all patches.

@@ -103,6 +103,8 @@ pub struct Label {
 pub struct Look<'a> {
     /// What it is painted with.
     pub paint: Paint<'a>,
+    /// Unit normals of the vertices, of surfaces that know their own; without them those of the facets are smoothed.
+    pub normals: Option<&'a [DVec3]>,
     /// Normals are smoothed except over edges sharper than this many degrees; 0 shows every facet.
     pub crease_deg: f64,
     /// Darkening of hollows, 0 (none) to 1.
@@ -119,6 +121,7 @@ impl Default for Look<'_> {
     fn default() -> Self {
         Look {
             paint: Paint::Plain([222, 214, 200]),
+            normals: None,
             crease_deg: 35.0,
             hollows: 0.8,
             lines: Vec::new(),
@@ -139,8 +142,8 @@ pub enum RenderError {
         /// Pixels down.
         height: usize,
     },
-    /// Colours or numbers do not match the mesh.
-    #[error("{found} colours or numbers for {wanted} {what}; one each is needed")]
+    /// Colours, numbers or normals do not match the mesh.
+    #[error("{found} colours, numbers or normals for {wanted} {what}; one each is needed")]
     Count {
         /// `triangles` or `vertices`.
         what: &'static str,
@@ -172,6 +175,10 @@ pub fn render(mesh: &TriMesh, look: &Look, camera: &Camera, width: usize, height
     };
     if wanted != found {
         return Err(RenderError::Count { what, wanted, found });
+    }
+    if let Some(normals) = look.normals.filter(|n| n.len() != mesh.points.len()) {
+        let (wanted, found) = (mesh.points.len(), normals.len());
+        return Err(RenderError::Count { what: "vertices", wanted, found });
     }
     let frame = camera.frame(width * FINE, height * FINE);
     let seen = visible::see(mesh, &frame);

@@ -16,7 +16,12 @@ pub(super) type Sample = Option<Vec3>;
 const TABLE: usize = 1024;
 
 pub(super) fn shade(mesh: &TriMesh, look: &Look, frame: &Frame, seen: &Seen) -> Vec<Sample> {
-    let normals = corner_normals(mesh, look.crease_deg, seen);
+    let smoothed = if look.normals.is_none() { Some(corner_normals(mesh, look.crease_deg, seen)) } else { None };
+    let normals = |face: u32| match (look.normals, &smoothed) {
+        (Some(own), _) => mesh.triangles[face as usize].map(|v| own[v as usize]),
+        (None, Some(smoothed)) => smoothed.of(face),
+        (None, None) => unreachable!("there are smoothed normals where there are no others"),
+    };
     let open = if look.hollows > 0.0 { openness(mesh, frame, seen) } else { Vec::new() };
     let color_at = if let Paint::Signed { .. } = look.paint { signed_color } else { field_color };
     let table: Vec<Vec3> = (0..=TABLE).map(|k| light(color_at(k as f64 / TABLE as f64))).collect();
@@ -26,7 +31,7 @@ pub(super) fn shade(mesh: &TriMesh, look: &Look, frame: &Frame, seen: &Seen) -> 
         let ray = frame.ray(x as f64 + 0.5, y as f64 + 0.5);
         let corners = mesh.corners(face as usize);
         let bary = weights(corners, frame.camera.eye, ray);
-        let [l, m, n] = normals.of(face);
+        let [l, m, n] = normals(face);
         let mut normal = (l * bary[0] + m * bary[1] + n * bary[2]).normalize_or(-frame.camera.forward);
         let geometric = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let back = geometric.dot(ray) > 0.0;

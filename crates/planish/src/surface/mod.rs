@@ -5,6 +5,7 @@
 //! 3. a network without gaps and folds - `params`, `network_fit`, `resolution`, `spacing`, `fold`
 //! 4. smooth seams - `seam`, §8.1      5. how good it is - `quality`, eq. 6.1
 //! 6. exact mirror images where there is a plane of symmetry - `mirrored`      7. after small edits - `retouch`
+//! 8. that none turns over, and which cross - `sound`
 
 pub mod basis;
 mod error;
@@ -19,6 +20,7 @@ mod resolution;
 mod retouch;
 mod seam;
 mod sides;
+mod sound;
 mod spacing;
 
 pub use error::FitError;
@@ -35,6 +37,7 @@ pub use quality::{
 };
 pub use retouch::retouch;
 pub use seam::{BENT_DEG, EDGE_ANGLE_DEG, EdgeInSeam, StitchParams, edges_in_seams, stitch, stitch_near};
+pub use sound::{Crossing, Facet, Turning, crossings, facet_error, turning};
 pub(crate) use sides::{check, check_grids, node};
 
 use glam::DVec3;
