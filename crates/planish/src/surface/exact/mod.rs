@@ -146,6 +146,9 @@ struct Task<'a> {
     tolerance: f64,
 }
 
+/// Surfaces, and the states of all seams.
+type Solved = (Vec<Surface>, Vec<Seam>);
+
 impl Task<'_> {
     /// Conditions along exact seams, and wishes along weighed ones.
     fn rows(&self, seams: &[Seam], glued: &[Option<Gluing>], shared: &Shared) -> (Vec<Row>, Vec<Row>) {
@@ -175,7 +178,7 @@ impl Task<'_> {
         given_up: &[usize],
         targets: &[Grid],
         observer: &dyn Observer,
-    ) -> Result<Option<(Vec<Surface>, Vec<Seam>)>, FitError> {
+    ) -> Result<Option<Solved>, FitError> {
         let network = self.fit.network;
         let (mut glued, seams) = self.start(given_up);
 
