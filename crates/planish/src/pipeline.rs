@@ -700,14 +700,30 @@ fn surfaces_through(
     let mut fitted = clock.stage("surfaces", |o| surface::fit_network(network, grids, &fit, o), control)?;
     // Seams are smoothed between images already, and what that takes from their symmetry is given back.
     symmetric(true, &mut fitted);
-    let mut smooth = clock.stage(
-        "seams",
-        |o| match params.fit.continuity {
-            Continuity::C0 => Ok(fitted.clone()),
-            Continuity::G1 | Continuity::G1Double => surface::stitch(network, grids, &fitted, &stitch, o),
-        },
-        |_| [("curves", network.curves.len())],
-    )?;
+    let made = |o: &dyn Observer| match params.fit.continuity {
+        Continuity::C0 => Ok((fitted.clone(), 0)),
+        Continuity::G1 | Continuity::G1Double => Ok((surface::stitch(network, grids, &fitted, &stitch, o)?, 0)),
+        Continuity::G1Exact => {
+            let mut smooth = surface::stitch(network, grids, &fitted, &stitch, &Part::new(o, 0.0, 0.3))?;
+            symmetric(false, &mut smooth);
+            // What is fitted to images is its own image.
+            let mut form = grids.to_vec();
+            if let Some(plane) = &model.sketch.symmetry {
+                surface::mirror_grids(&model.mesh, network, plane, &mut form);
+            }
+            let exact = surface::exact(network, &form, &smooth, &stitch, &Part::new(o, 0.3, 0.7))?;
+            Ok::<_, FitError>((exact.surfaces, exact.seams.len()))
+        }
+    };
+    // What the fit loses to its seams, along the normal, as a share of what it missed.
+    let percent = |smooth: &[surface::Surface]| {
+        let [is, was] = [smooth, &fitted[..]].map(|surfaces| surface::normal_rms(surfaces, grids));
+        if was > 0.0 { (100.0 * is / was).round() as usize } else { 100 }
+    };
+    let counts = |(smooth, exact): &(Vec<surface::Surface>, usize)| {
+        [("curves", network.curves.len()), ("exact", *exact), ("rms_percent", percent(smooth))]
+    };
+    let (mut smooth, _) = clock.stage("seams", made, counts)?;
     symmetric(false, &mut smooth);
     let reliefs = clock.stage(
         "relief",

@@ -172,6 +172,9 @@ fn surfaces_and_seams_end_within_200_ms() {
     stops("surfaces", |o| surface::fit_network(&model.network, &model.grids, &Default::default(), o));
     let fitted = surface::fit_network(&model.network, &model.grids, &Default::default(), &Silent).expect("surfaces");
     stops("seams", |o| surface::stitch(&model.network, &model.grids, &fitted, &Default::default(), o));
+    let params = surface::FitParams { continuity: surface::Continuity::G1Exact, ..Default::default() };
+    let fitted = surface::fit_network(&model.network, &model.grids, &params, &Silent).expect("surfaces");
+    stops("exact seams", |o| surface::exact(&model.network, &model.grids, &fitted, &Default::default(), o));
 }
 
 #[test]

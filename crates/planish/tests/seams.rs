@@ -6,7 +6,7 @@ use glam::DVec3;
 use patchworks::*;
 use planish::Silent;
 use planish::network::CurveKind;
-use planish::surface::{self, Continuity, FitParams, Resolution, SeamQuality, StitchParams, Surface};
+use planish::surface::{self, Continuity, Exact, FitParams, Resolution, SeamQuality, StitchParams, Surface};
 
 fn params(control: usize, continuity: Continuity) -> FitParams {
     let resolution = Resolution::Control([control, control]);
@@ -395,4 +395,143 @@ fn after_an_edit_of_one_patch_only_those_that_share_a_corner_with_it_are_solved_
     let (one, full) = (surface::deviation(&after, &work.grids).rms, surface::deviation(&whole, &work.grids).rms);
     assert!(one <= 1.1 * full, "RMS {one:e} and {full:e}");
     assert!(near(&[]) == before);
+}
+
+/// The surfaces as fitted, with smooth seams, and with exact ones.
+fn exact(work: &Patchwork, control: usize) -> ([Vec<Surface>; 2], Exact) {
+    let stitch = StitchParams { tolerance: 0.01, ..StitchParams::default() };
+    let [fitted, smooth] = both(work, &params(control, Continuity::G1Exact), &stitch);
+    let exact = surface::exact(&work.network, &work.grids, &smooth, &stitch, &Silent).unwrap();
+    ([fitted, smooth], exact)
+}
+
+/// What no angle along the smooth seams exceeds, degrees.
+fn bound(work: &Patchwork, surfaces: &[Surface]) -> f64 {
+    let seams = seams(work, surfaces);
+    assert!(seams.iter().all(|s| s.gap_max < 1e-14));
+    seams.iter().map(|s| s.angle_max_deg.max(s.regular_angle_bound_deg.unwrap())).fold(0.0, f64::max)
+}
+
+#[test]
+fn exact_seams_around_corners_of_three_patches_cost_the_fit_a_fifth_at_most() {
+    for (shape, loss) in [(to_sphere as fn(DVec3) -> DVec3, 1.2), (blob, 1.0)] {
+        let work = cube(41, CurveKind::Smooth, shape);
+        let ([fitted, smooth], exact) = exact(&work, 14);
+        assert!(exact.kept.is_empty() && exact.seams.len() == 12);
+        let bound = bound(&work, &exact.surfaces);
+        assert!(bound <= 1e-3 && angles(&work, &smooth)[1] > 0.01, "{bound} degrees");
+        let [was, is] = [&fitted, &exact.surfaces].map(|s| surface::normal_rms(s, &work.grids));
+        assert!(is <= loss * was, "RMS {was:e} to {is:e}");
+    }
+}
+
+#[test]
+fn exact_seams_of_uneven_balls_with_corners_of_3_to_8_patches_bend_by_a_thousandth_of_a_degree_at_most() {
+    // What it costs the fit grows with how uneven the corners are.
+    for (sides, loss) in [(5, 1.5), (6, 16.0), (8, 90.0)] {
+        let work = ball(sides, 33);
+        let ([fitted, _], exact) = exact(&work, 14);
+        assert!(exact.kept.is_empty(), "{:?}", exact.kept);
+        let bound = bound(&work, &exact.surfaces);
+        let [was, is] = [&fitted, &exact.surfaces].map(|s| surface::normal_rms(s, &work.grids));
+        assert!(bound <= 1e-3, "{sides}: {bound} degrees");
+        assert!(is <= loss * was, "{sides}: RMS {was:e} to {is:e}");
+    }
+}
+
+#[test]
+fn exact_seams_of_a_torus_are_as_near_as_smooth_ones() {
+    let work = torus(33);
+    let ([_, smooth], exact) = exact(&work, 10);
+    let bound = bound(&work, &exact.surfaces);
+    let [was, is] = [&smooth, &exact.surfaces].map(|s| surface::normal_rms(s, &work.grids));
+    assert!(exact.kept.is_empty() && bound <= 1e-3, "{bound} degrees");
+    assert!(is <= was, "RMS {was:e} to {is:e}");
+}
+
+#[test]
+fn a_box_of_sharp_edges_stays_bit_for_bit() {
+    let work = cube(17, CurveKind::Feature, |p| p);
+    let ([_, smooth], exact) = exact(&work, 8);
+    assert!(exact.surfaces == smooth && exact.seams.is_empty() && exact.kept.is_empty());
+}
+
+#[test]
+fn exact_seams_of_an_open_sheet_leave_the_corners_on_its_border_where_they_are() {
+    let work = wavy([33, 33]);
+    let ([fitted, smooth], exact) = exact(&work, 10);
+    assert!(exact.kept.is_empty() && bound(&work, &exact.surfaces) <= 1e-3);
+    let [was, is] = [&fitted, &exact.surfaces].map(|s| surface::normal_rms(s, &work.grids));
+    assert!(is <= 1.1 * was, "RMS {was:e} to {is:e}");
+    for (before, after) in smooth.iter().zip(&exact.surfaces) {
+        for [i, j] in [[0, 0], [9, 0], [9, 9], [0, 9]] {
+            // The corner inside may move.
+            let on_border = |p: DVec3| p.x < 1e-9 || p.x > 2.0 - 1e-9 || p.y < 1e-9 || p.y > 3.0 - 1e-9;
+            assert!(!on_border(before.at(i, j)) || before.at(i, j) == after.at(i, j));
+        }
+    }
+}
+
+/// A wavy sheet of 3 x 2 patches with a crease of 62 degrees along `x = 1`.
+fn creased(kind: CurveKind) -> (Patchwork, Vec<u32>) {
+    let height = |x: f64, y: f64| 0.03 * (3.0 * x).sin() * (2.5 * y).cos() - 0.6 * (x - 1.0).abs();
+    let mut work = sheet(3, 2, [false, false], [33, 33], |x, y| DVec3::new(x, y, height(x, y)));
+    let crease = [0, 3].map(|p| work.network.patches[p].sides[1].curve);
+    crease.iter().for_each(|&c| work.network.curves[c as usize].kind = kind);
+    (work, crease.to_vec())
+}
+
+#[test]
+fn exact_seams_meet_a_sharp_curve_that_keeps_its_place_and_its_angle() {
+    let (work, crease) = creased(CurveKind::Feature);
+    let ([fitted, _], exact) = exact(&work, 10);
+    let most = bound(&work, &exact.surfaces);
+    assert!(exact.kept.is_empty() && exact.seams.len() == 5 && most <= 1e-3, "{:?} {most}", exact.kept);
+    let all = surface::measure_seams(&work.network, &exact.surfaces, &Silent).unwrap();
+    for seam in all.iter().filter(|s| crease.contains(&s.curve)) {
+        assert!((seam.angle_mean_deg - 61.9).abs() < 1.0, "{seam:?}");
+    }
+    let off = |s: &Surface| (0..=64).map(|k| (s.point(1.0, k as f64 / 64.0).x - 1.0).abs()).fold(0.0, f64::max);
+    assert!(off(&exact.surfaces[0]) < 1e-5, "{}", off(&exact.surfaces[0]));
+    let [was, is] = [&fitted, &exact.surfaces].map(|s| surface::normal_rms(s, &work.grids));
+    assert!(is <= 1.5 * was, "RMS {was:e} to {is:e}");
+}
+
+#[test]
+fn a_seam_on_an_edge_is_told_and_all_others_are_exact() {
+    let (work, crease) = creased(CurveKind::Smooth);
+    let (_, exact) = exact(&work, 10);
+    assert_eq!(exact.kept, crease);
+    let others = seams(&work, &exact.surfaces).into_iter().filter(|s| exact.seams.contains(&s.curve));
+    let most = others.map(|s| s.angle_max_deg).fold(0.0, f64::max);
+    assert!(exact.seams.len() == 5 && most <= 1e-3, "{most} degrees");
+}
+
+#[test]
+fn seams_beside_a_flat_corner_keep_their_angle_and_all_others_are_exact() {
+    // One of the corners inside is the tip of a wedge of 3.8 degrees on either side.
+    let work = sheet(3, 2, [false, false], [33, 33], |x, y| {
+        let tip = 15.0 * (1.0 - (y - 1.0).abs()) * x.min(2.0 - x).max(0.0);
+        let place = 20.0 * x - tip;
+        DVec3::new(place, y, 0.5 * (0.1 * place).sin() * y.cos())
+    });
+    let ([_, smooth], exact) = exact(&work, 10);
+    assert!(exact.seams.len() == 3 && exact.kept.len() == 4, "{exact:?}");
+    for (before, after) in seams(&work, &smooth).iter().zip(seams(&work, &exact.surfaces)) {
+        if exact.seams.contains(&after.curve) {
+            assert!(after.angle_max_deg <= 1e-3, "{after:?}");
+        } else {
+            assert!(after.angle_rms_deg <= 1.2 * before.angle_rms_deg + 0.05, "{before:?} to {after:?}");
+        }
+    }
+}
+
+#[test]
+fn exact_seams_are_bitwise_equal_on_1_and_2_threads() {
+    let work = ball(5, 17);
+    let made = [1, 2].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| exact(&work, 8).1)
+    });
+    assert!(made[0] == made[1] && !made[0].seams.is_empty());
 }

@@ -79,6 +79,7 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
         reach = Reach::new(args.stages.demanded_tolerance(), params.fit.tolerance_of, &report, model.units);
         report.warnings.extend(missed::tolerance(&model, &params, reach, report.input.diagonal));
         report.warnings.extend(missed::angle(&model, &made.seams, &params, args.stages.demanded_angle()));
+        report.warnings.extend(missed::inexact(&made.seams, &params));
         report.seams = seam_rows(&model, &made.seams);
         model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
     } else if !args.stages.none_given() {

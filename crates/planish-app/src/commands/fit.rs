@@ -102,6 +102,7 @@ fn refit(session: &Session, args: &Fit) -> Result<(Report, Model, Option<Reach>)
     let reach = Reach::new(args.stages.demanded_tolerance(), params.fit.tolerance_of, &report, model.units);
     report.warnings.extend(missed::tolerance(&model, &params, reach, report.input.diagonal));
     report.warnings.extend(missed::angle(&model, &found.seams, &params, args.stages.demanded_angle()));
+    report.warnings.extend(missed::inexact(&found.seams, &params));
     report.seams = seam_rows(&model, &found.seams);
     model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
     let command = if gridded { "refit" } else { "fit" };

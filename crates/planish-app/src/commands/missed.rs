@@ -122,6 +122,33 @@ pub fn angle(model: &Model, seams: &[SeamQuality], params: &PipelineParams, dema
     Some(Warning::new(ANGLE, text, places.join("; ")))
 }
 
+/// Angle of an exact seam at most, degrees: far above rounding, far below what any receiver tells from nothing.
+const EXACT_DEG: f64 = 1e-3;
+
+/// Which smooth seams are not exact where exact ones are asked for, and where each bends by most.
+pub fn inexact(seams: &[SeamQuality], params: &PipelineParams) -> Option<Warning> {
+    if params.fit.continuity != Continuity::G1Exact {
+        return None;
+    }
+    let angle = |s: &SeamQuality| Some((s.curve, s.angle_max_deg.max(s.regular_angle_bound_deg?)));
+    let smooth: Vec<(u32, f64)> = seams.iter().filter_map(angle).collect();
+    let over: Vec<&(u32, f64)> = smooth.iter().filter(|s| s.1 > EXACT_DEG).collect();
+    if over.is_empty() {
+        return None;
+    }
+    let text = format!(
+        "{} of {} smooth seams are not exact: at edges, at corners where a patch is flat or pointed, and where the surfaces \
+         would turn over or leave the mesh; they are as smooth as the fit can afford.",
+        count(over.len() as u64),
+        count(smooth.len() as u64)
+    );
+    let mut places: Vec<String> = over.iter().take(NAMED).map(|s| format!("curve {}: {}", s.0, number(s.1))).collect();
+    if over.len() > NAMED {
+        places.push(format!("{} more", over.len() - NAMED));
+    }
+    Some(Warning::new("seams_inexact", text, places.join("; ")))
+}
+
 /// Why there are more or fewer patches than were asked for, by more than a fifth.
 pub fn patches(network: &Network, wanted: Option<u64>) -> Option<Warning> {
     let (wanted, found) = (wanted?, network.patches.len() as u64);

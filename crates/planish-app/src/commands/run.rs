@@ -266,6 +266,7 @@ pub fn fitted(
     let reach = Reach::new(job.demanded, run.params.fit.tolerance_of, &report, units);
     report.warnings.extend(missed::tolerance(&model, &run.params, reach, report.input.diagonal));
     report.warnings.extend(missed::angle(&model, &seams, &run.params, job.demanded_angle));
+    report.warnings.extend(missed::inexact(&seams, &run.params));
     report.warnings.extend(missed::patches(&model.network, job.wanted_patches));
     (model.units, model.shift) = (units, shift);
     model.params = serde_json::to_string(&run.params).map_err(Failure::fault)?;

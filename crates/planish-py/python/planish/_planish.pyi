@@ -87,7 +87,7 @@ class _Fit(TypedDict, total=False):
     max_control: int | None  # most control points of all surfaces for a tolerance
     cells_per_span: float | None  # grid cells for each knot span at least
     fit_smoothing: float | None  # weight of smoothness
-    continuity: Literal["c0", "g1", "g1_double"] | None  # how surfaces meet along smooth seams [g1]
+    continuity: Literal["c0", "g1", "g1_double", "g1_exact"] | None  # how surfaces meet along smooth seams [g1]
 
 class _Stitch(TypedDict, total=False):
     angle_tolerance: float | None  # largest angle along smooth seams, degrees [0.05]

@@ -11,10 +11,11 @@
 //! See `docs/methods/surfaces.md`, "Planes of symmetry".
 
 use super::Surface;
-use super::basis::Knots;
+use super::basis::{Knots, uniform_knots};
 use super::sides::{node, side_len};
 use crate::curve::symmetry::Plane;
 use crate::geom::polyline;
+use crate::grid::Grid;
 use crate::mesh::TriMesh;
 use crate::network::Network;
 use glam::DVec3;
@@ -60,6 +61,22 @@ pub fn mirror_surfaces(
         surfaces[q] = image(&surfaces[matched.mates[q].0], &matched, network, plane, q);
     }
     true
+}
+
+/// The same for the nodes of grids: what is fitted to them is its own image but for rounding, and conditions that it keeps are kept
+/// by the images, too.
+pub fn mirror_grids(mesh: &TriMesh, network: &Network, plane: &Plane, grids: &mut [Grid]) -> bool {
+    let net = |g: &Grid| Surface {
+        rows: g.rows,
+        cols: g.cols,
+        control: g.points.clone(),
+        knots_u: uniform_knots(g.cols),
+        knots_v: uniform_knots(g.rows),
+    };
+    let mut nets: Vec<Surface> = grids.iter().map(net).collect();
+    let is_mirrored = mirror_surfaces(mesh, network, plane, false, &mut nets);
+    grids.iter_mut().zip(nets).for_each(|(grid, net)| grid.points = net.control);
+    is_mirrored
 }
 
 /// A network with the images of its parts.

@@ -10,6 +10,7 @@
 pub mod basis;
 mod error;
 mod evaluate;
+mod exact;
 mod fit;
 mod fold;
 mod mirrored;
@@ -26,14 +27,15 @@ mod spacing;
 pub use error::FitError;
 pub use evaluate::Jet;
 pub(crate) use evaluate::RowSampler;
+pub use exact::{Exact, exact};
 pub use fit::{FEWEST_CONTROL, fit};
 pub use fold::folds;
-pub use mirrored::mirror_surfaces;
+pub use mirrored::{mirror_grids, mirror_surfaces};
 pub use network_fit::{fit_network, starved};
 pub use params::{Continuity, FitParams, KnotSpacing, Measure, Resolution};
 pub use quality::{
     Deviation, SeamAngle, SeamQuality, deviation, deviation_of, measure_seams, measure_seams_apart,
-    normal_deviation_of, seam_angles,
+    normal_deviation_of, normal_rms, seam_angles,
 };
 pub use retouch::retouch;
 pub use seam::{BENT_DEG, EDGE_ANGLE_DEG, EdgeInSeam, StitchParams, edges_in_seams, stitch, stitch_near};

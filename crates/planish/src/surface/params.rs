@@ -54,6 +54,9 @@ pub enum Continuity {
     /// with more control points, which with simple knots it cannot, but with as many control points both the angle and the
     /// distance are larger.
     G1Double,
+    /// With one tangent plane along each seam to a thousandth of a degree, by double knots along all of them and conditions in place of weights
+    /// ([`super::exact`]). With as many control points the distance is a few times larger.
+    G1Exact,
 }
 
 impl Default for FitParams {

@@ -54,6 +54,17 @@ pub fn normal_deviation_of(surface: &Surface, grid: &Grid) -> Deviation {
     summary(heights(surface, grid))
 }
 
+/// Root of the mean square of the distances of all nodes from their surfaces along the normals of the grids.
+pub fn normal_rms(surfaces: &[Surface], grids: &[Grid]) -> f64 {
+    let sums: Vec<(f64, usize)> = surfaces
+        .par_iter()
+        .zip(grids)
+        .map(|(s, g)| (heights(s, g).iter().map(|h| h * h).sum(), g.points.len()))
+        .collect();
+    let (sum, count) = sums.iter().fold((0.0, 0), |(a, b), (c, d)| (a + c, b + d));
+    if count > 0 { (sum / count as f64).sqrt() } else { 0.0 }
+}
+
 fn summary(mut distances: Vec<f64>) -> Deviation {
     if distances.is_empty() {
         return Deviation::default();

@@ -44,6 +44,7 @@ impl Plan {
         let double = match params.continuity {
             Continuity::C0 | Continuity::G1 => vec![false; network.curves.len()],
             Continuity::G1Double => double(network, &along),
+            Continuity::G1Exact => seams(network, &along),
         };
         let mut of = vec![usize::MAX; along.len()];
         let mut chords: Vec<Chord> = Vec::new();
@@ -213,6 +214,15 @@ fn double(network: &Network, along: &[Along]) -> Vec<bool> {
                 double[along[curve].chord as usize] = true;
             }
         }
+    }
+    along.iter().map(|run| double[run.chord as usize]).collect()
+}
+
+/// For each curve whether its chord has a smooth seam.
+fn seams(network: &Network, along: &[Along]) -> Vec<bool> {
+    let mut double = vec![false; network.curves.len()];
+    for (c, uses) in network.uses().iter().enumerate() {
+        double[along[c].chord as usize] |= uses.len() == 2 && network.curves[c].kind.is_smooth();
     }
     along.iter().map(|run| double[run.chord as usize]).collect()
 }

@@ -10,6 +10,8 @@
 //! radians, exact to first order; both derivatives are linear in the two outer rows of control points. Along a smooth
 //! seam the turns of both sides and the angle between their normals are to add up to nothing.
 
+use crate::network::Network;
+use crate::surface::Surface;
 use crate::surface::basis::basis_at;
 use crate::surface::fold::{CREDIBLE, MeanNormals};
 use crate::surface::sides::{node, place, side_len};
@@ -44,6 +46,16 @@ pub(crate) struct Stand {
 }
 
 impl Side {
+    /// Side `side` of a patch.
+    pub fn of(network: &Network, surfaces: &[Surface], (patch, side): (u32, u8)) -> Side {
+        let (patch, side) = (patch as usize, side as usize);
+        let s = &surfaces[patch];
+        let crossing = if side.is_multiple_of(2) { &s.knots_v } else { &s.knots_u };
+        let span = if side == 0 || side == 3 { crossing[4] } else { 1.0 - crossing[crossing.len() - 5] };
+        let reversed = network.patches[patch].sides[side].reversed;
+        Side { patch, side, reversed, rows: s.rows, cols: s.cols, across: 3.0 / span }
+    }
+
     /// Entry `i` of row `depth`, along the curve.
     pub fn node(&self, i: usize, depth: usize) -> usize {
         let i = if self.reversed { side_len(self.rows, self.cols, self.side) - 1 - i } else { i };

@@ -86,7 +86,7 @@ struct Wedge {
 }
 
 /// The curve ends of a patch at one of its corners: of the side that starts there, of the one before.
-fn ends(network: &Network, patch: usize, k: usize) -> [(usize, usize); 2] {
+pub(crate) fn ends(network: &Network, patch: usize, k: usize) -> [(usize, usize); 2] {
     let (next, before) = (network.patches[patch].sides[k], network.patches[patch].sides[(k + 3) % 4]);
     [(next.curve as usize, usize::from(next.reversed)), (before.curve as usize, usize::from(!before.reversed))]
 }

@@ -5,12 +5,12 @@
 //! 4. one system of all seams - `stitch`: `work`, `miss`, `motion` (what is unknown), `wish` and `bend` (angles), `ring` (what
 //!    moves cost), `system`, `sums`      5. bounds on what is left - `certificate`
 
-mod bend;
+pub(super) mod bend;
 pub(super) mod certificate;
 pub(super) mod corner;
 mod curve;
 mod meet;
-mod miss;
+pub(super) mod miss;
 mod motion;
 mod params;
 mod ring;

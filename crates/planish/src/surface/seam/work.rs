@@ -201,13 +201,8 @@ impl<'a> Work<'a> {
     }
 
     /// A side of a patch as its curve sees it.
-    pub fn side(&self, (patch, k): (u32, u8)) -> Side {
-        let (patch, side) = (patch as usize, k as usize);
-        let s = &self.surfaces[patch];
-        let crossing = if side.is_multiple_of(2) { &s.knots_v } else { &s.knots_u };
-        let span = if side == 0 || side == 3 { crossing[4] } else { 1.0 - crossing[crossing.len() - 5] };
-        let reversed = self.network.patches[patch].sides[side].reversed;
-        Side { patch, side, reversed, rows: s.rows, cols: s.cols, across: 3.0 / span }
+    pub fn side(&self, at: (u32, u8)) -> Side {
+        Side::of(self.network, self.surfaces, at)
     }
 }
 
