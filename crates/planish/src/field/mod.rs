@@ -31,7 +31,6 @@ mod sample_field;
 mod scalar_grid;
 mod solid;
 mod sweep;
-mod twice;
 mod winding;
 
 pub use creases::MeshCreases;
@@ -211,7 +210,7 @@ pub trait Creases: Sync {
     }
 
     /// Where what lies between two hits on one side of the square from `low` to `high`, which is perpendicular to `axis`, ends inside
-    /// of it; `None` if the source cannot tell. `way` is the unit vector from that side into the square.
+    /// of it; `None` if the source cannot tell, or if the tangents of the hits tell it as well. `way` is the unit vector from that side into the square.
     fn tip_point(
         &self,
         _axis: usize,

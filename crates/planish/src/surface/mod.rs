@@ -39,8 +39,8 @@ pub use quality::{
 };
 pub use retouch::retouch;
 pub use seam::{BENT_DEG, EDGE_ANGLE_DEG, EdgeInSeam, StitchParams, edges_in_seams, stitch, stitch_near};
-pub use sound::{Crossing, Facet, Turning, crossings, facet_error, turning};
 pub(crate) use sides::{check, check_grids, node};
+pub use sound::{Crossing, Facet, Turning, crossings, facet_error, turning};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

@@ -49,6 +49,8 @@ pub struct Part {
 
 /// Face points keep this distance from the sides of their face, as a fraction of it.
 const FACE_MARGIN: f64 = 0.004;
+/// Fraction of [`FACE_MARGIN`] from which on a point is left where it is.
+const UNMOVED_SHARE: f64 = 1e-3;
 /// The tangents must cross at an angle with at least this sine.
 const CROSSING: f64 = 0.02;
 /// A meeting farther outside the face than this, in cells, is no feature of it.
@@ -134,7 +136,7 @@ fn point(
 
 /// Face points of the faces at the least node of a cell with edges that are passed twice. A segment between two hits on one edge
 /// has one always: where the source says that what lies between them ends, or where their tangents meet, or else as far into the face as
-/// half their distance. What would meet others comes nearer to its edge, or goes.
+/// an arc over both reaches. What would meet others comes nearer to its edge, or goes.
 fn points_of_crowded_faces(
     field: &Directed,
     limits: &Thresholds,
@@ -166,9 +168,10 @@ fn points_of_crowded_faces(
                 Some((FacePoint { at: cell.at[0] as u32, hits, p, tagged: a.n.dot(b.n) < limits.sharp }, None))
             };
             let told = refine.and_then(|r| r.tip_point(axis, [low, high], way, (a.p, a.n), (b.p, b.n)));
-            match told.filter(|p| is_clear(axis, [low, high], *p)) {
-                Some(p) => of(p),
-                None => met().or_else(|| of(between + way * (a.p.distance(b.p) / 2.0).min(inwards.length()))),
+            let arc = || between + way * arc_height(a, b, way).min(inwards.length());
+            match told {
+                Some(p) => of(kept(axis, [low, high], p)),
+                None => met().or_else(|| of(kept(axis, [low, high], arc()))),
             }
         };
         let mut found: Vec<Option<Found>> = segments.iter().map(own).collect();
@@ -186,6 +189,23 @@ fn points_of_crowded_faces(
         }
         part.add(field, cell, axis, found);
     }
+}
+
+/// How far an arc reaches over two hits with these normals: as a parabola does, and half a circle at most.
+fn arc_height(a: &Pass, b: &Pass, way: DVec3) -> f64 {
+    let width = a.p.distance(b.p);
+    let along = (b.p - a.p) / width;
+    // The slope at either hit.
+    let slopes = [a, b].map(|hit| (hit.n.dot(along) / hit.n.dot(way)).abs());
+    (width * (slopes[0] + slopes[1]) / 8.0).min(width / 2.0)
+}
+
+/// A point of a face as near as can be, but not on its sides.
+fn kept(axis: usize, [low, high]: [DVec3; 2], p: DVec3) -> DVec3 {
+    let margin = FACE_MARGIN * UNMOVED_SHARE * (high - low);
+    let mut q = p.clamp(low + margin, high - margin);
+    q[axis] = low[axis];
+    q
 }
 
 /// Halvings after which a point is as near to its edge as numbers can tell.
@@ -260,7 +280,7 @@ fn place(
         return None;
     }
     let margin = size * FACE_MARGIN;
-    let near = margin * 1e-3;
+    let near = margin * UNMOVED_SHARE;
     if q.cmpgt(low + near).all() && q.cmplt(high - near).all() {
         return Some((lift(q), None));
     }

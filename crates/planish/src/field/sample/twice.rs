@@ -2,11 +2,11 @@
 //! side.
 //!
 //! Only where the values of both nodes are together less than values change along an edge, the surface may come between them. There
-//! the edge is halved a few times, parts of it left out by the same reason or by the field's own word for a box.
+//! the edge is halved, and parts of it are left out by the same reason or by the field's own word for a box.
 
-use super::directed::{self, Hit, Hits, Placed};
-use super::sample::{outward, root_within, steady};
-use super::{Field, Lattice};
+use super::root::{outward, root_within, steady};
+use crate::field::directed::{self, Hit, Hits, Placed};
+use crate::field::{Field, Lattice};
 use crate::geom::Aabb;
 use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
@@ -22,8 +22,10 @@ pub struct Near {
     change: f64,
 }
 
-/// Halvings of an edge: what is thinner than a thirty-second of a cell along it is seen by chance only.
-const HALVINGS: usize = 5;
+/// Halvings of an edge: a millionth of it is told, as far as values tell where to look.
+const HALVINGS: usize = 20;
+/// Parts of an edge that are halved at once; more are left where the surface runs along the edge, and it is given up. Chosen.
+const MOST_PARTS: usize = 16;
 
 /// Adds the nodes of a box that are near the surface.
 /// * `from`, `to` - the first nodes along the axes, and those after the last
@@ -135,6 +137,9 @@ impl Edge<'_> {
                     return Some((middle, value));
                 }
                 halves.extend([(a, fa, middle, value), (middle, value, b, fb)]);
+            }
+            if halves.len() > MOST_PARTS {
+                return None;
             }
             parts = halves;
         }
