@@ -526,6 +526,37 @@ fn seams_beside_a_flat_corner_keep_their_angle_and_all_others_are_exact() {
     }
 }
 
+/// A wavy sheet of 7 x 2 patches. Patch 2 has its nodes crowded on the middle of its side at `x = 3`, by `crowd` (1: without end).
+fn crowded(crowd: f64) -> Patchwork {
+    let height = |x: f64, y: f64| 0.1 * (1.3 * x + 0.5 * y).sin() * (y - 0.3).cos();
+    let mut work = sheet(7, 2, [false, false], [33, 33], |x, y| DVec3::new(x, y, height(x, y)));
+    work.grids[2] = grid(33, 33, |u, v| {
+        let (off, share) = (1.0 - u, crowd * (std::f64::consts::PI * v).sin().powi(2));
+        let x = 3.0 - off * (1.0 - share + share * off * off);
+        DVec3::new(x, v, height(x, v))
+    });
+    share_boundaries(&work.network, &mut work.grids);
+    work
+}
+
+#[test]
+fn a_patch_that_would_turn_over_stays_with_its_boundary_and_the_seams_of_all_others_are_exact() {
+    let (_, all) = exact(&crowded(0.8), 10);
+    assert!(all.kept.is_empty() && all.seams.len() == 19);
+    let work = crowded(0.98);
+    let ([_, smooth], exact) = exact(&work, 10);
+    let own = work.network.patches[2].sides.map(|side| side.curve);
+    let is_own = |c: &u32| own.contains(c);
+    assert!(exact.kept.iter().all(is_own) && exact.kept.len() == 3 && exact.seams.len() == 16, "{exact:?}");
+    assert!((0..14).all(|p| (exact.surfaces[p] == smooth[p]) == (p == 2)));
+    assert!(exact.surfaces.iter().zip(&work.grids).all(|(s, g)| surface::folds(s, g) == 0));
+    for (before, after) in seams(&work, &smooth).iter().zip(seams(&work, &exact.surfaces)) {
+        assert!(after.gap_max < 1e-14, "{after:?}");
+        let most = if is_own(&after.curve) { before.angle_max_deg * 1.1 + 0.05 } else { 1e-3 };
+        assert!(after.angle_max_deg.max(after.regular_angle_bound_deg.unwrap()) <= most, "{before:?} to {after:?}");
+    }
+}
+
 #[test]
 fn exact_seams_are_bitwise_equal_on_1_and_2_threads() {
     let work = ball(5, 17);

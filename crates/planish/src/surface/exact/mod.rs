@@ -9,18 +9,17 @@ mod rows;
 mod star;
 mod system;
 
-use super::basis::uniform_parameters;
 use super::fold::folds;
 use super::seam::miss::{Misses, farthest};
-use super::sides::{check, check_grids, diagonal};
-use super::{FitError, StitchParams, Surface, edges_in_seams, measure_seams};
+use super::sides::{check, check_grids, diagonal, place};
+use super::{FitError, SeamQuality, StitchParams, Surface, edges_in_seams, measure_seams};
 use crate::grid::Grid;
 use crate::network::Network;
 use crate::observe::{Observer, Part};
-use glam::DVec3;
 use rayon::prelude::*;
 use rows::{Row, Seam, Shared, conditions, wishes};
 use star::{Gluing, gluings};
+use std::collections::BTreeMap;
 use system::{Fit, System};
 
 /// How stiff the conditions are in each round, in weights of a control point. At first corners may still turn towards what the fit
@@ -39,9 +38,10 @@ const TURNS: usize = 2;
 /// Steps at most until the conditions are kept to [`EXACT`], a share of the diagonal: rounding.
 const SETTLING: usize = 20;
 const EXACT: f64 = 1e-13;
-/// How often seams beside patches that turn over or lie too far off are given up.
-const TRIALS: usize = 6;
-
+/// How often what is left of a part is solved again; one with bad patches in the last trial stays as it was.
+const TRIALS: usize = 8;
+/// How many times as far as before, beside the tolerance, a weighed seam may bend anywhere.
+const MORE_BENT: f64 = 1.1;
 /// How often the farthest place of the fit, or its tolerance, a place may be off.
 const FAR: f64 = 4.0;
 
@@ -62,9 +62,9 @@ pub struct Exact {
 /// * `surfaces` - as [`super::stitch`] returns them, with double knots along the seams ([`super::Continuity::G1Exact`])
 ///
 /// Seams on edges ([`super::edges_in_seams`]), with simple knots or of one knot span, and those at corners where a patch is flat or
-/// pointed keep their angle as nearly as a weight can hold it, and so do the seams of patches that would turn over or lie far off
-/// their grids. Corners at sharp curves and borders stay where they are; patches without exact seams around them stay, bit for
-/// bit.
+/// pointed keep their angle as nearly as a weight can hold it. Patches that would turn over or lie far off their grids, and those beside
+/// a seam that would bend more than before, stay with their boundaries, bit for bit, and the others are solved again. So do patches
+/// without exact seams around them. Corners at sharp curves and borders stay where they are.
 ///
 /// # Errors
 /// Lists that do not fit the network or each other, knots that differ along a chord, or the observer's wish.
@@ -89,31 +89,15 @@ pub fn exact(
     edges_in_seams(network, grids, surfaces).iter().for_each(|edge| smooth[edge.curve as usize] = false);
     let fit = Fit::new(network, grids, surfaces, &counts, (params.smoothing, &|c| !smooth[c]))?;
     let misses = Misses::new(surfaces, grids);
-    let before: Vec<usize> = surfaces.par_iter().zip(grids).map(|(s, g)| folds(s, g)).collect();
+    let folds = surfaces.par_iter().zip(grids).map(|(s, g)| folds(s, g)).collect();
     let far = FAR * misses.most.max(params.tolerance);
-    let task = Task { fit, surfaces, uses, misses, smooth, tolerance: params.angle_tolerance.to_radians() };
-    let mut targets = grids.to_vec();
-    let mut given_up = vec![0usize; surfaces.len()];
-    for trial in 0..TRIALS {
-        let part = Part::new(observer, trial as f64 / TRIALS as f64, 1.0 / TRIALS as f64);
-        let Some((made, seams)) = task.solved(&given_up, &targets, &part)? else { break };
-        let is_bad = |p: &usize| folds(&made[*p], &grids[*p]) > before[*p] || farthest(&made[*p], &grids[*p]) > far;
-        let bad: Vec<usize> = (0..made.len()).into_par_iter().filter(is_bad).collect();
-        if bad.is_empty() {
-            observer.progress(1.0);
-            let (exact, kept) = wanted.into_iter().partition(|&c| seams[c as usize] == Seam::Exact);
-            return Ok(Exact { surfaces: made, seams: exact, kept });
-        }
-        for p in bad {
-            // Once its seams are only weighed, the patch itself is what it was.
-            if given_up[p] > 0 {
-                targets[p].points = nodes_of(&surfaces[p], &grids[p]);
-            }
-            given_up[p] += 1;
-        }
-    }
+    let tolerance = params.angle_tolerance.to_radians();
+    let bends = measure_seams(network, surfaces, observer)?;
+    let task = Task { fit, surfaces, uses, misses, smooth, tolerance, folds, far, bends };
+    let (surfaces, is_exact) = task.run(observer)?;
     observer.progress(1.0);
-    Ok(Exact { surfaces: surfaces.to_vec(), seams: Vec::new(), kept: wanted })
+    let (seams, kept) = wanted.into_iter().partition(|&c| is_exact[c as usize]);
+    Ok(Exact { surfaces, seams, kept })
 }
 
 /// The largest angle along exact seams, degrees, bounded between samples.
@@ -128,11 +112,6 @@ fn most_bent(
     Ok(exact.map(|s| s.angle_max_deg.max(s.regular_angle_bound_deg.unwrap_or(0.0))).fold(0.0, f64::max))
 }
 
-/// The points of a surface at the parameters of the nodes of a grid.
-fn nodes_of(surface: &Surface, grid: &Grid) -> Vec<DVec3> {
-    surface.sample(&uniform_parameters(grid.cols), &uniform_parameters(grid.rows), [0, 0])
-}
-
 /// What all trials share.
 struct Task<'a> {
     fit: Fit<'a>,
@@ -144,12 +123,102 @@ struct Task<'a> {
     smooth: Vec<bool>,
     /// Of the angle of weighed seams, radians.
     tolerance: f64,
+    /// How often each surface is turned over to begin with.
+    folds: Vec<usize>,
+    /// How far from its grid a surface may be anywhere.
+    far: f64,
+    /// The angles of all seams to begin with.
+    bends: Vec<SeamQuality>,
 }
 
-/// Surfaces, and the states of all seams.
-type Solved = (Vec<Surface>, Vec<Seam>);
+/// A part with exact seams.
+struct Solved {
+    surfaces: Vec<Surface>,
+    /// The states of all seams.
+    seams: Vec<Seam>,
+    shared: Shared,
+}
 
 impl Task<'_> {
+    /// All surfaces, and for each curve whether its seam is exact.
+    ///
+    /// Bad patches are held as they were, from the third trial on with those around them, and what is left of their part is solved
+    /// again.
+    fn run(&self, observer: &dyn Observer) -> Result<(Vec<Surface>, Vec<bool>), FitError> {
+        let mut made = self.surfaces.to_vec();
+        let mut is_exact = vec![false; self.smooth.len()];
+        let mut held = vec![false; made.len()];
+        let mut parts = self.parts(&self.smooth, &held);
+        for trial in 0..TRIALS {
+            let share = 1.0 / (TRIALS * parts.len().max(1)) as f64;
+            let mut left = Vec::new();
+            for (i, wanted) in parts.iter().enumerate() {
+                let part = Part::new(observer, trial as f64 / TRIALS as f64 + i as f64 * share, share);
+                let Some(solved) = self.solved(wanted, &held, &part)? else { continue };
+                let bad = self.bad(&solved, observer)?;
+                if bad.is_empty() {
+                    (0..made.len())
+                        .filter(|&p| solved.shared.has(p))
+                        .for_each(|p| made[p] = solved.surfaces[p].clone());
+                    solved.seams.iter().zip(&mut is_exact).for_each(|(seam, is)| *is |= *seam == Seam::Exact);
+                    continue;
+                }
+                self.around(bad, trial / 2).into_iter().for_each(|p| held[p] |= solved.shared.has(p));
+                let goes_on: Vec<bool> = solved.seams.iter().map(|seam| *seam == Seam::Exact).collect();
+                left.extend(self.parts(&goes_on, &held));
+            }
+            parts = left;
+        }
+        Ok((made, is_exact))
+    }
+
+    /// Patches of a part that turn over or lie far off their grids, and those beside weighed seams that bend more than they did, rising.
+    fn bad(&self, solved: &Solved, observer: &dyn Observer) -> Result<Vec<usize>, FitError> {
+        let is_bad = |p: &usize| {
+            let (surface, grid) = (&solved.surfaces[*p], &self.fit.grids[*p]);
+            folds(surface, grid) > self.folds[*p] || farthest(surface, grid) > self.far
+        };
+        let all = (0..self.surfaces.len()).into_par_iter();
+        let mut bad: Vec<usize> = all.filter(|&p| solved.shared.has(p)).filter(is_bad).collect();
+        let bends = measure_seams(self.fit.network, &solved.surfaces, observer)?;
+        for (seam, before) in bends.iter().zip(&self.bends) {
+            let most = before.regular_angle_max_deg * MORE_BENT + self.tolerance.to_degrees();
+            if solved.seams[seam.curve as usize] == Seam::Weighed && seam.regular_angle_max_deg > most {
+                let both = self.uses[seam.curve as usize].iter().map(|&(p, _)| p as usize);
+                bad.extend(both.filter(|&p| solved.shared.has(p)));
+            }
+        }
+        bad.sort_unstable();
+        bad.dedup();
+        Ok(bad)
+    }
+
+    /// These patches, and those within so many patches of them.
+    fn around(&self, mut patches: Vec<usize>, rings: usize) -> Vec<usize> {
+        for _ in 0..rings {
+            let sides = |p: usize| self.fit.network.patches[p].sides;
+            let beside = patches.iter().flat_map(|&p| sides(p)).flat_map(|side| &self.uses[side.curve as usize]);
+            patches = beside.map(|&(p, _)| p as usize).collect();
+            patches.sort_unstable();
+            patches.dedup();
+        }
+        patches
+    }
+
+    /// Parts the exact ones among `wanted` seams into those that can be solved by themselves.
+    /// * `held` - patches that stay as they are, and whose seams are not exact
+    fn parts(&self, wanted: &[bool], held: &[bool]) -> Vec<Vec<bool>> {
+        let (_, seams) = self.start(wanted, held);
+        let shared = Shared::new(self.fit.network, self.surfaces, &seams, held);
+        let pair = |c: usize| [0, 1].map(|k| self.uses[c][k].0 as usize);
+        let labels = shared.parts((0..seams.len()).filter(|&c| seams[c] == Seam::Weighed).map(pair));
+        let mut parts: BTreeMap<usize, Vec<bool>> = BTreeMap::new();
+        for c in (0..seams.len()).filter(|&c| seams[c] == Seam::Exact) {
+            parts.entry(labels[pair(c)[0]]).or_insert_with(|| vec![false; seams.len()])[c] = true;
+        }
+        parts.into_values().collect()
+    }
+
     /// Conditions along exact seams, and wishes along weighed ones.
     fn rows(&self, seams: &[Seam], glued: &[Option<Gluing>], shared: &Shared) -> (Vec<Row>, Vec<Row>) {
         let network = self.fit.network;
@@ -167,26 +236,20 @@ impl Task<'_> {
                 _ => {}
             }
         }
+        held.retain(|row| !row.terms.is_empty());
         wished.retain(|row| !row.terms.is_empty());
         (held, wished)
     }
 
-    /// The surfaces and the states of all seams; `None` if no seam can be exact.
-    /// * `given_up` - for each patch how often it was bad: seams within that many patches of it are weighed
-    fn solved(
-        &self,
-        given_up: &[usize],
-        targets: &[Grid],
-        observer: &dyn Observer,
-    ) -> Result<Option<Solved>, FitError> {
+    /// The patches at `wanted` seams and around them; `None` if no seam can be exact.
+    fn solved(&self, wanted: &[bool], held: &[bool], observer: &dyn Observer) -> Result<Option<Solved>, FitError> {
         let network = self.fit.network;
-        let (mut glued, seams) = self.start(given_up);
-
+        let (mut glued, seams) = self.start(wanted, held);
         if !seams.contains(&Seam::Exact) {
             return Ok(None);
         }
-        let shared = Shared::new(network, self.surfaces, &seams);
-        let mut system = System::new(&self.fit, &shared, targets, self.surfaces);
+        let shared = Shared::new(network, self.surfaces, &seams, held);
+        let mut system = System::new(&self.fit, &shared, self.surfaces);
         let exact_below = EXACT * diagonal(self.fit.grids);
         for (round, stiff) in STIFF.into_iter().enumerate() {
             if round > 0 {
@@ -210,25 +273,33 @@ impl Task<'_> {
                 break;
             }
         }
-        Ok(Some((system.surfaces, seams)))
+        let surfaces = system.surfaces;
+        Ok(Some(Solved { surfaces, seams, shared }))
     }
 
     /// The first gluing functions, and which seams have some.
-    fn start(&self, given_up: &[usize]) -> (Vec<Option<Gluing>>, Vec<Seam>) {
+    /// * `wanted`, `held` - as [`Task::parts`] has them
+    fn start(&self, wanted: &[bool], held: &[bool]) -> (Vec<Option<Gluing>>, Vec<Seam>) {
         let network = self.fit.network;
-        let is_beside = |c: usize| self.uses[c].iter().any(|&(p, _)| given_up[p as usize] > 0);
+        let is_beside = |c: usize| self.uses[c].iter().any(|&(p, _)| held[p as usize]);
         let mut seams: Vec<Seam> = (0..self.smooth.len())
             .map(|c| match self.smooth[c] {
-                true if is_beside(c) => Seam::Weighed,
-                true => Seam::Exact,
+                true if wanted[c] && !is_beside(c) => Seam::Exact,
+                true => Seam::Weighed,
                 false => Seam::None,
             })
             .collect();
+        let mut stays = vec![false; network.corners.len()];
+        for p in (0..held.len()).filter(|&p| held[p]) {
+            (0..4).for_each(|k| stays[network.corner(p, k) as usize] = true);
+        }
         loop {
             let found = gluings(network, self.surfaces, &|c| seams[c] == Seam::Exact);
             let mut is_done = true;
-            for (seam, found) in seams.iter_mut().zip(&found) {
-                if *seam == Seam::Exact && found.is_none() {
+            for (c, (seam, found)) in seams.iter_mut().zip(&found).enumerate() {
+                let ends = self.fit.network.curves[c].corners;
+                let is_even = || (0..2).all(|e| !stays[ends[e] as usize] || self.is_even(c, e));
+                if *seam == Seam::Exact && (found.is_none() || !is_even()) {
                     (*seam, is_done) = (Seam::Weighed, false);
                 }
             }
@@ -236,5 +307,17 @@ impl Task<'_> {
                 return (found, seams);
             }
         }
+    }
+
+    /// True if both patches at a seam have one normal at its end `e` as they stand.
+    fn is_even(&self, curve: usize, e: usize) -> bool {
+        let normal = |k: usize| {
+            let (p, side) = self.uses[curve][k];
+            let reversed = self.fit.network.patches[p as usize].sides[side as usize].reversed;
+            let (u, v) = place(side as usize, reversed, e as f64);
+            self.surfaces[p as usize].jet(u, v).area_vector().normalize_or_zero()
+        };
+        let (m, n) = (normal(0), normal(1));
+        m.dot(n) > 0.0 && m.cross(n).length() <= GOAL_DEG.to_radians()
     }
 }

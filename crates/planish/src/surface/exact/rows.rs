@@ -3,6 +3,7 @@
 //! Unknown is every control point once, however many patches share it; the three coordinates have the same coefficients.
 
 use super::star::Gluing;
+use crate::mesh::sets::Sets;
 use crate::network::Network;
 use crate::surface::Surface;
 use crate::surface::basis::{basis_at, span_samples};
@@ -42,13 +43,16 @@ pub(super) struct Shared {
 impl Shared {
     /// Unknown are the patches at exact seams, and beside them the insides of patches that share a curve with one of these.
     /// Corners move where smooth seams lead all around.
-    pub fn new(network: &Network, surfaces: &[Surface], seams: &[Seam]) -> Shared {
+    /// * `held` - patches of which nothing moves; no exact seam is theirs. All curves leave their corners as they did: between curves
+    ///   that do not move there is but one direction for each, and the least error in one turns another by much.
+    pub fn new(network: &Network, surfaces: &[Surface], seams: &[Seam], held: &[bool]) -> Shared {
         let sides = |p: usize| network.patches[p].sides.map(|side| side.curve as usize);
         let all = 0..surfaces.len();
         let is_active = |p: usize| sides(p).iter().any(|&c| seams[c] == Seam::Exact);
         let mut moves = vec![false; network.curves.len()];
         all.clone().filter(|&p| is_active(p)).flat_map(sides).for_each(|c| moves[c] = true);
-        let is_in = |p: usize| sides(p).iter().any(|&c| moves[c]);
+        all.clone().filter(|&p| held[p]).flat_map(sides).for_each(|c| moves[c] = false);
+        let is_in = |p: usize| !held[p] && sides(p).iter().any(|&c| moves[c]);
         let mut free = vec![true; network.corners.len()];
         for p in all.clone() {
             for (k, c) in sides(p).into_iter().enumerate() {
@@ -58,13 +62,17 @@ impl Shared {
                 }
             }
         }
+        let mut leaves = vec![true; network.corners.len()];
+        for p in all.clone().filter(|&p| held[p]) {
+            (0..4).for_each(|k| leaves[network.corner(p, k) as usize] = false);
+        }
         let mut count = 0u32;
         let mut next = |n: usize| {
             count += n as u32;
             count - n as u32
         };
         let corners: Vec<u32> = free.iter().map(|&free| if free { next(1) } else { NONE }).collect();
-        let mut curves: Vec<Option<u32>> = vec![None; network.curves.len()];
+        let mut curves: Vec<Vec<u32>> = vec![Vec::new(); network.curves.len()];
         let mut of = vec![Vec::new(); surfaces.len()];
         for p in all.filter(|&p| is_in(p)) {
             let (rows, cols) = (surfaces[p].rows, surfaces[p].cols);
@@ -73,10 +81,14 @@ impl Shared {
                 let (c, n) = (side.curve as usize, side_len(rows, cols, k));
                 own[node(rows, cols, k, 0, 0)] = corners[network.corner(p, k) as usize];
                 if moves[c] {
-                    let first = *curves[c].get_or_insert_with(|| next(n - 2));
+                    if curves[c].is_empty() {
+                        let [start, end] = network.curves[c].corners.map(|at| leaves[at as usize]);
+                        let moves = |i: usize| (i > 1 || start) && (i + 2 < n || end);
+                        curves[c] = (0..n - 1).map(|i| if i > 0 && moves(i) { next(1) } else { NONE }).collect();
+                    }
                     for i in 1..n - 1 {
                         let at = if side.reversed { n - 1 - i } else { i };
-                        own[node(rows, cols, k, i, 0)] = first + at as u32 - 1;
+                        own[node(rows, cols, k, i, 0)] = curves[c][at];
                     }
                 }
             }
@@ -87,6 +99,27 @@ impl Shared {
             of[p] = own;
         }
         Shared { count: count as usize, of }
+    }
+
+    /// Parts of the network that can be solved by themselves: for each patch the least one of its part.
+    /// * `pairs` - patches that hang together by weighed seams
+    pub fn parts(&self, pairs: impl Iterator<Item = [usize; 2]>) -> Vec<usize> {
+        let mut sets = Sets::new(self.of.len());
+        pairs.filter(|pair| pair.iter().all(|&p| self.has(p))).for_each(|[p, q]| {
+            sets.join(p as u32, q as u32);
+        });
+        let mut owners = vec![NONE; self.count];
+        for (p, own) in self.of.iter().enumerate() {
+            for &k in own.iter().filter(|&&k| k != NONE) {
+                match &mut owners[k as usize] {
+                    owner if *owner == NONE => *owner = p as u32,
+                    owner => {
+                        sets.join(*owner, p as u32);
+                    }
+                }
+            }
+        }
+        (0..self.of.len() as u32).map(|p| sets.root(p) as usize).collect()
     }
 
     /// True if something of a patch is unknown.

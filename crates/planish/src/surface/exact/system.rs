@@ -104,9 +104,9 @@ impl<'a> Fit<'a> {
     }
 
     /// What pulls at the control points of a patch.
-    /// * `target` - points at the parameters of the nodes
     /// * `normals` - at the nodes
-    fn forces(&self, patch: usize, surface: &Surface, (target, normals): (&Grid, &[DVec3])) -> Vec<DVec3> {
+    fn forces(&self, patch: usize, surface: &Surface, normals: &[DVec3]) -> Vec<DVec3> {
+        let target = &self.grids[patch];
         let mut off = offsets(surface, target);
         let (rows, cols) = (target.rows, target.cols);
         let mut counts = vec![1.0; off.len()];
@@ -129,8 +129,6 @@ impl<'a> Fit<'a> {
 pub(super) struct System<'a> {
     fit: &'a Fit<'a>,
     shared: &'a Shared,
-    /// Points that patches are fitted to.
-    targets: &'a [Grid],
     pub surfaces: Vec<Surface>,
     conditions: Vec<Row>,
     wishes: Vec<Row>,
@@ -139,12 +137,11 @@ pub(super) struct System<'a> {
 }
 
 impl<'a> System<'a> {
-    pub fn new(fit: &'a Fit<'a>, shared: &'a Shared, targets: &'a [Grid], surfaces: &[Surface]) -> System<'a> {
+    pub fn new(fit: &'a Fit<'a>, shared: &'a Shared, surfaces: &[Surface]) -> System<'a> {
         let surfaces = surfaces.to_vec();
         System {
             fit,
             shared,
-            targets,
             surfaces,
             conditions: Vec::new(),
             wishes: Vec::new(),
@@ -158,7 +155,7 @@ impl<'a> System<'a> {
         self.multipliers.resize(conditions.len(), DVec3::ZERO);
         (self.conditions, self.wishes) = (conditions, wishes);
         let normals = |p: usize| {
-            let (grid, surface) = (&self.targets[p], &self.surfaces[p]);
+            let (grid, surface) = (&self.fit.grids[p], &self.surfaces[p]);
             if !self.shared.has(p) {
                 return Vec::new();
             }
@@ -240,7 +237,7 @@ impl<'a> System<'a> {
     /// What pulls at all unknowns, as the surfaces stand.
     fn pulls(&self, weight: f64) -> Vec<DVec3> {
         let forces = |p: usize| match self.shared.has(p) {
-            true => self.fit.forces(p, &self.surfaces[p], (&self.targets[p], &self.normals[p])),
+            true => self.fit.forces(p, &self.surfaces[p], &self.normals[p]),
             false => Vec::new(),
         };
         let forces: Vec<Vec<DVec3>> = (0..self.surfaces.len()).into_par_iter().map(forces).collect();
