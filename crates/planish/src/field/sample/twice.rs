@@ -34,8 +34,8 @@ pub fn add_near(lattice: &Lattice, from: [usize; 3], to: [usize; 3], values: &[f
     let size = [0, 1, 2].map(|a| to[a] - from[a]);
     let step = [1, size[0], size[0] * size[1]];
     let place = |n: usize| [n % size[0], n / step[1] % size[1], n / step[2]];
-    // Boxes of a single node tell nothing of changes: those of distances are known.
-    let mut change = if size.contains(&1) { lattice.step.max_element() } else { 0.0 };
+    // Those of distances are known, and of other values these tell.
+    let mut change = lattice.step.max_element();
     for (n, value) in values.iter().enumerate() {
         for a in (0..3).filter(|&a| place(n)[a] + 1 < size[a]) {
             change = f64::max(change, (values[n + step[a]] - value).abs());
