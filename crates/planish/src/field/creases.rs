@@ -329,14 +329,7 @@ impl Creases for MeshCreases {
         here.next().is_none().then_some((found.p, found.tagged))
     }
 
-    fn tip_point(
-        &self,
-        axis: usize,
-        [low, high]: [DVec3; 2],
-        _way: DVec3,
-        a: (DVec3, DVec3),
-        b: (DVec3, DVec3),
-    ) -> Option<DVec3> {
+    fn tip_point(&self, axis: usize, [low, high]: [DVec3; 2], a: (DVec3, DVec3), b: (DVec3, DVec3)) -> Option<DVec3> {
         let plane = ((low[axis] - self.lattice.origin[axis]) / self.lattice.step[axis]).round() as i64;
         let [_, v, u] = key(&self.lattice, axis, plane, (low + high) / 2.0);
         let cuts = &self.cuts[axis];

@@ -210,15 +210,8 @@ pub trait Creases: Sync {
     }
 
     /// Where what lies between two hits on one side of the square from `low` to `high`, which is perpendicular to `axis`, ends inside
-    /// of it; `None` if the source cannot tell, or if the tangents of the hits tell it as well. `way` is the unit vector from that side into the square.
-    fn tip_point(
-        &self,
-        _axis: usize,
-        _square: [DVec3; 2],
-        _way: DVec3,
-        _a: (DVec3, DVec3),
-        _b: (DVec3, DVec3),
-    ) -> Option<DVec3> {
+    /// of it; `None` if the source cannot tell.
+    fn tip_point(&self, _axis: usize, _square: [DVec3; 2], _a: (DVec3, DVec3), _b: (DVec3, DVec3)) -> Option<DVec3> {
         None
     }
 

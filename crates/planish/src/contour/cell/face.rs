@@ -167,7 +167,7 @@ fn points_of_crowded_faces(
                 let hits = [a.id.min(b.id), a.id.max(b.id)];
                 Some((FacePoint { at: cell.at[0] as u32, hits, p, tagged: a.n.dot(b.n) < limits.sharp }, None))
             };
-            let told = refine.and_then(|r| r.tip_point(axis, [low, high], way, (a.p, a.n), (b.p, b.n)));
+            let told = refine.and_then(|r| r.tip_point(axis, [low, high], (a.p, a.n), (b.p, b.n)));
             let arc = || between + way * arc_height(a, b, way).min(inwards.length());
             match told {
                 Some(p) => of(kept(axis, [low, high], p)),

@@ -24,9 +24,6 @@ const HIT_FRACTIONS: [f64; 3] = [0.3, 0.03, 0.002];
 const SEARCH_SPAN: f64 = 0.7;
 /// All surfaces pass a corner within this fraction of the search's reach.
 const OFF_CORNER: f64 = 1e-6;
-/// What lies between two hits ends in a sharp edge if its end is nearer to a tangent than this part of its width: another surface would
-/// cut it off halfway between both tangents.
-const ON_TANGENT: f64 = 0.1;
 /// Normals that still belong to the same surface (cosine).
 const SAME_SURFACE_COSINE: f64 = 0.8;
 
@@ -86,24 +83,6 @@ impl Creases for FieldCreases<'_> {
             found = Some(p);
         }
         found
-    }
-
-    fn tip_point(
-        &self,
-        _axis: usize,
-        [low, high]: [DVec3; 2],
-        way: DVec3,
-        a: (DVec3, DVec3),
-        b: (DVec3, DVec3),
-    ) -> Option<DVec3> {
-        // The first change of side half-way between both.
-        let from = (a.0 + b.0) / 2.0;
-        let at = |t: f64| from + way * (way.abs().dot(high - low) * t);
-        let (f0, f1) = (self.field.value(from), self.field.value(at(1.0)));
-        let end = ((f0 < 0.0) != (f1 < 0.0)).then(|| at(root(|t| self.field.value(at(t)), f0, f1)))?;
-        let near = ON_TANGENT * a.0.distance(b.0);
-        let is_met = a.1.dot(b.1) < self.sharp && [a, b].iter().any(|(p, n)| n.dot(end - *p).abs() < near);
-        (!is_met).then_some(end)
     }
 
     fn inner_point(

@@ -4,7 +4,6 @@
 //! that the surface does not cross them, so the work grows with the surface.
 
 mod root;
-mod twice;
 
 use super::directed::{self, Directed, Hit, Hits, Sides};
 use super::{Field, FieldError, Lattice, Side};
@@ -14,7 +13,6 @@ use glam::DVec3;
 use rayon::prelude::*;
 use root::{Bracket, outward, root_within, steady};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use twice::Near;
 
 pub use root::root;
 
@@ -29,9 +27,7 @@ const FEW: usize = 2;
 /// # Errors
 /// [`FieldError::Cancelled`].
 pub fn sample(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> Result<Directed, FieldError> {
-    // What passes an edge twice is told by exact fields: in others it would be noise.
-    let is_exact = field.noise_deg() == 0.0 && !field.in_batches();
-    let (sides, near) = sides_and_near(field, lattice, is_exact, observer)?;
+    let sides = sides(field, lattice, observer)?;
     observer.check()?;
     let none = || Hits { start: vec![0; lattice.rows() + 1], ..Hits::default() };
     if field.in_batches() {
@@ -67,7 +63,6 @@ pub fn sample(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> 
     }
     found.mended = 0;
     found.noise_deg = field.noise_deg();
-    found.twice = twice::hits(field, lattice, near, observer)?;
     observer.progress(1.0);
     Ok(found)
 }
@@ -76,36 +71,26 @@ pub fn sample(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> 
 /// # Errors
 /// [`FieldError::Cancelled`].
 pub fn sides(field: &dyn Field, lattice: &Lattice, observer: &dyn Observer) -> Result<Sides, FieldError> {
-    Ok(sides_and_near(field, lattice, false, observer)?.0)
-}
-
-/// The sides of all nodes, and those near the surface if they are wanted.
-fn sides_and_near(
-    field: &dyn Field,
-    lattice: &Lattice,
-    is_wanted: bool,
-    observer: &dyn Observer,
-) -> Result<(Sides, Vec<Near>), Cancelled> {
     let (ny, nz) = (lattice.nodes(1), lattice.nodes(2));
     let slabs = nz.div_ceil(BRICK);
     let done = AtomicUsize::new(0);
-    let slabs_of: Vec<Option<(Vec<Vec<u32>>, Vec<Near>)>> = (0..slabs)
+    let rows: Vec<Option<Vec<Vec<u32>>>> = (0..slabs)
         .into_par_iter()
         .map(|s| {
             if observer.cancelled() {
                 return None;
             }
-            let slab = Slab { field, lattice, observer, k0: s * BRICK, k1: ((s + 1) * BRICK).min(nz), is_wanted };
-            let found = slab.sides()?;
+            let slab = Slab { field, lattice, observer, k0: s * BRICK, k1: ((s + 1) * BRICK).min(nz) };
+            let rows = slab.sides()?;
             let n = done.fetch_add(1, Ordering::Relaxed);
             observer.progress(0.7 * (n + 1) as f64 / slabs as f64);
-            Some(found)
+            Some(rows)
         })
         .collect();
-    let found: Option<Vec<(Vec<Vec<u32>>, Vec<Near>)>> = slabs_of.into_iter().collect();
-    let (rows, near): (Vec<_>, Vec<_>) = found.ok_or(Cancelled)?.into_iter().unzip();
+    let rows: Option<Vec<Vec<Vec<u32>>>> = rows.into_iter().collect();
+    let rows = rows.ok_or(Cancelled)?;
     debug_assert_eq!(rows.iter().map(Vec::len).sum::<usize>(), ny * nz);
-    Ok((Sides::from_rows(rows.into_iter().flatten()), near.into_iter().flatten().collect()))
+    Ok(Sides::from_rows(rows.into_iter().flatten()))
 }
 
 /// A few planes of nodes.
@@ -115,16 +100,13 @@ struct Slab<'a> {
     observer: &'a dyn Observer,
     k0: usize,
     k1: usize,
-    /// True to tell the nodes near the surface, too.
-    is_wanted: bool,
 }
 
 impl Slab<'_> {
-    fn sides(&self) -> Option<(Vec<Vec<u32>>, Vec<Near>)> {
+    fn sides(&self) -> Option<Vec<Vec<u32>>> {
         let (nx, ny, words) = (self.lattice.nodes(0), self.lattice.nodes(1), self.lattice.words());
         let rows = ny * (self.k1 - self.k0);
-        let (inside, known) = (vec![0; rows * words], vec![!0; rows * words]);
-        let mut bits = Bits { inside, known, words, ny, near: Vec::new() };
+        let mut bits = Bits { inside: vec![0; rows * words], known: vec![!0; rows * words], words, ny };
         let group = GROUPS[0] * BRICK;
         for j in (0..ny).step_by(group) {
             if self.observer.cancelled() {
@@ -138,7 +120,7 @@ impl Slab<'_> {
             let (a, b) = (r * words, (r + 1) * words);
             directed::changes_of(&bits.inside[a..b], &bits.known[a..b], nx)
         };
-        Some(((0..rows).map(row).collect(), std::mem::take(&mut bits.near)))
+        Some((0..rows).map(row).collect())
     }
 
     /// Settles the nodes `from..to` of all planes of the slab; `field` is good for them.
@@ -210,9 +192,6 @@ impl Slab<'_> {
         }
         let mut values = vec![0.0; points.len()];
         field.values(&points, &mut values);
-        if self.is_wanted {
-            twice::add_near(self.lattice, from, to, &values, &mut bits.near);
-        }
         let mut values = values.into_iter();
         for k in from[2]..to[2] {
             for j in from[1]..to[1] {
@@ -229,7 +208,6 @@ struct Bits {
     known: Vec<u64>,
     words: usize,
     ny: usize,
-    near: Vec<Near>,
 }
 
 impl Bits {
