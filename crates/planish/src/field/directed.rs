@@ -299,7 +299,7 @@ impl Directed {
     pub fn normal(&self, name: u32) -> Option<DVec3> {
         let all = self.first_names().into_iter().zip(&self.axes);
         let all = all.chain(self.first_twice_names().into_iter().zip(&self.twice));
-        let (base, hits) = all.filter(|(base, _)| *base <= name).last()?;
+        let (base, hits) = all.rev().find(|(base, _)| *base <= name)?;
         hits.hits.get((name - base) as usize).map(|h| h.normal)
     }
 
