@@ -6,7 +6,7 @@ use planish::model::{Model, Units};
 use planish::network::{CurveKind, Network};
 use planish::pipeline::key;
 use planish::pipeline::{self, PipelineParams, Warning};
-use planish::surface::{Continuity, Measure, SeamQuality, normal_deviation_of};
+use planish::surface::{Continuity, EXACT_DEG, Measure, SeamQuality, normal_deviation_of};
 use planish_io::report::{Report, count, number};
 
 /// A demanded tolerance and what is reached, both as shares of the diagonal of the input.
@@ -121,9 +121,6 @@ pub fn angle(model: &Model, seams: &[SeamQuality], params: &PipelineParams, dema
     }
     Some(Warning::new(ANGLE, text, places.join("; ")))
 }
-
-/// Angle of an exact seam at most, degrees: far above rounding, far below what any receiver tells from nothing.
-const EXACT_DEG: f64 = 1e-3;
 
 /// Which smooth seams are not exact where exact ones are asked for, and where each bends by most.
 pub fn inexact(seams: &[SeamQuality], params: &PipelineParams) -> Option<Warning> {

@@ -10,24 +10,24 @@ use planish::surface::Surface;
 use planish::surface::basis::uniform_parameters;
 
 /// Teeth of a comb stand this share of the diagonal apart: a few pixels of a large picture.
-const STEP: f64 = 1.0 / 320.0;
+const TOOTH_DISTANCE: f64 = 1.0 / 320.0;
 /// Fewest and most steps between the teeth of one curve.
 const TEETH: [usize; 2] = [8, 400];
 /// Places of a curve that its length is measured at.
-const CHORDS: usize = 16;
+const LENGTH_CHORDS: usize = 16;
 /// Length of a tooth at the curvature that 95 of 100 places do not exceed, as a share of the diagonal.
-const REACH: f64 = 0.02;
+const TOOTH_LENGTH: f64 = 0.02;
 /// No tooth is longer than this many times that.
-const LONGEST: f64 = 2.0;
+const LONGEST_TO_USUAL: f64 = 2.0;
 /// Teeth shorter than this share of the diagonal, less than a pixel, are left out: of a flat curve the sign of its curvature is noise.
-const SEEN: f64 = 1.0 / 2000.0;
+const SHORTEST_TOOTH: f64 = 1.0 / 2000.0;
 /// Combs of convex curves (bent away from the outside) and of hollow ones, and of nothing: curves themselves.
 const CONVEX: [u8; 3] = [24, 78, 160];
 const HOLLOW: [u8; 3] = [196, 88, 16];
 const CURVE: [u8; 3] = [40, 46, 54];
 /// Widths of seams and of the middles of patches, pixels.
-const SEAM: f64 = 1.8;
-const MIDDLE: f64 = 0.8;
+const SEAM_WIDTH: f64 = 1.8;
+const MIDDLE_WIDTH: f64 = 0.8;
 
 /// The surfaces side by side, each with vertices of its own, and their normals there; none where `S_u x S_v = 0`.
 /// * `cuts` - quads per knot span
@@ -56,7 +56,7 @@ struct Tooth {
     curvature: f64,
 }
 
-/// Combs as lines, and the radius for which a tooth is [`REACH`] of the diagonal long, world units.
+/// Combs as lines, and the radius for which a tooth is [`TOOTH_LENGTH`] of the diagonal long, world units.
 pub struct Combs {
     pub lines: Vec<Line>,
     pub radius: f64,
@@ -66,10 +66,10 @@ pub struct Combs {
 /// which go on across the seams.
 pub fn combs(model: &Model) -> Combs {
     let diagonal = model.mesh.bounds().diagonal();
-    let middles = |s: &Surface| [true, false].map(|along_u| (teeth(s, along_u, 0.5, diagonal), MIDDLE));
+    let middles = |s: &Surface| [true, false].map(|along_u| (teeth(s, along_u, 0.5, diagonal), MIDDLE_WIDTH));
     let rims = |s: &Surface| {
         [(true, 0.0), (false, 1.0), (true, 1.0), (false, 0.0)]
-            .map(|(along_u, at)| (teeth(s, along_u, at, diagonal), SEAM))
+            .map(|(along_u, at)| (teeth(s, along_u, at, diagonal), SEAM_WIDTH))
     };
     let all: Vec<(Vec<Tooth>, f64)> =
         model.surfaces.iter().flat_map(|s| middles(s).into_iter().chain(rims(s))).collect();
@@ -78,8 +78,11 @@ pub fn combs(model: &Model) -> Combs {
     sizes.sort_by(f64::total_cmp);
     // Flat shapes have combs without teeth.
     let usual = sizes.get(sizes.len() * 95 / 100).copied().unwrap_or(0.0).max(1e-9 / diagonal);
-    let scale =
-        Scale { curvature: REACH * diagonal / usual, shortest: SEEN * diagonal, longest: LONGEST * REACH * diagonal };
+    let scale = Scale {
+        curvature: TOOTH_LENGTH * diagonal / usual,
+        shortest: SHORTEST_TOOTH * diagonal,
+        longest: LONGEST_TO_USUAL * TOOTH_LENGTH * diagonal,
+    };
     Combs { lines: all.iter().flat_map(|(teeth, width)| comb(teeth, scale, *width)).collect(), radius: 1.0 / usual }
 }
 
@@ -96,9 +99,9 @@ struct Scale {
 /// Places of the line of a surface where its other parameter is `at`.
 fn teeth(surface: &Surface, along_u: bool, at: f64, diagonal: f64) -> Vec<Tooth> {
     let jet = |t: f64| if along_u { surface.jet(t, at) } else { surface.jet(at, t) };
-    let chords: Vec<DVec3> = uniform_parameters(CHORDS + 1).into_iter().map(|t| jet(t).point).collect();
+    let chords: Vec<DVec3> = uniform_parameters(LENGTH_CHORDS + 1).into_iter().map(|t| jet(t).point).collect();
     let length: f64 = chords.windows(2).map(|w| w[0].distance(w[1])).sum();
-    let steps = ((length / (STEP * diagonal)).ceil() as usize).clamp(TEETH[0], TEETH[1]);
+    let steps = ((length / (TOOTH_DISTANCE * diagonal)).ceil() as usize).clamp(TEETH[0], TEETH[1]);
     let tooth = |t: f64| {
         let jet = jet(t);
         let normal = jet.area_vector().try_normalize()?;

@@ -23,7 +23,7 @@ pub(super) fn relax_near(at: DVec3) -> String {
 
 /// The first few of a list, in words.
 pub(super) fn few(names: &[String]) -> String {
-    const SHOWN: usize = 8;
-    let head = names[..names.len().min(SHOWN)].join(", ");
-    if names.len() > SHOWN { format!("{head} and {} more", names.len() - SHOWN) } else { head }
+    const MOST_NAMES: usize = 8;
+    let head = names[..names.len().min(MOST_NAMES)].join(", ");
+    if names.len() > MOST_NAMES { format!("{head} and {} more", names.len() - MOST_NAMES) } else { head }
 }

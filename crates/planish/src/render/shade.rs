@@ -16,11 +16,10 @@ pub(super) type Sample = Option<Vec3>;
 const TABLE: usize = 1024;
 
 pub(super) fn shade(mesh: &TriMesh, look: &Look, frame: &Frame, seen: &Seen) -> Vec<Sample> {
-    let smoothed = if look.normals.is_none() { Some(corner_normals(mesh, look.crease_deg, seen)) } else { None };
-    let normals = |face: u32| match (look.normals, &smoothed) {
-        (Some(own), _) => mesh.triangles[face as usize].map(|v| own[v as usize]),
-        (None, Some(smoothed)) => smoothed.of(face),
-        (None, None) => unreachable!("there are smoothed normals where there are no others"),
+    let own = look.normals.ok_or_else(|| corner_normals(mesh, look.crease_deg, seen));
+    let normals = |face: u32| match &own {
+        Ok(own) => mesh.triangles[face as usize].map(|v| own[v as usize]),
+        Err(smoothed) => smoothed.of(face),
     };
     let open = if look.hollows > 0.0 { openness(mesh, frame, seen) } else { Vec::new() };
     let color_at = if let Paint::Signed { .. } = look.paint { signed_color } else { field_color };

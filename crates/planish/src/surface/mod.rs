@@ -27,7 +27,7 @@ mod spacing;
 pub use error::FitError;
 pub use evaluate::Jet;
 pub(crate) use evaluate::RowSampler;
-pub use exact::{Exact, exact};
+pub use exact::{EXACT_DEG, Exact, exact};
 pub use fit::{FEWEST_CONTROL, fit};
 pub use fold::folds;
 pub use mirrored::{mirror_grids, mirror_surfaces};

@@ -8,7 +8,7 @@
 use super::caps::FACE_POINT;
 use super::crossings::{edge_point, joined};
 use super::twice::{Pass, TwicePassed, low_segments};
-use super::{AMBIGUOUS, Chain, FACE_EDGES, links};
+use super::{AMBIGUOUS, Chain, FACE_EDGES, MARGIN, UNMOVED_SHARE, links};
 use crate::contour::Thresholds;
 use crate::contour::walk::Cell;
 use crate::field::{Creases, Directed};
@@ -47,10 +47,6 @@ pub struct Part {
     wishes: Vec<(usize, u32, u32, [u32; 2], DVec3)>,
 }
 
-/// Face points keep this distance from the sides of their face, as a fraction of it.
-const FACE_MARGIN: f64 = 0.004;
-/// Fraction of [`FACE_MARGIN`] from which on a point is left where it is.
-const UNMOVED_SHARE: f64 = 1e-3;
 /// The tangents must cross at an angle with at least this sine.
 const CROSSING: f64 = 0.02;
 /// A meeting farther outside the face than this, in cells, is no feature of it.
@@ -202,7 +198,7 @@ fn arc_height(a: &Pass, b: &Pass, way: DVec3) -> f64 {
 
 /// A point of a face as near as can be, but not on its sides.
 fn kept(axis: usize, [low, high]: [DVec3; 2], p: DVec3) -> DVec3 {
-    let margin = FACE_MARGIN * UNMOVED_SHARE * (high - low);
+    let margin = MARGIN * UNMOVED_SHARE * (high - low);
     let mut q = p.clamp(low + margin, high - margin);
     q[axis] = low[axis];
     q
@@ -231,7 +227,7 @@ fn faint(
 /// True if a point of a face is clear of its sides.
 fn is_clear(axis: usize, [low, high]: [DVec3; 2], p: DVec3) -> bool {
     (0..3).filter(|&u| u != axis).all(|u| {
-        let margin = FACE_MARGIN * (high[u] - low[u]);
+        let margin = MARGIN * (high[u] - low[u]);
         p[u] > low[u] + margin && p[u] < high[u] - margin
     })
 }
@@ -279,7 +275,7 @@ fn place(
     if q.cmplt(low - far).any() || q.cmpgt(high + far).any() {
         return None;
     }
-    let margin = size * FACE_MARGIN;
+    let margin = size * MARGIN;
     let near = margin * UNMOVED_SHARE;
     if q.cmpgt(low + near).all() && q.cmplt(high - near).all() {
         return Some((lift(q), None));

@@ -15,6 +15,11 @@ pub(crate) mod patch;
 pub(crate) mod topology;
 pub(crate) mod twice;
 
+/// Vertices inside a cell, and points of a face, are kept this far from its sides, as a fraction of its size.
+const MARGIN: f64 = 0.004;
+/// Fraction of [`MARGIN`] from which on they stay where they are.
+const UNMOVED_SHARE: f64 = 1e-3;
+
 /// Corners of each edge.
 pub const EDGES: [[usize; 2]; 12] =
     [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];

@@ -14,7 +14,7 @@ use super::face::{FacePoints, Wish};
 use super::feature::{Shape, classify, solve};
 use super::topology::Trilinear;
 use super::twice::{Passes, TwicePassed};
-use super::{AMBIGUOUS, CROSSED, EDGE_FACES, links};
+use super::{AMBIGUOUS, CROSSED, EDGE_FACES, MARGIN, UNMOVED_SHARE, links};
 use crate::contour::Thresholds;
 use crate::contour::polish::local::CellRange;
 use crate::contour::walk::Cell;
@@ -83,8 +83,6 @@ pub struct Scratch {
     parts: Vec<usize>,
 }
 
-/// Inner vertices keep this distance from the faces of their cell, as a fraction of its size.
-const CELL_MARGIN: f64 = 0.004;
 /// Vertices farther from their cell than this are no feature of it, in cells.
 const FARTHEST_FEATURE: f64 = 1.0;
 
@@ -408,7 +406,7 @@ pub fn cell_corners(low: DVec3, high: DVec3) -> [DVec3; 8] {
 
 /// `p` kept clear of the faces of the cell, and whether it had to be moved.
 pub fn inside(p: DVec3, low: DVec3, high: DVec3) -> (DVec3, bool) {
-    let margin = (high - low) * CELL_MARGIN;
+    let margin = (high - low) * MARGIN;
     if p.is_nan() {
         return ((low + high) / 2.0, true);
     }
@@ -420,9 +418,6 @@ pub fn inside(p: DVec3, low: DVec3, high: DVec3) -> (DVec3, bool) {
         (q, q != p)
     }
 }
-
-/// Fraction of [`CELL_MARGIN`] from which on a vertex is left alone.
-const UNMOVED_SHARE: f64 = 1e-3;
 
 /// True if the normals of two hits that follow each other have a cosine below `faint`.
 fn bends(l: &[Corner], faint: f64) -> bool {

@@ -28,22 +28,24 @@ const STIFF: [f64; 5] = [1e1, 1e3, 1e5, 1e7, 1e9];
 /// Rounds after which conditions are to hold: from then on the first is the last in which no seam bends by more than [`GOAL_DEG`].
 /// What an equation holds by a small factor alone, the slope of `a` or `b`, costs the fit much and the angle little: to take
 /// the angles of a ball with corners of 3, 4 and 5 patches from 2.5e-4 degrees to rounding took its distances from 5 to 49 times those of plain fits.
-const FIRM: usize = 3;
-/// Largest angle that is left, degrees: half of what exact seams are said to keep.
-const GOAL_DEG: f64 = 5e-4;
+const FIRST_FIRM_ROUND: usize = 3;
+/// Largest angle of an exact seam, degrees: far above rounding, far below what any receiver tells from nothing.
+pub const EXACT_DEG: f64 = 1e-3;
+/// Largest angle that is left, degrees.
+const GOAL_DEG: f64 = EXACT_DEG / 2.0;
 /// Steps of conjugate gradients until the multipliers are renewed, and how often that is in a round. Steps of the same number
 /// without conjugate directions left a ball of six patches 2.3 times as far off, and balls with corners of 3 to 8 patches up to 17 %.
-const STEPS: usize = 10;
-const TURNS: usize = 2;
-/// Steps at most until the conditions are kept to [`EXACT`], a share of the diagonal: rounding.
-const SETTLING: usize = 20;
-const EXACT: f64 = 1e-13;
+const GRADIENT_STEPS: usize = 10;
+const MULTIPLIER_STEPS: usize = 2;
+/// Steps at most until the conditions are kept to [`KEPT`], a share of the diagonal: rounding.
+const MOST_SETTLINGS: usize = 20;
+const KEPT: f64 = 1e-13;
 /// How often what is left of a part is solved again; one with bad patches in the last trial stays as it was.
-const TRIALS: usize = 8;
+const MOST_TRIALS: usize = 8;
 /// How many times as far as before, beside the tolerance, a weighed seam may bend anywhere.
 const MORE_BENT: f64 = 1.1;
 /// How often the farthest place of the fit, or its tolerance, a place may be off.
-const FAR: f64 = 4.0;
+const FAR_TO_FARTHEST: f64 = 4.0;
 
 /// Surfaces with exact seams.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,7 +92,7 @@ pub fn exact(
     let fit = Fit::new(network, grids, surfaces, &counts, (params.smoothing, &|c| !smooth[c]))?;
     let misses = Misses::new(surfaces, grids);
     let folds = surfaces.par_iter().zip(grids).map(|(s, g)| folds(s, g)).collect();
-    let far = FAR * misses.most.max(params.tolerance);
+    let far = FAR_TO_FARTHEST * misses.most.max(params.tolerance);
     let tolerance = params.angle_tolerance.to_radians();
     let bends = measure_seams(network, surfaces, observer)?;
     let task = Task { fit, surfaces, uses, misses, smooth, tolerance, folds, far, bends };
@@ -149,11 +151,11 @@ impl Task<'_> {
         let mut is_exact = vec![false; self.smooth.len()];
         let mut held = vec![false; made.len()];
         let mut parts = self.parts(&self.smooth, &held);
-        for trial in 0..TRIALS {
-            let share = 1.0 / (TRIALS * parts.len().max(1)) as f64;
+        for trial in 0..MOST_TRIALS {
+            let share = 1.0 / (MOST_TRIALS * parts.len().max(1)) as f64;
             let mut left = Vec::new();
             for (i, wanted) in parts.iter().enumerate() {
-                let part = Part::new(observer, trial as f64 / TRIALS as f64 + i as f64 * share, share);
+                let part = Part::new(observer, trial as f64 / MOST_TRIALS as f64 + i as f64 * share, share);
                 let Some(solved) = self.solved(wanted, &held, &part)? else { continue };
                 let bad = self.bad(&solved, observer)?;
                 if bad.is_empty() {
@@ -250,7 +252,7 @@ impl Task<'_> {
         }
         let shared = Shared::new(network, self.surfaces, &seams, held);
         let mut system = System::new(&self.fit, &shared, self.surfaces);
-        let exact_below = EXACT * diagonal(self.fit.grids);
+        let exact_below = KEPT * diagonal(self.fit.grids);
         for (round, stiff) in STIFF.into_iter().enumerate() {
             if round > 0 {
                 let renewed = gluings(network, &system.surfaces, &|c| seams[c] == Seam::Exact);
@@ -259,17 +261,17 @@ impl Task<'_> {
             let (conditions, wishes) = self.rows(&seams, &glued, &shared);
             system.renew(conditions, wishes);
             let factor = system.factor(stiff, observer)?;
-            for _ in 0..TURNS {
-                system.descend(&factor, STEPS, observer)?;
+            for _ in 0..MULTIPLIER_STEPS {
+                system.descend(&factor, GRADIENT_STEPS, observer)?;
             }
-            for _ in 0..if round + 1 < FIRM { 0 } else { SETTLING } {
+            for _ in 0..if round + 1 < FIRST_FIRM_ROUND { 0 } else { MOST_SETTLINGS } {
                 observer.check()?;
                 if system.settle(&factor) < exact_below {
                     break;
                 }
             }
             observer.progress((round + 1) as f64 / STIFF.len() as f64);
-            if round + 1 >= FIRM && most_bent(network, &system.surfaces, &seams, observer)? <= GOAL_DEG {
+            if round + 1 >= FIRST_FIRM_ROUND && most_bent(network, &system.surfaces, &seams, observer)? <= GOAL_DEG {
                 break;
             }
         }

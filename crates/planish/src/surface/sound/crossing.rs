@@ -19,14 +19,14 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Steps of Newton's method: it doubles its digits, of which there are sixteen, once it is near.
-const STEPS: usize = 20;
+const NEWTON_STEPS: usize = 20;
 /// Pairs of facets that are tried for two patches at most: a curve along which they cross has many, and one is enough.
-const TRIES: usize = 64;
+const MOST_TRIES: usize = 64;
 /// Sine of the angle between the normals below which surfaces touch rather than cross. The place is known to 1e-12 of the
 /// diagonal, so that the surfaces are on both sides of each other within a billionth of it.
-const ANGLE: f64 = 1e-3;
+const LEAST_SINE: f64 = 1e-3;
 /// Parameters nearer than this to a boundary are on it, and places of one patch nearer than this to each other are one place.
-const BESIDE: f64 = 1e-6;
+const ON_BOUNDARY: f64 = 1e-6;
 
 /// Where a triangle of a mesh of surfaces is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,7 +72,7 @@ pub fn crossings(
     let search = |(patches, pairs): &([u32; 2], Vec<[u32; 2]>)| {
         observer.check()?;
         let [a, b] = patches.map(|p| &surfaces[p as usize]);
-        let step = pairs.len().div_ceil(TRIES);
+        let step = pairs.len().div_ceil(MOST_TRIES);
         let meet = |pair: &[u32; 2]| {
             let [p, q] = pair.map(|t| facets[t as usize].place);
             let (place, angle_deg) = common(a, b, [p[0], p[1], q[0], q[1]], near)?;
@@ -89,14 +89,15 @@ pub fn crossings(
 /// * `near` - what counts as one place, world units
 fn common(a: &Surface, b: &Surface, start: [f64; 4], near: f64) -> Option<(DVec3, f64)> {
     let mut x = start;
-    for _ in 0..STEPS {
+    for _ in 0..NEWTON_STEPS {
         let (at_a, at_b) = (a.jet(x[0], x[1]), b.jet(x[2], x[3]));
         let apart = at_a.point - at_b.point;
         if apart.length() <= near {
             let [m, n] = [at_a, at_b].map(|jet| jet.area_vector().normalize_or_zero());
             let sine = m.cross(n).length();
-            let is_own = std::ptr::eq(a, b) && (x[0] - x[2]).abs().max((x[1] - x[3]).abs()) <= BESIDE;
-            let is_crossing = sine >= ANGLE && !is_own && !(is_on_boundary(x[0], x[1]) && is_on_boundary(x[2], x[3]));
+            let is_own = std::ptr::eq(a, b) && (x[0] - x[2]).abs().max((x[1] - x[3]).abs()) <= ON_BOUNDARY;
+            let is_crossing =
+                sine >= LEAST_SINE && !is_own && !(is_on_boundary(x[0], x[1]) && is_on_boundary(x[2], x[3]));
             return is_crossing.then(|| (at_a.point, sine.atan2(m.dot(n)).to_degrees()));
         }
         let ways = [at_a.u, at_a.v, -at_b.u, -at_b.v];
@@ -113,7 +114,7 @@ fn common(a: &Surface, b: &Surface, start: [f64; 4], near: f64) -> Option<(DVec3
 }
 
 fn is_on_boundary(u: f64, v: f64) -> bool {
-    [u, 1.0 - u, v, 1.0 - v].iter().any(|x| *x <= BESIDE)
+    [u, 1.0 - u, v, 1.0 - v].iter().any(|x| *x <= ON_BOUNDARY)
 }
 
 /// What triangles leave a surface by at most, world units, if their corners are nodes of even steps in its parameters and their
