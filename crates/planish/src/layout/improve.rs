@@ -59,36 +59,26 @@ pub(super) fn straighten(bench: &mut Bench, observer: &dyn Observer) -> Result<(
 
 /// Changes the connectivity until nothing gets better, towards `patches` patches.
 pub(super) fn improve(bench: &mut Bench, patches: usize, observer: &dyn Observer) -> Result<(), LayoutError> {
-    let (mut known, mut drawn) = (Known::new(), Known::new());
-    let mut fresh = vec![true; bench.complex.nodes.len()];
+    let cells = bench.complex.cells.len();
+    let (mut filled, mut drawn) = (Known::but(vec![true; cells]), Known::but(vec![false; cells]));
     for round in 0..CHANGE_ROUNDS {
         observer.progress(0.3 + 0.5 * round as f64 / CHANGE_ROUNDS as f64);
         let least = LEAST_GAIN * GAIN_GROWTH.powi(round as i32);
         let scale = Scale::new(bench, patches);
-        let chosen = choose(
-            bench,
-            unions(&bench.complex),
-            least,
-            &fresh,
-            &mut known,
-            |union| scale.best(union),
-            |change| nodes_of_one(&bench.complex, change),
-        );
+        let nodes = |change: &Change| nodes_of(&bench.complex, &change.cells);
+        let chosen = choose(unions(&bench.complex), least, &mut filled, |union| scale.best(union), nodes);
         if chosen.is_empty() {
             break;
         }
-        let mut touched = nodes_of(&bench.complex, &chosen);
+        let mut touched = cells_of(&bench.complex, &chosen);
         bench.apply(&chosen);
-        touched.resize(bench.complex.nodes.len(), true);
-        fresh = settle_some(
-            bench,
-            (patches, Footing::Ignored),
-            SETTLING_AROUND_CHANGES,
-            touched.clone(),
-            &mut drawn,
-            observer,
-        )?;
-        fresh.iter_mut().zip(touched).for_each(|(fresh, touched)| *fresh |= touched);
+        touched.resize(bench.complex.cells.len(), true);
+        drawn.forget(&touched);
+        let scale = (patches, Footing::Ignored);
+        let settled = settle_some(bench, scale, SETTLING_AROUND_CHANGES, &mut drawn, observer)?;
+        touched.iter_mut().zip(settled).for_each(|(touched, settled)| *touched |= settled);
+        // The sectors of a node are those of all cells around it.
+        filled.forget(&around(&bench.complex, &touched));
     }
     Ok(())
 }
@@ -101,8 +91,8 @@ pub(super) fn settle(
     rounds: usize,
     observer: &dyn Observer,
 ) -> Result<(), LayoutError> {
-    let fresh = vec![true; bench.complex.nodes.len()];
-    settle_some(bench, (patches, Footing::Ignored), rounds, fresh, &mut Known::new(), observer).map(|_| ())
+    let mut known = Known::but(vec![true; bench.complex.cells.len()]);
+    settle_some(bench, (patches, Footing::Ignored), rounds, &mut known, observer).map(|_| ())
 }
 
 /// The same, and nodes inside lines slide along these.
@@ -112,52 +102,51 @@ pub(super) fn settle_along_lines(
     rounds: usize,
     observer: &dyn Observer,
 ) -> Result<(), LayoutError> {
-    let fresh = vec![true; bench.complex.nodes.len()];
+    let fresh = vec![true; bench.complex.cells.len()];
     settle_along_lines_around(bench, (patches, rounds), fresh, observer)
 }
 
-/// The same around the nodes in `fresh`, for a number of patches and in so many rounds.
+/// The same around the cells in `fresh`, for a number of patches and in so many rounds.
 pub(super) fn settle_along_lines_around(
     bench: &mut Bench,
     (patches, rounds): (usize, usize),
-    mut fresh: Vec<bool>,
+    fresh: Vec<bool>,
     observer: &dyn Observer,
 ) -> Result<(), LayoutError> {
-    let mut known = Known::new();
+    let mut known = Known::but(fresh);
     for _ in 0..rounds {
-        let mut drawn = settle_some(bench, (patches, Footing::Ignored), 1, fresh.clone(), &mut known, observer)?;
+        let mut fresh = known.fresh.clone();
+        let drawn = settle_some(bench, (patches, Footing::Ignored), 1, &mut known, observer)?;
         fresh.iter_mut().zip(&drawn).for_each(|(fresh, drawn)| *fresh |= drawn);
-        for half in slide(bench, patches, &fresh).into_iter().flat_map(|cell| bench.complex.loop_of(cell)) {
-            drawn[bench.complex.from(*half) as usize] = true;
-        }
-        if !drawn.contains(&true) {
+        let slid = slide(bench, patches, &fresh);
+        if !drawn.contains(&true) && !slid.contains(&true) {
             break;
         }
-        fresh = drawn;
+        known.forget(&slid);
     }
     Ok(())
 }
 
 /// As [`settle`] around the cells that a grid would not cover well, and corners come on flat ground.
 pub(super) fn settle_uncovered(bench: &mut Bench, rounds: usize, observer: &dyn Observer) -> Result<(), LayoutError> {
-    let mut fresh = vec![false; bench.complex.nodes.len()];
+    let mut fresh = vec![false; bench.complex.cells.len()];
     let cells: Vec<u32> = bench.complex.live_cells().collect();
     for (&c, _) in cells.iter().zip(fitness::covers(bench)).filter(|(_, cover)| !cover.is_good()) {
-        bench.complex.loop_of(c).iter().for_each(|&half| fresh[bench.complex.from(half) as usize] = true);
+        fresh[c as usize] = true;
     }
-    settle_some(bench, (cells.len(), Footing::Counts), rounds, fresh, &mut Known::new(), observer).map(|_| ())
+    let mut known = Known::but(around(&bench.complex, &fresh));
+    settle_some(bench, (cells.len(), Footing::Counts), rounds, &mut known, observer).map(|_| ())
 }
 
-/// As [`settle`] around the nodes in `fresh`. Returns the nodes of cells that were drawn anew.
+/// As [`settle`] where not all is `known`. Marks the cells that were drawn anew.
 fn settle_some(
     bench: &mut Bench,
     (patches, footing): (usize, Footing),
     rounds: usize,
-    mut fresh: Vec<bool>,
     known: &mut Known,
     observer: &dyn Observer,
 ) -> Result<Vec<bool>, LayoutError> {
-    let mut all = vec![false; fresh.len()];
+    let mut all = vec![false; bench.complex.cells.len()];
     for _ in 0..rounds {
         observer.check()?;
         let complex = &bench.complex;
@@ -167,27 +156,25 @@ fn settle_some(
         let scale = Scale::new(bench, patches);
         let cells = |change: &Change| change.cells.clone();
         let redrawn = |union: &Change| scale.redrawn(union, footing);
-        let chosen = choose(bench, unions, LEAST_SETTLING, &fresh, known, redrawn, cells);
+        let chosen = choose(unions, LEAST_SETTLING, known, redrawn, cells);
         if chosen.is_empty() {
             break;
         }
-        fresh = nodes_of(&bench.complex, &chosen);
-        all.iter_mut().zip(&fresh).for_each(|(all, fresh)| *all |= fresh);
+        let drawn = cells_of(&bench.complex, &chosen);
         bench.apply(&chosen);
+        known.forget(&drawn);
+        all.iter_mut().zip(drawn).for_each(|(all, drawn)| *all |= drawn);
     }
     Ok(all)
 }
 
-/// Slides nodes inside lines, whose cells have a node in `fresh`, to where that makes cells better, in a batch of disjoint
-/// ones. Returns the cells that were drawn anew.
-fn slide(bench: &mut Bench, patches: usize, fresh: &[bool]) -> Vec<u32> {
+/// Slides nodes inside lines, with a cell in `fresh`, to where that makes cells better, in a batch of disjoint
+/// ones. Marks the cells that were drawn anew.
+fn slide(bench: &mut Bench, patches: usize, fresh: &[bool]) -> Vec<bool> {
     let complex = &bench.complex;
     let scale = Scale::new(bench, patches);
-    let slides = complex.stars().into_iter().filter_map(|star| Slide::new(complex, &star)).filter(|slide| {
-        let mut halves = slide.cells().into_iter().flat_map(|c| complex.loop_of(c));
-        halves.any(|&h| fresh[complex.from(h) as usize])
-    });
-    let slides: Vec<Slide> = slides.collect();
+    let slides = complex.stars().into_iter().filter_map(|star| Slide::new(complex, &star));
+    let slides: Vec<Slide> = slides.filter(|slide| slide.cells().into_iter().any(|c| fresh[c as usize])).collect();
     let gains: Vec<Option<(f64, usize)>> = slides.par_iter().map(|slide| scale.slid(slide)).collect();
     let mut found: Vec<(f64, (Slide, usize))> = (slides.into_iter().zip(gains))
         .filter_map(|(slide, gain)| gain.filter(|g| g.0 > LEAST_SETTLING).map(|(gain, at)| (gain, (slide, at))))
@@ -195,23 +182,55 @@ fn slide(bench: &mut Bench, patches: usize, fresh: &[bool]) -> Vec<u32> {
     found.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.0.node.cmp(&y.1.0.node)));
     let (now, _) = disjoint(found, |(_, (slide, _))| slide.cells(), |(_, slide)| Some(slide));
     slide::apply(bench, &now);
-    now.iter().flat_map(|(slide, _)| slide.cells()).collect()
+    let mut slid = vec![false; fresh.len()];
+    now.iter().flat_map(|(slide, _)| slide.cells()).for_each(|c| slid[c as usize] = true);
+    slid
 }
 
-/// The nodes of the cells of a change.
-fn nodes_of_one(complex: &Complex, change: &Change) -> Vec<u32> {
-    change.cells.iter().flat_map(|&c| complex.loop_of(c)).map(|&h| complex.from(h)).collect()
+/// The nodes of some cells.
+fn nodes_of(complex: &Complex, cells: &[u32]) -> Vec<u32> {
+    cells.iter().flat_map(|&c| complex.loop_of(c)).map(|&h| complex.from(h)).collect()
 }
 
-/// Marks the nodes of the cells of `changes`.
-fn nodes_of(complex: &Complex, changes: &[Change]) -> Vec<bool> {
+/// Marks the cells of `changes`.
+fn cells_of(complex: &Complex, changes: &[Change]) -> Vec<bool> {
+    let mut marked = vec![false; complex.cells.len()];
+    changes.iter().flat_map(|change| &change.cells).for_each(|&c| marked[c as usize] = true);
+    marked
+}
+
+/// Marks the cells with a node of a marked one.
+fn around(complex: &Complex, marked: &[bool]) -> Vec<bool> {
     let mut nodes = vec![false; complex.nodes.len()];
-    changes.iter().flat_map(|change| nodes_of_one(complex, change)).for_each(|n| nodes[n as usize] = true);
-    nodes
+    let inner: Vec<u32> = complex.live_cells().filter(|&c| marked[c as usize]).collect();
+    nodes_of(complex, &inner).into_iter().for_each(|n| nodes[n as usize] = true);
+    let mut wider = vec![false; complex.cells.len()];
+    for c in complex.live_cells() {
+        wider[c as usize] = nodes_of(complex, &[c]).into_iter().any(|n| nodes[n as usize]);
+    }
+    wider
 }
 
-/// The best filling of each union, by the arcs that it removes.
-type Known = BTreeMap<Vec<u32>, Option<Gain>>;
+/// What the best change of each union is.
+struct Known {
+    /// By the arcs that it removes; a union that is not here is left as it is.
+    best: BTreeMap<Vec<u32>, Option<Gain>>,
+    /// Marks the cells whose unions have to be looked at anew.
+    fresh: Vec<bool>,
+}
+
+impl Known {
+    /// All unions are good as they are but for those with a cell in `fresh`.
+    fn but(fresh: Vec<bool>) -> Known {
+        Known { best: BTreeMap::new(), fresh }
+    }
+
+    /// Cells have changed, or have come.
+    fn forget(&mut self, changed: &[bool]) {
+        self.fresh.resize(changed.len(), true);
+        self.fresh.iter_mut().zip(changed).for_each(|(fresh, changed)| *fresh |= changed);
+    }
+}
 
 /// The unions worth filling anew: pairs of cells, and the cells around a node.
 fn unions(complex: &Complex) -> Vec<Change> {
@@ -226,26 +245,21 @@ fn unions(complex: &Complex) -> Vec<Change> {
 }
 
 /// The changes of `unions` that gain most by `best`, and more than `least`, such that no two touch the same (`touches`).
-/// What is known of unions without a node in `fresh` is taken from `known`.
+/// Afterwards all of `unions` are known.
 fn choose(
-    bench: &Bench,
     unions: Vec<Change>,
     least: f64,
-    fresh: &[bool],
     known: &mut Known,
     best: impl Fn(&Change) -> Option<Gain> + Sync,
     touches: impl Fn(&Change) -> Vec<u32>,
 ) -> Vec<Change> {
-    let complex = &bench.complex;
-    let nodes = |change: &Change| nodes_of_one(complex, change);
-    let gains: Vec<Option<Gain>> = unions
-        .par_iter()
-        .map(|union| match known.get(&union.removed) {
-            gain if !nodes(union).iter().any(|&n| fresh[n as usize]) => gain.cloned().flatten(),
-            _ => best(union).filter(|g| g.0 > least),
-        })
-        .collect();
-    *known = unions.into_iter().map(|u| u.removed).zip(gains.iter().cloned()).collect();
+    let gain = |union: &Change| match union.cells.iter().any(|&c| known.fresh[c as usize]) {
+        true => best(union).filter(|gain| gain.0 > least),
+        false => known.best.get(&union.removed).cloned().flatten(),
+    };
+    let gains: Vec<Option<Gain>> = unions.par_iter().map(gain).collect();
+    known.best = unions.into_iter().map(|u| u.removed).zip(gains.iter().cloned()).collect();
+    known.fresh.fill(false);
     let mut found: Vec<Gain> = gains.into_iter().flatten().filter(|g| g.0 > least).collect();
     // Ties by the cells, so that the order does not depend on how candidates were found.
     found.sort_by(|x, y| y.0.total_cmp(&x.0).then_with(|| x.1.cells.cmp(&y.1.cells)));
@@ -344,8 +358,8 @@ mod tests {
         let off = |footing: Footing| {
             let complex = outline::outline(&Ground::new(&mesh, &adjacency, &lines), &label, 4, &corner);
             let mut bench = Bench::new(&mesh, &adjacency, complex).expect("four cells");
-            let fresh = vec![true; bench.complex.nodes.len()];
-            settle_some(&mut bench, (4, footing), 24, fresh, &mut Known::new(), &Silent).unwrap();
+            let mut known = Known::but(vec![true; bench.complex.cells.len()]);
+            settle_some(&mut bench, (4, footing), 24, &mut known, &Silent).unwrap();
             let inner = bench.complex.stars().into_iter().find(|star| star_change(&bench.complex, star).is_some());
             let node = bench.complex.from(inner.expect("a corner inside")[0]);
             (mesh.points[bench.complex.nodes[node as usize].vertex as usize].x - 0.5).abs()

@@ -3,6 +3,7 @@
 mod banded_cholesky;
 mod dense;
 mod eigen3;
+pub(crate) mod envelope;
 pub(crate) mod small_cholesky;
 
 pub use banded_cholesky::{Banded, BandedCholesky};

@@ -6,11 +6,10 @@
 //! Tutte, *How to Draw a Graph*, 1963; Floater, *Parametrization and smooth approximation of surface triangulations*, 1997;
 //! `docs/decisions/0005-spade-and-convex-maps.md`.
 
-use crate::linalg::SparseCholesky;
+use crate::linalg::{SparseCholesky, envelope};
 use crate::mesh::{Adjacency, NONE, next, previous};
 use glam::{DVec2, DVec3};
 use robust::{Coord, orient2d};
-use std::collections::HashMap;
 
 /// Least weight of an edge in the map, against the cotangent weight 1 of a right isosceles triangle: keeps
 /// the map one to one where triangles are obtuse.
@@ -44,14 +43,14 @@ impl Disk {
         barrier: impl Fn(u32) -> bool,
         start: u32,
     ) -> Option<Disk> {
-        let local: HashMap<u32, u32> = faces.iter().enumerate().map(|(i, &f)| (f, i as u32)).collect();
+        let local = |f: u32| faces.binary_search(&f).ok().map(|i| i as u32);
         let mut opposite = vec![NONE; 3 * faces.len()];
         for (i, &f) in faces.iter().enumerate() {
             for k in 0..3 {
                 let h = 3 * f + k;
                 let o = adjacency.opposite[h as usize];
                 if !barrier(h) && o != NONE {
-                    if let Some(&j) = local.get(&(o / 3)) {
+                    if let Some(j) = local(o / 3) {
                         opposite[3 * i + k as usize] = 3 * j + o % 3;
                     } else {
                         return None; // the region leaks
@@ -88,7 +87,7 @@ impl Disk {
             }
         }
         let triangles: Vec<[u32; 3]> = own.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-        let first = 3 * *local.get(&(start / 3))? + start % 3;
+        let first = 3 * local(start / 3)? + start % 3;
         let mut boundary = Vec::new();
         let mut h = first;
         loop {
@@ -135,7 +134,7 @@ impl Disk {
         let position = |v: u32| points[self.vertices[v as usize] as usize];
         let mut lower = Vec::with_capacity(8 * m);
         let mut diagonal = vec![0.0; m];
-        let mut rhs = vec![0.0; 2 * m];
+        let mut rhs = vec![DVec2::ZERO; m];
         for h in 0..self.adjacency.opposite.len() as u32 {
             let o = self.adjacency.opposite[h as usize];
             if o < h {
@@ -156,18 +155,23 @@ impl Disk {
                 }
                 diagonal[x as usize] += w;
                 if y == NONE {
-                    rhs[x as usize] += w * uv[other as usize].x;
-                    rhs[m + x as usize] += w * uv[other as usize].y;
+                    rhs[x as usize] += w * uv[other as usize];
                 } else if x > y {
                     lower.push((x as usize, y as usize, -w));
                 }
             }
         }
         lower.extend(diagonal.iter().enumerate().map(|(i, &d)| (i, i, d)));
-        SparseCholesky::factor(m, &lower).ok()?.solve(&mut rhs);
+        if m <= envelope::MOST_UNKNOWNS {
+            envelope::solve(m, &lower, &mut rhs)?;
+        } else {
+            let mut columns: Vec<f64> = rhs.iter().map(|p| p.x).chain(rhs.iter().map(|p| p.y)).collect();
+            SparseCholesky::factor(m, &lower).ok()?.solve(&mut columns);
+            rhs = (0..m).map(|i| DVec2::new(columns[i], columns[m + i])).collect();
+        }
         for (v, &u) in unknown.iter().enumerate() {
             if u != NONE {
-                uv[v] = DVec2::new(rhs[u as usize], rhs[m + u as usize]);
+                uv[v] = rhs[u as usize];
             }
         }
         uv.iter().all(|p| p.is_finite()).then_some(uv)

@@ -62,7 +62,7 @@ pub(in crate::layout) enum Order {
 /// Closes chords of a complex of four-sided cells, one after the other, until none is left that makes it better. True if a ring went
 /// while others waited, so that another order may end elsewhere.
 /// * `fewest` - cells that are left at least
-/// * `settle` - draws cells anew around the nodes that are marked
+/// * `settle` - draws anew around the cells that are marked
 /// * `price` - what a network costs; one that costs less is better
 /// # Errors
 /// Those of `settle`.
@@ -234,15 +234,12 @@ impl<'a> Straight<'a> {
     }
 }
 
-/// The nodes of the cells around the nodes that others became one with.
+/// Marks the cells around the nodes that others became one with.
 fn around(complex: &Complex, closing: &Closing) -> Vec<bool> {
     let kept: BTreeSet<u32> = closing.contractions.iter().map(|c| c.into).collect();
-    let mut marked = vec![false; complex.nodes.len()];
+    let mut marked = vec![false; complex.cells.len()];
     for c in complex.live_cells() {
-        let nodes = complex.loop_of(c).iter().map(|&h| complex.from(h));
-        if nodes.clone().any(|n| kept.contains(&n)) {
-            nodes.for_each(|n| marked[n as usize] = true);
-        }
+        marked[c as usize] = complex.loop_of(c).iter().any(|&h| kept.contains(&complex.from(h)));
     }
     marked
 }
