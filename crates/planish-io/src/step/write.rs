@@ -119,26 +119,25 @@ fn document(input: &StepInput, topology: &Topology) -> Result<(String, StepSumma
         edges[c] = Some(e.add(format!("EDGE_CURVE('curve {c}',#{start},#{end},#{curve},.T.)")));
     }
     let faces: Vec<usize> = (0..surfaces.len()).map(|p| face(&mut e, input.network, p, surfaces[p], &edges)).collect();
-    let mut solids = Vec::new();
-    let mut shells = Vec::new();
+    let mut pieces = Pieces { solids: Vec::new(), shells: Vec::new() };
     for (number, Component { patches, closed }) in (1..).zip(&topology.components) {
         let ids: Vec<usize> = patches.iter().map(|&p| faces[p]).collect();
         if *closed {
             let shell = e.add(format!("CLOSED_SHELL('',{})", list(&ids)));
-            solids.push(e.add(format!("MANIFOLD_SOLID_BREP('piece {number}',#{shell})")));
+            pieces.solids.push(e.add(format!("MANIFOLD_SOLID_BREP('piece {number}',#{shell})")));
         } else {
-            shells.push(e.add(format!("OPEN_SHELL('piece {number}',{})", list(&ids))));
+            pieces.shells.push(e.add(format!("OPEN_SHELL('piece {number}',{})", list(&ids))));
         }
     }
     style::color(&mut e, &faces, context);
     let summary = StepSummary {
-        solids: solids.len(),
-        shells: shells.len(),
+        solids: pieces.solids.len(),
+        shells: pieces.shells.len(),
         faces: faces.len(),
         edges: edges.iter().flatten().count(),
         gap_max: topology.gap_max,
     };
-    represent(&mut e, input.name, product, context, axis, &solids, &shells);
+    represent(&mut e, input.name, product, context, axis, &pieces);
     Ok((format!("{}DATA;\n{}ENDSEC;\nEND-ISO-10303-21;\n", head(input), e.finish()), summary))
 }
 
@@ -264,20 +263,19 @@ fn multiplicities(knots: &[f64]) -> (String, String) {
     (join(runs.iter().map(|run| real(run[0])).collect()), join(runs.iter().map(|run| run.len().to_string()).collect()))
 }
 
+/// The pieces of a product: closed ones, and open ones.
+struct Pieces {
+    solids: Vec<usize>,
+    shells: Vec<usize>,
+}
+
 /// Ties solids and shells to the product: one representation, or two related to a common one if there are both.
-fn represent(
-    e: &mut Entities,
-    name: &str,
-    product: usize,
-    context: usize,
-    axis: usize,
-    solids: &[usize],
-    shells: &[usize],
-) {
+fn represent(e: &mut Entities, name: &str, product: usize, context: usize, axis: usize, pieces: &Pieces) {
+    let Pieces { solids, shells } = pieces;
     let name = text(name);
     let mut representations = Vec::new();
     if !solids.is_empty() {
-        let items = list(&[&[axis], solids].concat());
+        let items = list(&[&[axis], &solids[..]].concat());
         representations.push(e.add(format!("ADVANCED_BREP_SHAPE_REPRESENTATION({name},{items},#{context})")));
     }
     if !shells.is_empty() {

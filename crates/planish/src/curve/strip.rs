@@ -349,8 +349,8 @@ fn straightened(
             let before = if k > 0 { bends[k - 1].at } else { lay.start };
             let after = bends.get(k + 1).map_or(lay.end, |b| b.at);
             let mut around = |w: u32| *angles.entry(w).or_insert_with(|| whole_angle(mesh, adjacency, w));
-            let range = [first, last];
-            if let Some(other) = other_side(adjacency, &lay, bend, range, &gates, [before, after], &mut around) {
+            let turn = Turn { bend, gates: [first, last], arms: [before, after] };
+            if let Some(other) = other_side(adjacency, &lay, &gates, &turn, &mut around) {
                 push_gates(adjacency, &mut turned, gates[done..first].iter().copied());
                 push_gates(adjacency, &mut turned, other.into_iter().map(|h| Gate::new(mesh, adjacency, h)));
                 done = last + 1;
@@ -419,15 +419,22 @@ fn beyond_their_edges<G>(
     gates.truncate(gates.len() - last);
 }
 
-/// The half-edges that pass the vertex of `bend` on its other side, if the surface opens by less than 180 degrees
+/// A bend with what is around it.
+struct Turn<'a> {
+    bend: &'a Bend,
+    /// The first and the last of the gates that have its vertex.
+    gates: [usize; 2],
+    /// The bends before and after it, or the ends of the way.
+    arms: [DVec2; 2],
+}
+
+/// The half-edges that pass the vertex of a bend on its other side, if the surface opens by less than 180 degrees
 /// there.
 fn other_side(
     adjacency: &Adjacency,
     lay: &Layout,
-    bend: &Bend,
-    [first, last]: [usize; 2],
     gates: &[Gate],
-    [before, after]: [DVec2; 2],
+    &Turn { bend, gates: [first, last], arms: [before, after] }: &Turn,
     around: &mut dyn FnMut(u32) -> f64,
 ) -> Option<Vec<u32>> {
     let (own, far) = if bend.on_left { (&lay.left, &lay.right) } else { (&lay.right, &lay.left) };

@@ -148,7 +148,15 @@ pub(super) fn mirror(ground: &Ground, drawing: &mut Drawing, before: &Drawing, p
         let mut here = first.sections(s);
         match second.filter(|o| first.patch != o.patch) {
             Some(second) => sections.push((second.patch, second.sections(s))),
-            None => across(&mut here, mesh, new, (first.patch, *p), before, plane, images),
+            None => {
+                let image = |c: u32| images.image.get(c as usize).copied();
+                let patch = &new.patches[first.patch as usize];
+                let own = Onto::find(patch, &image, &new.patches, true, 4).filter(|o| o.patch == first.patch);
+                if let Some(own) = own {
+                    let features = before.sketch.features.iter().filter(|f| f.patch == *p);
+                    across(&mut here, &own, features, mesh, new, plane);
+                }
+            }
         }
         sections.push((first.patch, here));
     }
@@ -157,21 +165,17 @@ pub(super) fn mirror(ground: &Ground, drawing: &mut Drawing, before: &Drawing, p
 
 /// Cells of a patch that is its own image, made their own image along the direction that crosses the plane: those up to
 /// the last curve before the plane count, and the section over the plane takes what is left of the sum.
-/// * `names` - the numbers of the patch now and before
-fn across(
+/// * `own` - the patch as its own image
+/// * `features` - the feature curves that it had before
+fn across<'a>(
     cells: &mut Sections,
+    own: &Onto,
+    features: impl Iterator<Item = &'a FeatureCurve>,
     mesh: &TriMesh,
     network: &Network,
-    names: (u32, u32),
-    before: &Drawing,
     plane: &Plane,
-    images: &Images,
 ) {
-    let patch = &network.patches[names.0 as usize];
-    let image = |c: u32| images.image.get(c as usize).copied();
-    let Some(own) = Onto::find(patch, &image, &network.patches, true, 4).filter(|o| o.patch == names.0) else {
-        return;
-    };
+    let patch = &network.patches[own.patch as usize];
     let (list, end) = match own.first {
         0 => (&mut cells.u, 3),
         2 => (&mut cells.v, 0),
@@ -185,7 +189,7 @@ fn across(
         list.reverse();
     }
     // Curves along the plane, by where they lie: those that cross it are of the other family.
-    let tops = before.sketch.features.iter().filter(|f| f.patch == names.1).map(|f| {
+    let tops = features.map(|f| {
         let heights = f.points.iter().map(height);
         heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)))
     });

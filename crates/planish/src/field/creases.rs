@@ -281,8 +281,7 @@ impl Creases for MeshCreases {
         guess: DVec3,
         through: &[DVec3],
         _corner: bool,
-        low: DVec3,
-        high: DVec3,
+        [low, high]: [DVec3; 2],
         _hits: &[(DVec3, DVec3)],
     ) -> Option<DVec3> {
         let cell = cell_of(&self.lattice, (low + high) / 2.0);

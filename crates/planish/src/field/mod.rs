@@ -173,7 +173,7 @@ pub trait Creases: Sync {
     /// if the guess is as good as anything. `a` and `b` are position and normal of the hits, `size` that of a cell.
     fn face_point(&self, axis: usize, guess: DVec3, a: (DVec3, DVec3), b: (DVec3, DVec3), size: f64) -> Option<DVec3>;
 
-    /// A place of the feature inside the cell from `low` to `high`, near `guess`; `through` are the points at which it
+    /// A place of the feature inside the cell of lowest and highest corner `bounds`, near `guess`; `through` are the points at which it
     /// passes the cell's faces, `corner` whether several features seem to meet here, `hits` the
     /// positions and normals around.
     fn inner_point(
@@ -181,8 +181,7 @@ pub trait Creases: Sync {
         guess: DVec3,
         through: &[DVec3],
         corner: bool,
-        low: DVec3,
-        high: DVec3,
+        bounds: [DVec3; 2],
         hits: &[(DVec3, DVec3)],
     ) -> Option<DVec3>;
 

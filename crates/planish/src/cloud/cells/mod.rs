@@ -153,12 +153,13 @@ pub(crate) fn cells(
         let around = KdTree::new(&candidates.iter().map(|c| c.at).collect::<Vec<_>>());
         let span = [pass, pass + 1].map(|k| k as f64 / CELL_PASSES as f64);
         let before = &made;
+        let known = Known { tree, candidates: &candidates, around: &around };
         let fresh = in_pieces(places.len(), (span[0], span[1]), observer, |s, site| {
             let old = &before[site];
             if old.as_ref().is_some_and(|f| f.cost < KEPT) {
                 return old.clone();
             }
-            let new = find(&places[site], site as u32, pass > 0, tree, &candidates, &around, &mut s.around);
+            let new = known.find(&places[site], site as u32, pass > 0, &mut s.around);
             match (old, new) {
                 (Some(o), Some(n)) => Some(if n.total < o.total { n } else { o.clone() }),
                 (o, n) => n.or_else(|| o.clone()),
@@ -202,6 +203,7 @@ fn narrow(
         places.par_iter().zip(&*made).filter_map(clear).collect::<Vec<_>>().into_iter().unzip();
     let hemmed = KdTree::new(&hemmed);
     let around = KdTree::new(&candidates.iter().map(|c| c.at).collect::<Vec<_>>());
+    let known = Known { tree, candidates, around: &around };
     let fresh = in_pieces(places.len(), (1.0, 1.0), observer, |s, site| {
         let place = &places[site];
         let old = made[site].as_ref().filter(|f| f.cost > UNEXPLAINED)?;
@@ -210,11 +212,8 @@ fn narrow(
         hemmed.within(place.center, HEARD * place.support, |i, _, _| nearest = nearest.min(clear[i as usize]));
         let support = (nearest / HEARD).max(COVERED_GAPS * place.apart);
         let place = Place { support, ..*place };
-        let new = if support < places[site].support {
-            find(&place, site as u32, false, tree, candidates, &around, &mut s.around)
-        } else {
-            None
-        };
+        let new =
+            if support < places[site].support { known.find(&place, site as u32, false, &mut s.around) } else { None };
         new.filter(|n| n.cost < old.cost).map(|n| (place, n))
     })?;
     for (site, (place, found)) in fresh.into_iter().enumerate().filter_map(|(site, f)| Some((site, f?))) {
@@ -344,77 +343,85 @@ impl Found {
     }
 }
 
-fn find(
-    place: &Place,
-    site: u32,
-    again: bool,
-    tree: &KdTree,
-    candidates: &[Candidate],
-    around: &KdTree,
-    scratch: &mut Vec<DVec3>,
-) -> Option<Found> {
-    let &Place { center, support, noise, .. } = place;
-    let ball = around_place(center, HEARD * support, MOST_CELL_POINTS, tree, scratch);
-    let count = ball.len().max(1) as f64;
-    let residuals = |q: &Quadric| ball.levels(q, noise);
-    // Candidates, those of the site first, then by distance.
-    let mut near: Vec<(f64, u32)> = Vec::with_capacity(4 * MOST_CANDIDATES);
-    around.within(center, CANDIDATE_SUPPORTS * support, |i, _, d2| {
-        near.push((if candidates[i as usize].owner == site { 0.0 } else { d2 }, i));
-    });
-    near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    if let Some(first) = near.first()
-        && near.get(1).is_none_or(|n| n.0 > 0.0)
-    {
-        let c = &candidates[first.1 as usize];
-        let total = cost(&residuals(&c.quadric));
-        if c.owner == site && total < ONE_SHEET_COST * count + count.sqrt() {
-            let sheets = vec![(c.quadric, c.at, c.error)];
-            return Some(Found { sheets, concave: 0, total, cost: total / count });
+/// What cells are found from.
+#[derive(Clone, Copy)]
+struct Known<'a> {
+    /// Tree of the points.
+    tree: &'a KdTree,
+    /// Sheets that a cell may take.
+    candidates: &'a [Candidate],
+    /// Tree of these.
+    around: &'a KdTree,
+}
+
+impl Known<'_> {
+    /// The sheets of a cell at `place`.
+    /// * `again` - true if the candidates are what the cells have found before
+    fn find(&self, place: &Place, site: u32, again: bool, scratch: &mut Vec<DVec3>) -> Option<Found> {
+        let Known { tree, candidates, around } = *self;
+        let &Place { center, support, noise, .. } = place;
+        let ball = around_place(center, HEARD * support, MOST_CELL_POINTS, tree, scratch);
+        let count = ball.len().max(1) as f64;
+        let residuals = |q: &Quadric| ball.levels(q, noise);
+        // Candidates, those of the site first, then by distance.
+        let mut near: Vec<(f64, u32)> = Vec::with_capacity(4 * MOST_CANDIDATES);
+        around.within(center, CANDIDATE_SUPPORTS * support, |i, _, d2| {
+            near.push((if candidates[i as usize].owner == site { 0.0 } else { d2 }, i));
+        });
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        if let Some(first) = near.first()
+            && near.get(1).is_none_or(|n| n.0 > 0.0)
+        {
+            let c = &candidates[first.1 as usize];
+            let total = cost(&residuals(&c.quadric));
+            if c.owner == site && total < ONE_SHEET_COST * count + count.sqrt() {
+                let sheets = vec![(c.quadric, c.at, c.error)];
+                return Some(Found { sheets, concave: 0, total, cost: total / count });
+            }
         }
+        let (asked, seen) = different(candidates, &near, place);
+        if asked.is_empty() {
+            return None;
+        }
+        let all: Vec<Seen> = asked
+            .iter()
+            .zip(&seen)
+            .map(|(c, s)| {
+                let price = SHEET_PRICE + VARIATION_PRICE * c.quadric.variation(c.at, HEARD * support);
+                Seen { residuals: residuals(&c.quadric), normal: s.1, price }
+            })
+            .collect();
+        let found = nest(&all, false, MOST_SHEETS)?;
+        let mut nested = Nested {
+            sheets: found.order.iter().map(|&k| asked[k].sheet()).collect(),
+            prices: found.order.iter().map(|&k| all[k].price).collect(),
+            concave: found.concave,
+            cost: found.cost,
+        };
+        // What the site has found before is refined already.
+        let known = again && found.order.iter().all(|&k| asked[k].owner == site);
+        if nested.sheets.len() > 1 && !known {
+            let wide = around_place(center, WIDEST_BALL * HEARD * support, MOST_BALL_POINTS, tree, scratch);
+            nested.refine(place, HEARD * support, &ball, wide);
+        }
+        let Nested { mut sheets, prices, mut concave, cost: mut spent } = nested;
+        // A plate ends where its points do: no sheet says so, if it is as thin as the noise.
+        let found = sheets.len();
+        while found > 1 && sheets.len() < MOST_SHEETS {
+            let bare: Vec<Quadric> = sheets.iter().map(|s| s.0).collect();
+            let Some(end) = rim(&bare, concave, center, HEARD * support, &ball, noise) else { break };
+            concave |= u8::from(end.groove) << sheets.len();
+            let normal = if end.groove { -end.normal } else { end.normal };
+            sheets.push((Quadric::plane(end.at, support, normal), end.at, sheets[0].2));
+        }
+        let mut total = spent + prices.iter().sum::<f64>();
+        if spent > UNEXPLAINED * count
+            && let Some(found) = stepped(&asked, &all, place, &ball, total)
+        {
+            (sheets, concave, spent, total) = found;
+        }
+        Some(Found { sheets, concave, total, cost: spent / count })
     }
-    let (asked, seen) = different(candidates, &near, place);
-    if asked.is_empty() {
-        return None;
-    }
-    let all: Vec<Seen> = asked
-        .iter()
-        .zip(&seen)
-        .map(|(c, s)| {
-            let price = SHEET_PRICE + VARIATION_PRICE * c.quadric.variation(c.at, HEARD * support);
-            Seen { residuals: residuals(&c.quadric), normal: s.1, price }
-        })
-        .collect();
-    let found = nest(&all, false, MOST_SHEETS)?;
-    let mut nested = Nested {
-        sheets: found.order.iter().map(|&k| asked[k].sheet()).collect(),
-        prices: found.order.iter().map(|&k| all[k].price).collect(),
-        concave: found.concave,
-        cost: found.cost,
-    };
-    // What the site has found before is refined already.
-    let known = again && found.order.iter().all(|&k| asked[k].owner == site);
-    if nested.sheets.len() > 1 && !known {
-        let wide = around_place(center, WIDEST_BALL * HEARD * support, MOST_BALL_POINTS, tree, scratch);
-        nested.refine(place, HEARD * support, &ball, wide);
-    }
-    let Nested { mut sheets, prices, mut concave, cost: mut spent } = nested;
-    // A plate ends where its points do: no sheet says so, if it is as thin as the noise.
-    let found = sheets.len();
-    while found > 1 && sheets.len() < MOST_SHEETS {
-        let bare: Vec<Quadric> = sheets.iter().map(|s| s.0).collect();
-        let Some(end) = rim(&bare, concave, center, HEARD * support, &ball, noise) else { break };
-        concave |= u8::from(end.groove) << sheets.len();
-        let normal = if end.groove { -end.normal } else { end.normal };
-        sheets.push((Quadric::plane(end.at, support, normal), end.at, sheets[0].2));
-    }
-    let mut total = spent + prices.iter().sum::<f64>();
-    if spent > UNEXPLAINED * count
-        && let Some(found) = stepped(&asked, &all, place, &ball, total)
-    {
-        (sheets, concave, spent, total) = found;
-    }
-    Some(Found { sheets, concave, total, cost: spent / count })
 }
 
 /// The candidates that a cell tries, the nearest of every other sheet first, then what differs from these; and of each the signed

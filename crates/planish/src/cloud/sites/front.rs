@@ -103,21 +103,24 @@ pub(crate) fn grow(
         let span = [done, done + fresh.len()].map(|x| x as f64 / open.len().max(1) as f64);
         done += fresh.len();
         let closed_tree = KdTree::new(&closed.iter().map(|f| f.center).collect::<Vec<_>>());
-        let snapshot = Closed { fits: &closed, tree: &closed_tree };
+        let known = Known { points: tree, fits: &closed, closed: &closed_tree };
         let fitted = in_pieces(fresh.len(), (span[0], span[1]), observer, |s, k| {
             let site = fresh[k] as usize;
-            fit_site(tree, sites, site, irregularity[site], now, snapshot, &mut s.around)
+            fit_site(known, sites, site, irregularity[site], now, &mut s.around)
         })?;
         closed.extend(fitted.into_iter().flatten());
     }
     Ok(closed)
 }
 
-/// What is fitted already.
+/// What sites are fitted from: the points, and what is fitted already.
 #[derive(Clone, Copy)]
-struct Closed<'a> {
+struct Known<'a> {
+    /// Tree of the points.
+    points: &'a KdTree,
     fits: &'a [Fit],
-    tree: &'a KdTree,
+    /// Tree of the fits.
+    closed: &'a KdTree,
 }
 
 /// The other sheet of the site of a fit, if it has one: both stand side by side.
@@ -211,15 +214,7 @@ fn carries_on(f: &Fit, g: &Fit) -> bool {
     m.dot(g.normal).abs() > CREASE_COSINE && k.dot(f.normal).abs() > CREASE_COSINE && d.abs() < slack && e.abs() < slack
 }
 
-fn fit_site(
-    tree: &KdTree,
-    sites: &Sites,
-    site: usize,
-    irregularity: f64,
-    class: u8,
-    closed: Closed,
-    near: &mut Vec<DVec3>,
-) -> Vec<Fit> {
+fn fit_site(known: Known, sites: &Sites, site: usize, irregularity: f64, class: u8, near: &mut Vec<DVec3>) -> Vec<Fit> {
     let survey = &sites.survey[site];
     let p = survey.quadric.center;
     let noise = divisor(sites.noise(site));
@@ -228,7 +223,7 @@ fn fit_site(
     } else if class == 0 {
         vec![Start { sheet: survey.quadric, at: p, radius: survey.radius }]
     } else {
-        choose(tree, survey.radius, sites.gap[site] / SITE_DISTANCE, survey.quadric, noise, closed, near)
+        choose(known, survey.radius, sites.gap[site] / SITE_DISTANCE, survey.quadric, noise, near)
     };
     let sheets = starts.len() as u8;
     let all: Vec<Quadric> = starts.iter().map(|s| s.sheet).collect();
@@ -237,7 +232,7 @@ fn fit_site(
         .enumerate()
         .filter_map(|(k, start)| {
             let others: Vec<Quadric> = (0..all.len()).filter(|&i| i != k).map(|i| all[i]).collect();
-            let (s, radius, error) = widen(tree, closed, &start, &others, noise, near)?;
+            let (s, radius, error) = widen(known, &start, &others, noise, near)?;
             let (center, normal) = s.quadric.project(start.at);
             Some(Fit {
                 quadric: s.quadric.normalized_at(center),
@@ -277,21 +272,13 @@ pub(crate) const SIDE_BY_SIDE: f64 = 0.866;
 const MIXED: f64 = 0.4;
 
 /// The sheets that explain the points around a site, each with the middle of the points that are nearest to it there.
-fn choose(
-    tree: &KdTree,
-    radius: f64,
-    usual: f64,
-    own: Quadric,
-    noise: f64,
-    closed: Closed,
-    around: &mut Vec<DVec3>,
-) -> Vec<Start> {
+fn choose(known: Known, radius: f64, usual: f64, own: Quadric, noise: f64, around: &mut Vec<DVec3>) -> Vec<Start> {
     let p = own.center;
     let alone = vec![Start { sheet: own, at: p, radius }];
     // A crease has a narrow ball because one sheet is no model there; with the right sheets a usual ball will do.
     let wide = usual.clamp(radius, CREASE_REACH * radius);
     around.clear();
-    tree.within(p, wide, |_, q, _| around.push(q));
+    known.points.within(p, wide, |_, q, _| around.push(q));
     let mut ball = Points::default();
     ball.refill(around);
     let residuals = |q: &Quadric| ball.levels(q, noise);
@@ -302,22 +289,22 @@ fn choose(
         return alone;
     }
     let mut near = Vec::with_capacity(4 * MOST_CARRIED);
-    closed.tree.within(p, CARRIED_REACH * wide, |i, _, d2| near.push((d2, i)));
+    known.closed.within(p, CARRIED_REACH * wide, |i, _, d2| near.push((d2, i)));
     near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut asked: Vec<(Quadric, f64)> = Vec::new();
     for &(_, i) in &near {
-        let f = &closed.fits[i as usize];
+        let f = &known.fits[i as usize];
         if f.error > GUIDE_ERROR_NOISE * noise {
             continue;
         }
         let (d, n) = f.quadric.distance(p);
         // Two that say the same here are one: same offset within the noise, same direction within 8 degrees.
-        let known = asked.iter().any(|a| {
+        let is_asked = asked.iter().any(|a| {
             let (e, m) = a.0.distance(p);
             let turn = n.dot(m);
             turn.abs() > 0.99 && (d - e * turn.signum()).abs() < 0.7 * noise
         });
-        if !known && d.abs() < wide {
+        if !is_asked && d.abs() < wide {
             asked.push((f.quadric, f.radius));
             if asked.len() == MOST_CARRIED {
                 break;
@@ -370,8 +357,7 @@ struct Start {
 
 /// Fits a sheet from a first guess and widens its ball while its own points show no bias: sheet, radius, expected error.
 fn widen(
-    tree: &KdTree,
-    closed: Closed,
+    known: Known,
     start: &Start,
     others: &[Quadric],
     noise: f64,
@@ -388,7 +374,7 @@ fn widen(
         if step != 1 {
             near.clear();
             let reach = if step == 0 { start.radius * GROWTH_RATIO } else { r };
-            tree.within(p, reach, |_, q, _| near.push(q));
+            known.points.within(p, reach, |_, q, _| near.push(q));
         }
         if step == 0 {
             ball.clear();
@@ -420,7 +406,7 @@ fn widen(
         if step > 0 && ball.len() > PLENTY_OF_POINTS && r > WIDEST_NOISE * noise {
             break;
         }
-        let guides = guides(closed.fits, closed.tree, p, r, noise);
+        let guides = guides(known.fits, known.closed, p, r, noise);
         let part = Ball { center: p, scale: r, points: &ball, weights: &weights, guides: &guides, noise: noise / r };
         let Some(found) = sheet(&part, &guess, if step == 0 { 2 } else { 1 }) else {
             if best.is_none() && step < GROWTH_STEPS {
@@ -525,9 +511,10 @@ mod tests {
         };
         let points: Vec<DVec3> = (0..2000).map(place).collect();
         let closed = KdTree::new(&fits.map(|f| f.center));
-        let closed = Closed { fits: &fits, tree: &closed };
+        let points = KdTree::new(&points);
+        let known = Known { points: &points, fits: &fits, closed: &closed };
         let own = Quadric::plane(DVec3::ZERO, 1.0, DVec3::Z);
-        let found = choose(&KdTree::new(&points), 10.0 * noise, 10.0 * noise, own, noise, closed, &mut Vec::new());
+        let found = choose(known, 10.0 * noise, 10.0 * noise, own, noise, &mut Vec::new());
         let is_fitted = |s: &&Start| (s.sheet.distance(DVec3::ZERO).0.abs() - sides[0]).abs() < 1e-12;
         found.iter().filter(is_fitted).count()
     }

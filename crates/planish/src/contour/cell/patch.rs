@@ -97,15 +97,14 @@ impl Patcher<'_> {
     fn patches(&self, cell: &Cell, scratch: &mut Scratch, sheet: &mut Sheet) {
         self.loops(cell, scratch);
         let count = scratch.ends.len();
-        let low = self.field.lattice.node(cell.at[0], cell.at[1], cell.at[2]);
-        let high = self.field.lattice.node(cell.at[0] + 1, cell.at[1] + 1, cell.at[2] + 1);
         if count == 1 {
             let mut corners = std::mem::take(&mut scratch.corners);
-            self.one(cell, &mut corners, scratch, sheet, [low, high], true);
+            self.one(cell, &mut corners, scratch, sheet, true);
             scratch.corners = corners;
             sheet.triangles.append(&mut scratch.local);
             return;
         }
+        let [low, high] = self.bounds(cell);
         let tunnel = self.tunnel(cell, scratch, [low, high]);
         let inner = sheet.inner.len();
         let (edges, wishes) = (sheet.edges.len(), sheet.wishes.len());
@@ -117,7 +116,7 @@ impl Patcher<'_> {
                 for l in 0..count {
                     let mut own = all[first..scratch.ends[l]].to_vec();
                     first = scratch.ends[l];
-                    self.one(cell, &mut own, scratch, sheet, [low, high], features);
+                    self.one(cell, &mut own, scratch, sheet, features);
                     scratch.parts.push(scratch.local.len());
                 }
                 if self.disjoint(&all, scratch, sheet) {
@@ -150,6 +149,12 @@ impl Patcher<'_> {
         caps::caps(&positions, cell.config, &loops, tunnel, &mut vertex, &mut |t| triangles.push(t));
         sheet.pushed += 1;
         scratch.corners = all;
+    }
+
+    /// The lowest and the highest corner of a cell.
+    fn bounds(&self, cell: &Cell) -> [DVec3; 2] {
+        let [i, j, k] = cell.at;
+        [self.field.lattice.node(i, j, k), self.field.lattice.node(i + 1, j + 1, k + 1)]
     }
 
     /// Fills the loops of a cell, without face points.
@@ -229,15 +234,8 @@ impl Patcher<'_> {
     }
 
     /// The patch of one loop, into `scratch.local`.
-    fn one(
-        &self,
-        cell: &Cell,
-        l: &mut Vec<Corner>,
-        scratch: &mut Scratch,
-        sheet: &mut Sheet,
-        [low, high]: [DVec3; 2],
-        features: bool,
-    ) {
+    fn one(&self, cell: &Cell, l: &mut Vec<Corner>, scratch: &mut Scratch, sheet: &mut Sheet, features: bool) {
+        let [low, high] = self.bounds(cell);
         scratch.normals.clear();
         let is_hit = |c: &&Corner| c.edge != FACE_POINT;
         scratch.normals.extend(l.iter().filter(is_hit).map(|c| c.n));
@@ -281,7 +279,7 @@ impl Patcher<'_> {
             }
         }
         if let Some(refine) = self.refine {
-            p = refine.inner_point(p, &points, shape == Shape::Corner, low, high, &scratch.planes).unwrap_or(p);
+            p = refine.inner_point(p, &points, shape == Shape::Corner, [low, high], &scratch.planes).unwrap_or(p);
         }
         let kind = if shape == Shape::Corner { FeatureKind::Corner } else { FeatureKind::Edge };
         let (clamped, moved) = inside(p, low, high);

@@ -90,8 +90,7 @@ impl Creases for FieldCreases<'_> {
         guess: DVec3,
         through: &[DVec3],
         corner: bool,
-        low: DVec3,
-        high: DVec3,
+        [low, high]: [DVec3; 2],
         hits: &[(DVec3, DVec3)],
     ) -> Option<DVec3> {
         let size = (high - low).max_element();
