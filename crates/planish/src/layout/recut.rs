@@ -162,7 +162,7 @@ impl Embedding {
     pub fn draw(&self, mesh: &TriMesh, adjacency: &Adjacency, complex: &Complex, change: &Change) -> Option<Drawn> {
         let union = self.map(complex, change)?;
         let Union { disk, corners, uv, .. } = &union;
-        let line = |a: u32, b: u32| self.line(mesh, adjacency, disk, uv, a, b);
+        let line = |a: u32, b: u32| self.line((mesh, adjacency), (disk, uv), [a, b]);
         let corner = |i: usize| disk.boundary[corners[i]];
         let lines = change.lines.iter().map(|&(i, j)| line(corner(i), corner(j))).collect::<Option<Vec<_>>>()?;
         let (mut spokes, mut center) = (Vec::new(), NONE);
@@ -205,14 +205,11 @@ impl Embedding {
     /// The straight line of the map `uv` between two vertices of the disk, as places of the working mesh.
     pub fn line(
         &self,
-        mesh: &TriMesh,
-        adjacency: &Adjacency,
-        disk: &Disk,
-        uv: &[DVec2],
-        a: u32,
-        b: u32,
+        (mesh, adjacency): (&TriMesh, &Adjacency),
+        (disk, uv): (&Disk, &[DVec2]),
+        ends: [u32; 2],
     ) -> Option<Vec<Place>> {
-        self.polyline((mesh, adjacency), (disk, uv), [a, b], &[])
+        self.polyline((mesh, adjacency), (disk, uv), ends, &[])
     }
 
     /// The same through points of the map.

@@ -116,7 +116,8 @@ impl Slide {
             let uv = disk.circle_map(&embedding.cut.mesh.points, &embedding.angles(&disk, &turned))?;
             let place = |corner: usize| disk.boundary[corners[corner]];
             for (&half, &(from, to)) in flank.halves.iter().zip(&flank.change.lines) {
-                let line = embedding.line(bench.mesh, bench.adjacency, &disk, &uv, place(from), place(to))?;
+                let ground = (bench.mesh, bench.adjacency);
+                let line = embedding.line(ground, (&disk, &uv), [from, to].map(place))?;
                 chains.push((half, line));
             }
         }

@@ -13,7 +13,7 @@ use super::handles::TINY_LOOP;
 use super::repairs::Repairs;
 use crate::mesh::diagnose::sorted_triple;
 use crate::mesh::sets::Sets;
-use crate::mesh::soup::{check, fans, keyed_edges, mates, orient, origin, repeats};
+use crate::mesh::soup::{Orientation, check, fans, keyed_edges, mates, orient, origin, repeats};
 use crate::mesh::{Attribute, FeatureTags, MeshError, NONE, TriMesh, next};
 use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
@@ -256,7 +256,7 @@ fn orient_all(
         .collect();
     done.turned_faces += turn.iter().filter(|&&t| t).count();
     if judge_pieces {
-        let inverted = inside_out(mesh, triangles, source, mate, &orientation.piece, orientation.pieces, &turn);
+        let inverted = inside_out(mesh, triangles, source, mate, &orientation, &turn);
         done.turned_components += inverted.iter().filter(|&&i| i).count();
         for (t, turn) in turn.iter_mut().enumerate() {
             *turn ^= inverted[orientation.piece[t] as usize];
@@ -285,10 +285,10 @@ fn inside_out(
     triangles: &[[u32; 3]],
     source: &[u32],
     mate: &[u32],
-    piece: &[u32],
-    pieces: usize,
+    orientation: &Orientation,
     turn: &[bool],
 ) -> Vec<bool> {
+    let &Orientation { ref piece, pieces, .. } = orientation;
     let at = |v: u32| mesh.points[source[v as usize] as usize];
     let mut closed = vec![true; pieces];
     let mut reference = vec![DVec3::NAN; pieces];

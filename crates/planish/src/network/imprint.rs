@@ -261,7 +261,7 @@ pub fn imprint(mesh: &TriMesh, network: &Network, observer: &dyn Observer) -> Re
     let chains: Vec<Chain> = curves.into_iter().enumerate().map(|(curve, places)| Chain { curve, places }).collect();
     let whole: Vec<usize> = (0..chains.len()).collect();
     let all: Vec<usize> = (0..network.patches.len()).collect();
-    let (made, lost) = cut_out(mesh, &adjacency, network, &chains, &whole, &all, observer)?;
+    let (made, lost) = cut_out((mesh, &adjacency), network, &chains, &whole, &all, observer)?;
     match lost {
         Some((faces, p)) => Err(ImprintError::Uncovered { faces, x: p.x, y: p.y, z: p.z }),
         None => Ok(made),
@@ -284,8 +284,7 @@ type CutOut = (Vec<PatchMesh>, Option<(usize, DVec3)>);
 /// # Errors
 /// As [`imprint`], but for parts that belong to no patch.
 pub(crate) fn cut_out(
-    mesh: &TriMesh,
-    adjacency: &Adjacency,
+    (mesh, adjacency): (&TriMesh, &Adjacency),
     network: &Network,
     chains: &[Chain],
     whole: &[usize],
@@ -408,9 +407,8 @@ fn patch_mesh(mesh: &TriMesh, adjacency: &Adjacency, cut: &Cut, disk: &disk::Dis
 pub(crate) fn cut(mesh: &TriMesh, adjacency: &Adjacency, curves: &[&[Place]]) -> Result<Cut, ImprintError> {
     let mut points = mesh.points.clone();
     let mut origin: Vec<Place> = (0..points.len() as u32).map(Place::Vertex).collect();
-    let mut on_edge: HashMap<u32, Vec<(f64, u32)>> = HashMap::new();
-    let mut in_face: HashMap<u32, Vec<(FacePoint, u32)>> = HashMap::new();
-    let mut segments: HashMap<u32, Vec<Segment>> = HashMap::new();
+    let mut marks = Marks::default();
+    let Marks { on_edge, in_face, segments } = &mut marks;
     let mut chains = Vec::with_capacity(curves.len());
     for (c, curve) in curves.iter().enumerate() {
         let mut chain: Vec<u32> = Vec::with_capacity(curve.len());
@@ -476,10 +474,8 @@ pub(crate) fn cut(mesh: &TriMesh, adjacency: &Adjacency, curves: &[&[Place]]) ->
         touched[f as usize] = true;
     }
     let split: Vec<u32> = (0..touched.len() as u32).filter(|&f| touched[f as usize]).collect();
-    let pieces: Vec<Vec<[u32; 3]>> = split
-        .par_iter()
-        .map(|&f| split_face(f, mesh, adjacency, &on_edge, &in_face, &segments, &points))
-        .collect::<Result<_, _>>()?;
+    let pieces: Vec<Vec<[u32; 3]>> =
+        split.par_iter().map(|&f| split_face(f, mesh, adjacency, &marks, &points)).collect::<Result<_, _>>()?;
     let mut triangles = Vec::with_capacity(mesh.triangles.len() + 3 * split.len());
     let mut parent = Vec::with_capacity(triangles.capacity());
     for f in (0..mesh.triangles.len()).filter(|&f| !touched[f]) {
@@ -498,6 +494,15 @@ pub(crate) fn cut(mesh: &TriMesh, adjacency: &Adjacency, curves: &[&[Place]]) ->
 struct Segment {
     ends: [u32; 2],
     curve: usize,
+}
+
+/// What curves leave on a mesh: new vertices on edges, by the lower half-edge and in order along it, those in faces, and
+/// pieces of curves across faces.
+#[derive(Default)]
+struct Marks {
+    on_edge: HashMap<u32, Vec<(f64, u32)>>,
+    in_face: HashMap<u32, Vec<(FacePoint, u32)>>,
+    segments: HashMap<u32, Vec<Segment>>,
 }
 
 /// The place `t` of the way along side `k` of a face in its flat picture, where the sides bulge.
@@ -551,9 +556,7 @@ fn split_face(
     f: u32,
     mesh: &TriMesh,
     adjacency: &Adjacency,
-    on_edge: &HashMap<u32, Vec<(f64, u32)>>,
-    in_face: &HashMap<u32, Vec<(FacePoint, u32)>>,
-    segments: &HashMap<u32, Vec<Segment>>,
+    marks: &Marks,
     points: &[DVec3],
 ) -> Result<Vec<[u32; 3]>, ImprintError> {
     // Vertices with their places in the flat picture; those of the boundary, in order; and the sides that each lies on.
@@ -565,7 +568,7 @@ fn split_face(
         sides.push(1u8 << k | 1 << ((k + 2) % 3));
         let h = 3 * f + k as u32;
         let o = adjacency.opposite[h as usize];
-        let mine = on_edge.get(&if o < h { o } else { h }).map_or(&[][..], |l| &l[..]);
+        let mine = marks.on_edge.get(&if o < h { o } else { h }).map_or(&[][..], |l| &l[..]);
         let first = ring.len();
         for &(t, v) in mine {
             ring.push(names.len());
@@ -577,11 +580,11 @@ fn split_face(
             ring[first..].reverse();
         }
     }
-    for (p, v) in in_face.get(&f).map_or(&[][..], |l| &l[..]) {
+    for (p, v) in marks.in_face.get(&f).map_or(&[][..], |l| &l[..]) {
         names.push(*v);
         flat.push(Point2::new(p.bary[1], p.bary[2]));
     }
-    let pieces = segments.get(&f).map_or(&[][..], |l| &l[..]);
+    let pieces = marks.segments.get(&f).map_or(&[][..], |l| &l[..]);
     let crossing = |v: u32| {
         let p = points[v as usize];
         let mut curves: Vec<usize> = pieces.iter().map(|s| s.curve).collect();

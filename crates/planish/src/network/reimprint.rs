@@ -89,7 +89,7 @@ pub fn reimprint_over(
             whole[curve] = first;
         }
     }
-    let (mut made, _) = cut_out(&part, &part_adjacency, network, &chains, &whole, which, observer)?;
+    let (mut made, _) = cut_out((&part, &part_adjacency), network, &chains, &whole, which, observer)?;
     for patch in &mut made {
         patch.face_origin.iter_mut().for_each(|f| *f = faces[*f as usize]);
         patch.origin.iter_mut().for_each(|p| p.face = faces[p.face as usize]);

@@ -113,18 +113,18 @@ impl Lines<'_> {
         let found = vertices.into_par_iter().map_init(seen, |seen, v| {
             observer.check()?;
             let Some(along) = self.direction(v, NEAR_CELLS * scale.cell) else { return Ok(None) };
-            let one = |sector| self.flank(v, sector, along, scale, &is_beside, seen);
+            let one = |sector| self.flank((v, along), sector, scale, &is_beside, seen);
             let flanks: Option<Vec<Flank>> = self.sectors(v).into_iter().map(one).collect();
             Ok(flanks.filter(|f| f.len() > 1).map(|flanks| (v, flanks)))
         });
         Ok(found.collect::<Result<Vec<_>, Cancelled>>()?.into_iter().flatten().collect())
     }
 
+    /// The flank beside a vertex, `v`, of a line that runs `along` there.
     fn flank(
         &self,
-        v: u32,
+        (v, along): (u32, DVec3),
         sector: Vec<u32>,
-        along: DVec3,
         scale: &ScanScale,
         is_beside: &[bool],
         seen: &mut Seen,

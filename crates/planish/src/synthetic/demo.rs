@@ -172,26 +172,26 @@ impl Body {
 
         // Outside, bottom to top.
         let first = add_ring(&mut mesh, count(0.0), false, |a| self.smooth(0.0, a));
-        let ring = grow(&mut mesh, first.clone(), None, step, self.meridian, girth, |s, a| self.outer(s, a));
+        let ring = grow(&mut mesh, (first.clone(), None), step, self.meridian, girth, |s, a| self.outer(s, a));
         // Top flat, counterbore, its floor, the bore.
         let between = |from: f64, to: f64| move |s: f64| TAU * (from + (to - from) * s);
         let wide = mean_radius(1.0);
-        let ring = grow(&mut mesh, ring, None, step, wide - COUNTERBORE, between(wide, COUNTERBORE), |s, a| {
+        let ring = grow(&mut mesh, (ring, None), step, wide - COUNTERBORE, between(wide, COUNTERBORE), |s, a| {
             self.smooth(1.0, a).lerp(circle(COUNTERBORE, a, TOP), s)
         });
         let floor = TOP - COUNTERBORE_DEPTH;
-        let ring = grow(&mut mesh, ring, None, step, COUNTERBORE_DEPTH, between(COUNTERBORE, COUNTERBORE), |s, a| {
+        let ring = grow(&mut mesh, (ring, None), step, COUNTERBORE_DEPTH, between(COUNTERBORE, COUNTERBORE), |s, a| {
             circle(COUNTERBORE, a, TOP + (floor - TOP) * s)
         });
-        let ring = grow(&mut mesh, ring, None, step, COUNTERBORE - BORE, between(COUNTERBORE, BORE), |s, a| {
+        let ring = grow(&mut mesh, (ring, None), step, COUNTERBORE - BORE, between(COUNTERBORE, BORE), |s, a| {
             circle(COUNTERBORE + (BORE - COUNTERBORE) * s, a, floor)
         });
-        let ring = grow(&mut mesh, ring, None, step, floor - BOTTOM, between(BORE, BORE), |s, a| {
+        let ring = grow(&mut mesh, (ring, None), step, floor - BOTTOM, between(BORE, BORE), |s, a| {
             circle(BORE, a, floor + (BOTTOM - floor) * s)
         });
         // Bottom flat, back to the first ring.
         let wide = mean_radius(0.0);
-        grow(&mut mesh, ring, Some(first), step, wide - BORE, between(BORE, wide), |s, a| {
+        grow(&mut mesh, (ring, Some(first)), step, wide - BORE, between(BORE, wide), |s, a| {
             circle(BORE, a, BOTTOM).lerp(self.smooth(0.0, a), s)
         });
         for pocket in &self.pockets {
@@ -280,13 +280,19 @@ fn mill(mesh: &TriMesh, pocket: &Pocket, step: f64) -> Option<TriMesh> {
     let deep = rim.iter().map(|p| p.1).sum::<f64>() / rim.len() as f64 - floor;
     let ring = Ring { vertices: rim.iter().map(|p| p.2).collect(), angles: rim.iter().map(|p| p.0).collect() };
     let (wide, middle) = (pocket.radius, pocket.axis * floor);
-    let ring =
-        grow(&mut cut, ring, None, step, deep, |_| TAU * wide, |s, a| on(wide, a, height(a) + (floor - height(a)) * s));
+    let ring = grow(
+        &mut cut,
+        (ring, None),
+        step,
+        deep,
+        |_| TAU * wide,
+        |s, a| on(wide, a, height(a) + (floor - height(a)) * s),
+    );
     if pocket.holed {
         let radius = |s: f64| wide + (HOLE - wide) * s;
-        let ring = grow(&mut cut, ring, None, step, wide - HOLE, |s| TAU * radius(s), |s, a| on(radius(s), a, floor));
+        let ring = grow(&mut cut, (ring, None), step, wide - HOLE, |s| TAU * radius(s), |s, a| on(radius(s), a, floor));
         let ring =
-            grow(&mut cut, ring, None, step, HOLE_DEPTH, |_| TAU * HOLE, |s, a| on(HOLE, a, floor - s * HOLE_DEPTH));
+            grow(&mut cut, (ring, None), step, HOLE_DEPTH, |_| TAU * HOLE, |s, a| on(HOLE, a, floor - s * HOLE_DEPTH));
         let bottom = floor - HOLE_DEPTH;
         grow_disk(&mut cut, ring, step, HOLE, pocket.axis * bottom, |a| on(HOLE, a, bottom));
     } else {

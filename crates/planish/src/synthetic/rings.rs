@@ -90,12 +90,11 @@ pub(super) fn girth_count(girth: f64, step: f64) -> usize {
 }
 
 /// Grows a strip of rings over a surface of revolution-like `at(s, angle)`, `s` from 0 to 1, starting from
-/// `first` (which lies at `s = 0`); `length` and `girth(s)` set the number of rings and of their points.
+/// `first` (which lies at `s = 0`) to `last`; `length` and `girth(s)` set the number of rings and of their points.
 /// The last ring is `last` if given, else a new one at `s = 1`; it is returned.
 pub(super) fn grow(
     mesh: &mut TriMesh,
-    first: Ring,
-    last: Option<Ring>,
+    (first, last): (Ring, Option<Ring>),
     step: f64,
     length: f64,
     girth: impl Fn(f64) -> f64,

@@ -66,7 +66,7 @@ pub fn cylinder(radius: f64, height: f64, around: usize) -> TriMesh {
     let step = TAU * radius / around as f64;
     let on = |r: f64, a: f64, z: f64| DVec3::new(r * a.cos(), r * a.sin(), z);
     let bottom = add_ring(&mut mesh, around, false, |a| on(radius, a, 0.0));
-    let top = grow(&mut mesh, bottom.clone(), None, step, height, |_| TAU * radius, |s, a| on(radius, a, s * height));
+    let top = grow(&mut mesh, (bottom.clone(), None), step, height, |_| TAU * radius, |s, a| on(radius, a, s * height));
     grow_disk(&mut mesh, top, step, radius, DVec3::new(0.0, 0.0, height), |a| on(radius, a, height));
     let wall = mesh.triangles.len();
     grow_disk(&mut mesh, bottom, step, radius, DVec3::ZERO, |a| on(radius, a, 0.0));
@@ -168,7 +168,7 @@ pub fn annulus(inner: f64, outer: f64, around: usize) -> TriMesh {
     let at = |r: f64, a: f64| DVec3::new(r * a.cos(), r * a.sin(), 0.0);
     let radius = |s: f64| outer + (inner - outer) * s;
     let rim = add_ring(&mut mesh, around, false, |a| at(outer, a));
-    grow(&mut mesh, rim, None, step, outer - inner, |s| TAU * radius(s), |s, a| at(radius(s), a));
+    grow(&mut mesh, (rim, None), step, outer - inner, |s| TAU * radius(s), |s, a| at(radius(s), a));
     mesh
 }
 
