@@ -305,7 +305,7 @@ fn one_patch(wanted: &dyn Fn(&str) -> bool) {
     let sizes = grid::choose_sizes(&before, &old, &grid_params);
     let old_grids = grid::relax(&mesh, &old, &sizes, &grid_params, &Silent).expect("grids");
     let start = Instant::now();
-    editor.drag_curve(curve, 0.5, DVec3::X * 0.03, &section(0.6), &params, &Silent).expect("a drag");
+    editor.drag_curve(curve, (0.5, DVec3::X * 0.03), &section(0.6), &params, &Silent).expect("a drag");
     let drag = milliseconds(start);
     let which = changed_patches(&before, &editor.network).expect("the same network");
     let near: Vec<&PatchMesh> = which.iter().map(|&p| &old[p]).collect();
@@ -387,7 +387,7 @@ fn follows(name: &str, mesh: &TriMesh, wanted: &dyn Fn(&str) -> bool) {
         let length: f64 = at.windows(2).map(|w| w[0].distance(w[1])).sum();
         let aside = (at[at.len() - 1] - at[0]).any_orthonormal_vector() * (0.05 * length);
         let forces = SnakeParams { fairness: 0.1, curvature: 1.0, ..SnakeParams::default() };
-        if editor.drag_curve(c as u32, 0.5, aside, &section(0.7), &forces, &Silent).is_err()
+        if editor.drag_curve(c as u32, (0.5, aside), &section(0.7), &forces, &Silent).is_err()
             || !editor.glance().is_finished()
         {
             continue;

@@ -383,7 +383,7 @@ fn resampled(
             }
         }
         let drawn_grids = (&mut grids[..], start);
-        if !grid::densify(relaxer, network, drawn, drawn_grids, &need, &params.grid, &part)? {
+        if !grid::densify(relaxer, (network, drawn), drawn_grids, &need, &params.grid, &part)? {
             break;
         }
         before = need;

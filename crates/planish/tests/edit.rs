@@ -200,7 +200,7 @@ fn dragging_a_corner_or_a_curve_of_a_layout_leaves_a_finished_network_and_the_re
     let before = editor.network.clone();
     let middle = before.curves[5].points[before.curves[5].points.len() / 2].position(&mesh);
     let holds = Holds { section: Some((0.5, 0.5)), ..Holds::default() };
-    editor.drag_curve(5, 0.5, middle.any_orthonormal_vector() * 0.05, &holds, &params, &Silent).unwrap();
+    editor.drag_curve(5, (0.5, middle.any_orthonormal_vector() * 0.05), &holds, &params, &Silent).unwrap();
     let (old, new) = (&before.curves[5].points, &editor.network.curves[5].points);
     assert!(old != new && old[0] == new[0] && old[old.len() - 1] == new[new.len() - 1]);
     // Outside the half in the middle nothing changed.
@@ -380,8 +380,7 @@ fn grids_follow_1_to_4_feature_curves_of_both_families_exactly_without_a_fold() 
         let (mesh, network, features) = bumpy(u, v);
         let patches = imprint(&mesh, &network, &Silent).unwrap();
         let made = relax_with_features(
-            &mesh,
-            &patches[0],
+            (&mesh, &patches[0]),
             &features,
             (81, 61),
             &Sections::default(),
@@ -429,7 +428,7 @@ fn a_section_is_refined_alone_and_curves_of_one_family_that_cross_are_refused_wi
     let (mesh, network, mut features) = bumpy(1, 2);
     let patches = imprint(&mesh, &network, &Silent).unwrap();
     let run = |features: &[FeatureCurve], sections: &Sections| {
-        relax_with_features(&mesh, &patches[0], features, (41, 31), sections, &GridParams::default(), &Silent)
+        relax_with_features((&mesh, &patches[0]), features, (41, 31), sections, &GridParams::default(), &Silent)
     };
     let coarse = run(&features, &Sections { u: vec![10, 10, 10], v: vec![12, 12] }).unwrap();
     let fine = run(&features, &Sections { u: vec![10, 30, 10], v: vec![12, 12] }).unwrap();
@@ -547,7 +546,7 @@ fn points_slide_along_feature_curves_so_that_iso_curves_cross_them_with_half_the
     let features = [FeatureCurve { patch: 0, family: Family::V, points }];
     let params = GridParams::default();
     let made =
-        relax_with_features(&mesh, &patches[0], &features, (81, 41), &Sections::default(), &params, &Silent).unwrap();
+        relax_with_features((&mesh, &patches[0]), &features, (81, 41), &Sections::default(), &params, &Silent).unwrap();
     let (grid, column) = (&made.grid, made.lines[0]);
     let at = |i: usize, j: usize| grid.points[j * grid.cols + i];
     // Nodes on the curve, by its length: even ones would all be this far apart.

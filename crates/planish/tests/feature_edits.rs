@@ -57,7 +57,7 @@ fn reach(at: &[DVec3]) -> [f64; 2] {
 fn is_followed(mesh: &TriMesh, drawing: &Drawing) {
     let patch = imprint(mesh, &drawing.network, &Silent).unwrap().remove(0);
     let (features, params) = (&drawing.sketch.features, GridParams::default());
-    let made = relax_with_features(mesh, &patch, features, (41, 21), &Sections::default(), &params, &Silent).unwrap();
+    let made = relax_with_features((mesh, &patch), features, (41, 21), &Sections::default(), &params, &Silent).unwrap();
     for k in 0..features.len() {
         let own = positions(mesh, drawing, k);
         for p in &made.curves[k] {

@@ -39,7 +39,7 @@ fn edited(share: f64) -> (TriMesh, Adjacency, Network, Network, u32) {
     let mut editor = Editor::new(&mesh, &adjacency, before.clone());
     let params = SnakeParams { fairness: 0.1, curvature: 1.0, ..SnakeParams::default() };
     let holds = Holds { section: Some((0.5, 0.7)), ..Holds::default() };
-    editor.drag_curve(curve as u32, 0.5, aside, &holds, &params, &Silent).unwrap();
+    editor.drag_curve(curve as u32, (0.5, aside), &holds, &params, &Silent).unwrap();
     let after = editor.network.clone();
     (mesh, adjacency, before, after, curve as u32)
 }

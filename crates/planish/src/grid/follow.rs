@@ -90,7 +90,7 @@ fn follow_patch(
 ) -> Result<Grid, Fault> {
     let (cols, rows, stops) = (old.cols, old.rows, SideStops::default());
     let chart = flatten(input, patch, &stops, [cols, rows], observer)?;
-    let from_nothing = || relax_patch(input, patch, (cols, rows), &stops, params, caught, observer);
+    let from_nothing = || relax_patch((input, patch), (cols, rows), &stops, params, caught, observer);
     let Some(net) = carried(&chart, patch, old) else { return from_nothing() };
     let net = settled_coarsely(net, params, observer)?;
     let mut net = settle(net, FINE_EFFORT, params, observer)?;

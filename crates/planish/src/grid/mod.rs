@@ -26,7 +26,7 @@ mod sizes;
 
 pub use divide::{DivideError, divide};
 pub use feature::curve::{FeatureGrid, Sections, relax_with_features};
-pub use feature::network::{Drawn, Here, check_features, family_of, relax_network};
+pub use feature::network::{Drawn, Here, check_features, family_of};
 pub use feature::{Family, FeatureCurve, FeatureError};
 pub use follow::follow;
 pub use quality::{GridQuality, folds, measure};
@@ -271,7 +271,7 @@ fn relax_jobs(
                 return Err(GridError::TooSmall { patch: k, cols, rows });
             }
             let stops = stops.get(k).unwrap_or(&none);
-            let made = relax_patch(input, patch, (cols, rows), stops, params, caught, observer);
+            let made = relax_patch((input, patch), (cols, rows), stops, params, caught, observer);
             let grid = made.map_err(|f| f.of_patch(k))?;
             let size = patch.mesh.triangles.len();
             observer.progress((done.fetch_add(size, Ordering::Relaxed) + size) as f64 / total as f64);
@@ -292,8 +292,7 @@ fn rim_node(k: usize, n: usize, cols: usize, rows: usize) -> usize {
 }
 
 fn relax_patch(
-    input: &TriMesh,
-    patch: &PatchMesh,
+    (input, patch): (&TriMesh, &PatchMesh),
     (cols, rows): (usize, usize),
     stops: &SideStops,
     params: &GridParams,

@@ -48,7 +48,7 @@ const FIRST_SHARE: f64 = 0.6;
 /// * `drawn` - feature curves, which become iso-curves of the grids of their patches; cells that sections give go over
 ///   what the patches want. Mostly empty.
 /// # Errors
-/// As [`relax_network`](super::relax_network).
+/// As [`Here::relax_all`].
 pub fn resample(
     input: &TriMesh,
     network: &Network,
@@ -70,14 +70,78 @@ pub fn resample_by(
     params: &GridParams,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid>, FeatureError> {
-    refined(input, network, patches, params, &|sizes| give_sums(network, drawn, sizes), relaxer, observer)
+    params.validate()?;
+    let mut sizes = choose_sizes(network, patches, params);
+    give_sums(network, drawn, &mut sizes)?;
+    let all: Vec<usize> = (0..patches.len()).collect();
+    let mut grids = relaxer.relax(&all, &sizes, &Part::new(observer, 0.0, FIRST_SHARE))?;
+    let allowed = params.miss * input.bounds().diagonal();
+    let chords = network.chords();
+    let [_, most] = bounds(params);
+    let budget = ((MOST_GROWTH * total(&sizes) as f64) as usize).min(params.max_points);
+    let mut suspects = all;
+    let mut past_help = vec![false; patches.len()];
+    // What was wrong with the patches that asked for the last round.
+    let mut before: Vec<Option<Fault>> = vec![None; patches.len()];
+    for round in 0..REFINEMENT_ROUNDS {
+        observer.check().map_err(GridError::from)?;
+        let fault = |p: usize, grid: &Grid| {
+            let folds = folds(grid, &patches[p]);
+            let floor = if folds > 0 { FOLDED_MISS * allowed } else { 0.0 };
+            Fault { folds, miss: miss(grid, &patches[p]).0.max(floor) }
+        };
+        suspects.retain(|&p| !past_help[p]);
+        let faults: Vec<Fault> = suspects.par_iter().map(|&p| fault(p, &grids[p])).collect();
+        for (&p, now) in suspects.iter().zip(&faults) {
+            past_help[p] = before[p].take().is_some_and(|before| !now.helped(before));
+        }
+        let wants = |past_help: &[bool]| -> Vec<(usize, f64)> {
+            suspects.iter().zip(&faults).map(|(&p, f)| (p, if past_help[p] { 0.0 } else { f.miss })).collect()
+        };
+        let misses = wants(&past_help);
+        // Long chords carry one patch's need far: where that asks for too many points, only the worst are heeded.
+        let wish = |misses: &[(usize, f64)]| -> Result<Vec<Size>, FeatureError> {
+            let mut limit = allowed;
+            loop {
+                let mut wanted = finer(network, &chords, &grids, misses, limit, most);
+                give_sums(network, drawn, &mut wanted)?;
+                if total(&wanted) <= budget || wanted == sizes {
+                    return Ok(wanted);
+                }
+                limit *= LESS;
+            }
+        };
+        let mut wanted = wish(&misses)?;
+        let share = (1.0 - FIRST_SHARE) / REFINEMENT_ROUNDS as f64;
+        let start = FIRST_SHARE + share * round as f64;
+        let needy: Vec<usize> = (0..suspects.len()).filter(|&k| misses[k].1 > allowed).collect();
+        let tried: Vec<usize> = needy.iter().map(|&k| suspects[k]).collect();
+        needy.iter().for_each(|&k| before[suspects[k]] = Some(faults[k]));
+        let added = total(&wanted).saturating_sub(total(&sizes));
+        let trial: usize = tried.iter().map(|&p| wanted[p].0 * wanted[p].1).sum();
+        if trial as f64 <= TRIAL_SHARE * added as f64 {
+            for (&k, grid) in needy.iter().zip(relaxer.relax(&tried, &wanted, &Part::new(observer, start, 0.0))?) {
+                past_help[suspects[k]] = !fault(suspects[k], &grid).helped(faults[k]);
+            }
+            wanted = wish(&wants(&past_help))?;
+        }
+        suspects = (0..patches.len()).filter(|&p| wanted[p] != sizes[p]).collect();
+        if suspects.is_empty() {
+            break;
+        }
+        for (&p, grid) in suspects.iter().zip(relaxer.relax(&suspects, &wanted, &Part::new(observer, start, share))?) {
+            grids[p] = grid;
+        }
+        sizes = wanted;
+    }
+    Ok(grids)
 }
 
 /// Who relaxes patches: [`Here`], or other processes in its place.
 pub trait Relaxer: Sync {
     /// Grids of some of the patches of a network, rising, by the sizes of all: what [`Here`] makes of them, to the bit.
     /// # Errors
-    /// As [`relax_network`](super::relax_network); [`FeatureError::Elsewhere`].
+    /// As [`Here::relax_all`]; [`FeatureError::Elsewhere`].
     fn relax(&self, which: &[usize], sizes: &[Size], observer: &dyn Observer) -> Result<Vec<Grid>, FeatureError>;
 }
 
@@ -97,11 +161,10 @@ impl Relaxer for Here<'_> {
 ///
 /// * `need` - for each curve how much it needs finer grids; 0 for not at all
 /// # Errors
-/// As [`relax_network`](super::relax_network).
+/// As [`Here::relax_all`].
 pub fn densify(
     relaxer: &dyn Relaxer,
-    network: &Network,
-    drawn: Drawn,
+    (network, drawn): (&Network, Drawn),
     (grids, start): (&mut [Grid], usize),
     need: &[f64],
     params: &GridParams,
@@ -150,85 +213,6 @@ pub fn densify(
 
 /// Points along u and v.
 pub type Size = (usize, usize);
-type Give<'a> = dyn Fn(&mut [Size]) -> Result<(), FeatureError> + 'a;
-
-/// Relaxes all patches, and those that need it again with more points.
-/// * `give` - puts sizes that are given in the place of those chosen
-fn refined(
-    input: &TriMesh,
-    network: &Network,
-    patches: &[PatchMesh],
-    params: &GridParams,
-    give: &Give,
-    relaxer: &dyn Relaxer,
-    observer: &dyn Observer,
-) -> Result<Vec<Grid>, FeatureError> {
-    params.validate()?;
-    let mut sizes = choose_sizes(network, patches, params);
-    give(&mut sizes)?;
-    let all: Vec<usize> = (0..patches.len()).collect();
-    let mut grids = relaxer.relax(&all, &sizes, &Part::new(observer, 0.0, FIRST_SHARE))?;
-    let allowed = params.miss * input.bounds().diagonal();
-    let chords = network.chords();
-    let [_, most] = bounds(params);
-    let budget = ((MOST_GROWTH * total(&sizes) as f64) as usize).min(params.max_points);
-    let mut suspects = all;
-    let mut past_help = vec![false; patches.len()];
-    // What was wrong with the patches that asked for the last round.
-    let mut before: Vec<Option<Fault>> = vec![None; patches.len()];
-    for round in 0..REFINEMENT_ROUNDS {
-        observer.check().map_err(GridError::from)?;
-        let fault = |p: usize, grid: &Grid| {
-            let folds = folds(grid, &patches[p]);
-            let floor = if folds > 0 { FOLDED_MISS * allowed } else { 0.0 };
-            Fault { folds, miss: miss(grid, &patches[p]).0.max(floor) }
-        };
-        suspects.retain(|&p| !past_help[p]);
-        let faults: Vec<Fault> = suspects.par_iter().map(|&p| fault(p, &grids[p])).collect();
-        for (&p, now) in suspects.iter().zip(&faults) {
-            past_help[p] = before[p].take().is_some_and(|before| !now.helped(before));
-        }
-        let wants = |past_help: &[bool]| -> Vec<f64> {
-            suspects.iter().zip(&faults).map(|(&p, f)| if past_help[p] { 0.0 } else { f.miss }).collect()
-        };
-        let misses = wants(&past_help);
-        // Long chords carry one patch's need far: where that asks for too many points, only the worst are heeded.
-        let wish = |misses: &[f64]| -> Result<Vec<Size>, FeatureError> {
-            let mut limit = allowed;
-            loop {
-                let mut wanted = finer(network, &chords, &grids, &suspects, misses, limit, most);
-                give(&mut wanted)?;
-                if total(&wanted) <= budget || wanted == sizes {
-                    return Ok(wanted);
-                }
-                limit *= LESS;
-            }
-        };
-        let mut wanted = wish(&misses)?;
-        let share = (1.0 - FIRST_SHARE) / REFINEMENT_ROUNDS as f64;
-        let start = FIRST_SHARE + share * round as f64;
-        let needy: Vec<usize> = (0..suspects.len()).filter(|&k| misses[k] > allowed).collect();
-        let tried: Vec<usize> = needy.iter().map(|&k| suspects[k]).collect();
-        needy.iter().for_each(|&k| before[suspects[k]] = Some(faults[k]));
-        let added = total(&wanted).saturating_sub(total(&sizes));
-        let trial: usize = tried.iter().map(|&p| wanted[p].0 * wanted[p].1).sum();
-        if trial as f64 <= TRIAL_SHARE * added as f64 {
-            for (&k, grid) in needy.iter().zip(relaxer.relax(&tried, &wanted, &Part::new(observer, start, 0.0))?) {
-                past_help[suspects[k]] = !fault(suspects[k], &grid).helped(faults[k]);
-            }
-            wanted = wish(&wants(&past_help))?;
-        }
-        suspects = (0..patches.len()).filter(|&p| wanted[p] != sizes[p]).collect();
-        if suspects.is_empty() {
-            break;
-        }
-        for (&p, grid) in suspects.iter().zip(relaxer.relax(&suspects, &wanted, &Part::new(observer, start, share))?) {
-            grids[p] = grid;
-        }
-        sizes = wanted;
-    }
-    Ok(grids)
-}
 
 /// What is wrong with a grid.
 #[derive(Clone, Copy)]
@@ -246,17 +230,17 @@ impl Fault {
 }
 
 /// Sizes with more points along the chords of patches that miss more than `limit`.
+/// * `misses` - patches, and what each misses
 fn finer(
     network: &Network,
     chords: &[u32],
     grids: &[Grid],
-    suspects: &[usize],
-    misses: &[f64],
+    misses: &[(usize, f64)],
     limit: f64,
     most: usize,
 ) -> Vec<(usize, usize)> {
     let mut factor = vec![1.0f64; chords.len()];
-    for (&p, &miss) in suspects.iter().zip(misses).filter(|(_, miss)| **miss > limit) {
+    for &(p, miss) in misses.iter().filter(|m| m.1 > limit) {
         for (side, coarse) in network.patches[p].sides.iter().zip(coarse(&grids[p])) {
             let f = &mut factor[chords[side.curve as usize] as usize];
             *f = if coarse { f.max((miss / limit).sqrt().clamp(FACTOR[0], FACTOR[1])) } else { *f };

@@ -64,7 +64,7 @@ impl Command for DragCurve {
                 let all = e.drag_corner(end as u32, to, self.width, &params, observer)?;
                 Ok(all.first().map(|&(_, relaxed)| relaxed))
             }
-            _ => e.drag_curve(curve, self.at, by, &holds, &params, observer).map(Some),
+            _ => e.drag_curve(curve, (self.at, by), &holds, &params, observer).map(Some),
         };
         let relaxed = work.edit_curve(curve, change)?;
         work.relaxed.extend(relaxed.map(|relaxed| RelaxedCurve { curve, relaxed }));

@@ -123,8 +123,7 @@ impl<'m> Editor<'m> {
     pub fn drag_curve(
         &mut self,
         curve: u32,
-        share: f64,
-        force: DVec3,
+        (share, force): (f64, DVec3),
         holds: &Holds,
         params: &SnakeParams,
         observer: &dyn Observer,

@@ -53,15 +53,14 @@ const READING: f64 = 0.3;
 pub(crate) const FEWEST_CELLS: usize = 2;
 
 /// Resamples a patch so that its feature curves are iso-curves of the grid, exactly.
-/// * `patch` - exact sub-mesh of `input`
+/// * `patch` - exact sub-mesh of the mesh `input`
 /// * `curves` - those of this patch, in any order and direction
 /// * `size` - `(cols, rows)` of the whole grid, divided by the ends of the curves where `sections` does not tell
 /// # Errors
 /// See [`FeatureError`]; curves are named by their index in `curves`.
 /// Source: [K98] §5.11.
 pub fn relax_with_features(
-    input: &TriMesh,
-    patch: &PatchMesh,
+    (input, patch): (&TriMesh, &PatchMesh),
     curves: &[FeatureCurve],
     size: (usize, usize),
     sections: &Sections,
@@ -75,7 +74,7 @@ pub fn relax_with_features(
         cells_between("v", &sections.v, &means(&strands.along), size.1.saturating_sub(1))?,
     ];
     let stops = [0, 1, 2, 3].map(|k| strands.stops(k, &cells));
-    relax_along(input, patch, &strands, &cells, &stops, params, observer)
+    relax_along((input, patch), &strands, &cells, &stops, params, observer)
 }
 
 /// Feature curves woven into their patch.
@@ -124,8 +123,7 @@ pub(crate) fn weave(patch: &PatchMesh, strands: &Strands) -> Result<Woven, Featu
 /// The grid along strands that are there already, with the cells of every section and the stops of the sides, those
 /// of the strands among them.
 pub(crate) fn relax_along(
-    input: &TriMesh,
-    patch: &PatchMesh,
+    (input, patch): (&TriMesh, &PatchMesh),
     strands: &Strands,
     cells: &[Vec<usize>; 2],
     stops: &SideStops,

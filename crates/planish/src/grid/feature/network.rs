@@ -74,27 +74,19 @@ pub fn check_features(
     Ok(())
 }
 
-/// Resamples every patch of a network; those with feature curves follow them exactly.
-/// * `sizes` - as of [`crate::grid::choose_sizes`]; numbers given by sections go over them along their chord
-/// # Errors
-/// See [`FeatureError`]; curves are named by their index.
-pub fn relax_network(
-    input: &TriMesh,
-    network: &Network,
-    patches: &[PatchMesh],
-    sizes: &[(usize, usize)],
-    drawn: Drawn,
-    params: &GridParams,
-    observer: &dyn Observer,
-) -> Result<Vec<Grid>, FeatureError> {
-    let mut sizes = sizes.to_vec();
-    give_sums(network, drawn, &mut sizes)?;
-    let all: Vec<usize> = (0..patches.len()).collect();
-    Here { input, network, patches, drawn, params }.relax_some(&all, &sizes, observer)
-}
-
 impl Here<'_> {
-    /// As [`relax_network`] for some of the patches, `which`, rising, with the sums of given sections in `sizes` already.
+    /// Resamples every patch of the network; those with feature curves follow them exactly.
+    /// * `sizes` - as of [`crate::grid::choose_sizes`]; numbers given by sections go over them along their chord
+    /// # Errors
+    /// See [`FeatureError`]; curves are named by their index.
+    pub fn relax_all(&self, sizes: &[(usize, usize)], observer: &dyn Observer) -> Result<Vec<Grid>, FeatureError> {
+        let mut sizes = sizes.to_vec();
+        give_sums(self.network, self.drawn, &mut sizes)?;
+        let all: Vec<usize> = (0..self.patches.len()).collect();
+        self.relax_some(&all, &sizes, observer)
+    }
+
+    /// As [`Here::relax_all`] for some of the patches, `which`, rising, with the sums of given sections in `sizes` already.
     pub(crate) fn relax_some(
         &self,
         which: &[usize],
@@ -150,7 +142,7 @@ impl Here<'_> {
         let mut grids: BTreeMap<usize, Grid> = plain.into_iter().zip(made).collect();
         for (&p, (found, cells)) in strands.iter().filter(|s| which.contains(s.0)) {
             let part = Part::new(observer, grids.len() as f64 * each, each);
-            let made = relax_along(input, &patches[p], found, cells, &stops[p], params, &part);
+            let made = relax_along((input, &patches[p]), found, cells, &stops[p], params, &part);
             grids.insert(p, made.map_err(|e| named(e, &of_patch[&p]))?.grid);
         }
         Ok(grids.into_values().collect())
