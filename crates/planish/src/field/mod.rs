@@ -173,9 +173,9 @@ pub trait Creases: Sync {
     /// if the guess is as good as anything. `a` and `b` are position and normal of the hits, `size` that of a cell.
     fn face_point(&self, axis: usize, guess: DVec3, a: (DVec3, DVec3), b: (DVec3, DVec3), size: f64) -> Option<DVec3>;
 
-    /// A place of the feature inside the cell of lowest and highest corner `bounds`, near `guess`; `through` are the points at which it
-    /// passes the cell's faces, `corner` whether several features seem to meet here, `hits` the
-    /// positions and normals around.
+    /// A place of the feature inside the cell near `guess`; `through` are the points at which it passes the cell's faces,
+    /// `corner` whether several features seem to meet here, `bounds` the lowest and the highest corner of the cell, `hits`
+    /// the positions and normals around.
     fn inner_point(
         &self,
         guess: DVec3,
