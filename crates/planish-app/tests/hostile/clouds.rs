@@ -2,6 +2,9 @@
 
 use super::dice::Dice;
 
+/// So many in any format are less than 200 kB: a number has 23 letters at most.
+const MOST_POINTS: usize = 2_700;
+
 fn on(shape: usize, dice: &mut Dice) -> [f64; 3] {
     let (a, t) = (std::f64::consts::TAU * dice.unit(), dice.signed());
     let r = (1.0 - t * t).sqrt();
@@ -57,6 +60,7 @@ pub fn drawn(dice: &mut Dice) -> (&'static str, String) {
     let (shape, count) = (dice.below(9), 20 + dice.below(1500));
     let mut points: Vec<[f64; 3]> = (0..count).map(|_| on(shape, dice)).collect();
     (0..dice.below(4)).for_each(|_| damage(&mut points, dice));
+    points.truncate(MOST_POINTS);
     let row = |p: &[f64; 3], between: &str| format!("{:e}{between}{:e}{between}{:e}\n", p[0], p[1], p[2]);
     match dice.below(4) {
         0 => ("csv", "x,y,z\n".to_owned() + &points.iter().map(|p| row(p, ",")).collect::<String>()),

@@ -68,6 +68,16 @@ impl Complex {
         self.cells[cell as usize].as_ref().expect("a live cell")
     }
 
+    /// Marks the cells with a node of a marked one.
+    pub fn with_neighbours(&self, marked: &[bool]) -> Vec<bool> {
+        let nodes_of = |c: u32| self.loop_of(c).iter().map(|&h| self.from(h) as usize);
+        let mut near = vec![false; self.nodes.len()];
+        self.live_cells().filter(|&c| marked[c as usize]).flat_map(nodes_of).for_each(|n| near[n] = true);
+        let mut wider = vec![false; self.cells.len()];
+        self.live_cells().for_each(|c| wider[c as usize] = nodes_of(c).any(|n| near[n]));
+        wider
+    }
+
     /// The half-arc after `half` around its cell.
     pub fn following(&self, half: u32) -> u32 {
         let sides = self.loop_of(self.cell(half));

@@ -78,7 +78,7 @@ pub(super) fn improve(bench: &mut Bench, patches: usize, observer: &dyn Observer
         let settled = settle_some(bench, scale, SETTLING_AROUND_CHANGES, &mut drawn, observer)?;
         touched.iter_mut().zip(settled).for_each(|(touched, settled)| *touched |= settled);
         // The sectors of a node are those of all cells around it.
-        filled.forget(&around(&bench.complex, &touched));
+        filled.forget(&bench.complex.with_neighbours(&touched));
     }
     Ok(())
 }
@@ -134,7 +134,7 @@ pub(super) fn settle_uncovered(bench: &mut Bench, rounds: usize, observer: &dyn 
     for (&c, _) in cells.iter().zip(fitness::covers(bench)).filter(|(_, cover)| !cover.is_good()) {
         fresh[c as usize] = true;
     }
-    let mut known = Known::but(around(&bench.complex, &fresh));
+    let mut known = Known::but(bench.complex.with_neighbours(&fresh));
     settle_some(bench, (cells.len(), Footing::Counts), rounds, &mut known, observer).map(|_| ())
 }
 
@@ -197,18 +197,6 @@ fn cells_of(complex: &Complex, changes: &[Change]) -> Vec<bool> {
     let mut marked = vec![false; complex.cells.len()];
     changes.iter().flat_map(|change| &change.cells).for_each(|&c| marked[c as usize] = true);
     marked
-}
-
-/// Marks the cells with a node of a marked one.
-fn around(complex: &Complex, marked: &[bool]) -> Vec<bool> {
-    let mut nodes = vec![false; complex.nodes.len()];
-    let inner: Vec<u32> = complex.live_cells().filter(|&c| marked[c as usize]).collect();
-    nodes_of(complex, &inner).into_iter().for_each(|n| nodes[n as usize] = true);
-    let mut wider = vec![false; complex.cells.len()];
-    for c in complex.live_cells() {
-        wider[c as usize] = nodes_of(complex, &[c]).into_iter().any(|n| nodes[n as usize]);
-    }
-    wider
 }
 
 /// What the best change of each union is.

@@ -234,14 +234,14 @@ impl<'a> Straight<'a> {
     }
 }
 
-/// Marks the cells around the nodes that others became one with.
+/// Marks the cells around the nodes that others became one with, and the cells around these.
 fn around(complex: &Complex, closing: &Closing) -> Vec<bool> {
     let kept: BTreeSet<u32> = closing.contractions.iter().map(|c| c.into).collect();
     let mut marked = vec![false; complex.cells.len()];
     for c in complex.live_cells() {
         marked[c as usize] = complex.loop_of(c).iter().any(|&h| kept.contains(&complex.from(h)));
     }
-    marked
+    complex.with_neighbours(&marked)
 }
 
 /// A contraction, drawn.
