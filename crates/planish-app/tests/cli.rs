@@ -200,11 +200,7 @@ fn layout_then_fit_then_export_then_compare_works_step_by_step() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     write_box(&path.join("box.ply"), 6);
-    let done = |args: &[&str]| {
-        let output = planish(args, path);
-        assert_eq!(status(&output), 0, "{args:?}: {}", stderr(&output));
-        stdout(&output)
-    };
+    let done = |args: &[&str]| ok(args, path);
     done(&["layout", "box.ply", "-o", "network.json", "--patches", "6"]);
     done(&["fit", "box.ply", "--network", "network.json", "-o", "box.planish", "--report", "fit.json"]);
     for name in ["box.step", "box.glb", "box-surface.ply", "box.stl", "box.obj"] {
@@ -342,11 +338,7 @@ fn fit_makes_of_a_model_that_edit_left_without_surfaces_what_edit_would_have_mad
     let path = folder.path();
     write_box(&path.join("box.ply"), 6);
     fs::write(path.join("lines.toml"), "[[step]]\nedit = \"feature_lines\"\nangle_deg = 40.0\n").unwrap();
-    let done = |args: &[&str]| {
-        let output = planish(args, path);
-        assert_eq!(status(&output), 0, "{args:?}: {}", stderr(&output));
-        stdout(&output)
-    };
+    let done = |args: &[&str]| ok(args, path);
     done(&["edit", "box.ply", "lines.toml", "-o", "whole.planish"]);
     done(&["edit", "box.ply", "lines.toml", "-o", "bare.planish", "--no-fit"]);
     let table = done(&["fit", "bare.planish", "-o", "fitted.planish", "--report", "plain.json"]);
@@ -388,10 +380,7 @@ fn the_network_of_a_model_goes_out_as_layout_writes_it_and_in_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     write_box(&path.join("box.ply"), 6);
-    let done = |args: &[&str]| {
-        let output = planish(args, path);
-        assert_eq!(status(&output), 0, "{args:?}: {}", stderr(&output));
-    };
+    let done = |args: &[&str]| ok(args, path);
     done(&["layout", "box.ply", "-o", "network.json", "--patches", "6"]);
     done(&["fit", "box.ply", "--network", "network.json", "-o", "box.planish"]);
     done(&["export", "box.planish", "-o", "out.json"]);

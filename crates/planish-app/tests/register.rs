@@ -6,12 +6,6 @@ use common::*;
 use std::fs;
 use std::path::Path;
 
-fn done(args: &[&str], folder: &Path) -> String {
-    let output = planish(args, folder);
-    assert_eq!(status(&output), 0, "{args:?}: {}", stderr(&output));
-    stdout(&output)
-}
-
 fn report(folder: &Path, name: &str) -> serde_json::Value {
     serde_json::from_slice(&fs::read(folder.join(name)).unwrap()).unwrap()
 }
@@ -56,7 +50,7 @@ fn a_scan_against_a_mesh_has_sides_a_share_within_the_tolerance_a_column_and_a_p
     assert_eq!(status(&compare(&["--tolerance", "0.31"])), 0);
     assert_eq!(status(&compare(&["--within", "99"])), 2);
     // The other way about: the points of the scan count, and A lies inside.
-    done(&["compare", "box.ply", "top.xyz", "-q", "--report", "d.json"], path);
+    ok(&["compare", "box.ply", "top.xyz", "-q", "--report", "d.json"], path);
     let found = report(path, "d.json");
     assert!((found["quality"]["signed.max"].as_f64().unwrap() + 0.1).abs() < 1e-9, "{found}");
     assert!((found["quality"]["distance.max"].as_f64().unwrap() - 0.3).abs() < 1e-9);
@@ -77,13 +71,13 @@ fn two_scans_and_a_scan_of_another_unit_are_compared_and_fitted() {
     assert!((0.5..0.7).contains(&p95), "{p95}");
     assert!((after["quality"]["align.matrix_14"].as_f64().unwrap() - 5.0).abs() < 0.05, "{after}");
     // The same scan in metres.
-    done(&["transform", "a.xyz", "--move", "0,0,0", "-q", "-o", "a.e57"], path);
+    ok(&["transform", "a.xyz", "--move", "0,0,0", "-q", "-o", "a.e57"], path);
     let same = report_of(path, &["compare", "a.e57", "a.xyz"]);
     assert!(same["quality"]["distance.max"].as_f64().unwrap() < 1e-8, "{same}");
 }
 
 fn report_of(folder: &Path, args: &[&str]) -> serde_json::Value {
-    done(&[args, &["-q", "--report", "r.json"]].concat(), folder);
+    ok(&[args, &["-q", "--report", "r.json"]].concat(), folder);
     report(folder, "r.json")
 }
 
@@ -95,29 +89,26 @@ fn steps_are_done_in_their_order_and_undone_by_their_opposites_in_every_format()
     let there = ["--move", "1,2,3", "--turn", "z,90", "--scale", "2", "--mirror", "x", "--up", "z-to-y"];
     let back = ["--up", "y-to-z", "--mirror", "x", "--scale", "0.5", "--turn", "z,-90", "--move", "-1,-2,-3"];
     for name in ["a.ply", "a.obj", "a.stl"] {
-        done(&[&["transform", "box.ply", "-q", "-o", name][..], &there].concat(), path);
-        done(&[&["transform", name, "-q", "-o", "b.ply"][..], &back].concat(), path);
+        ok(&[&["transform", "box.ply", "-q", "-o", name][..], &there].concat(), path);
+        ok(&[&["transform", name, "-q", "-o", "b.ply"][..], &back].concat(), path);
         let found = report_of(path, &["compare", "box.ply", "b.ply"]);
         assert!(found["quality"]["distance.max"].as_f64().unwrap() < 1e-6, "{name}: {found}");
         assert_eq!(found["quality"]["normal.flipped_share"], 0.0, "{name}");
     }
     // GLB is in metres.
-    done(&["transform", "box.ply", "-q", "--turn", "y,30", "-o", "a.glb"], path);
-    done(&["transform", "a.glb", "-q", "--turn", "y,-30", "-o", "b.glb"], path);
+    ok(&["transform", "box.ply", "-q", "--turn", "y,30", "-o", "a.glb"], path);
+    ok(&["transform", "a.glb", "-q", "--turn", "y,-30", "-o", "b.glb"], path);
     assert_eq!(status(&planish(&["compare", "box.ply", "b.glb", "--tolerance", "1e-6mm"], path)), 0);
     // The corner (0, 0, 0) of the box goes to (1, 2, 3), (-2, 1, 3), (-4, 2, 6), (4, 2, 6), and with z up turned to y to (4, 6, -2).
     fs::write(path.join("o.xyz"), "0 0 0\n1 0 0\n0 1 0\n0 0 1\n").unwrap();
-    done(&[&["transform", "o.xyz", "-q", "-o", "p.xyz"][..], &there].concat(), path);
+    ok(&[&["transform", "o.xyz", "-q", "-o", "p.xyz"][..], &there].concat(), path);
     let text = fs::read_to_string(path.join("p.xyz")).unwrap();
     let first = text.lines().find(|l| l.starts_with(|c: char| c.is_ascii_digit() || c == '-')).unwrap();
     assert_eq!(first.split_whitespace().take(3).collect::<Vec<_>>(), ["4", "6", "-2"], "{text}");
     write_ball(&path.join("a.xyz"), 1.0, 0.0);
     for name in ["s.ply", "s.xyz", "s.las", "s.laz", "s.e57"] {
-        done(
-            &["transform", "a.xyz", "--units", "m", "--turn", "1,1,1,120", "--about", "center", "-q", "-o", name],
-            path,
-        );
-        done(&["transform", name, "--units", "m", "--turn", "1,1,1,-120", "-q", "-o", "t.xyz"], path);
+        ok(&["transform", "a.xyz", "--units", "m", "--turn", "1,1,1,120", "--about", "center", "-q", "-o", name], path);
+        ok(&["transform", name, "--units", "m", "--turn", "1,1,1,-120", "-q", "-o", "t.xyz"], path);
         let found = report_of(path, &["compare", "a.xyz", "t.xyz", "--units", "m"]);
         let limit = if name.contains(".la") { 1e-2 } else { 1e-6 };
         assert!(found["quality"]["distance.max"].as_f64().unwrap() < limit, "{name}: {found}");
@@ -129,11 +120,11 @@ fn crops_cut_meshes_and_scans_pairs_bring_points_home_and_far_places_keep_their_
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     write_box(&path.join("box.ply"), 4);
-    done(&["transform", "box.ply", "--crop-box", "-1,-1,-1,2,2,0.3", "-q", "-o", "cut.ply"], path);
+    ok(&["transform", "box.ply", "--crop-box", "-1,-1,-1,2,2,0.3", "-q", "-o", "cut.ply"], path);
     let info = report_of(path, &["info", "cut.ply"]);
     assert!((info["quality"]["mesh.area"].as_f64().unwrap() - 2.2).abs() < 1e-6, "{info}");
     write_ball(&path.join("a.xyz"), 1.0, 0.0);
-    done(&["transform", "a.xyz", "--crop-plane", "0,0,1,0", "-q", "-o", "half.xyz"], path);
+    ok(&["transform", "a.xyz", "--crop-plane", "0,0,1,0", "-q", "-o", "half.xyz"], path);
     assert_eq!(report_of(path, &["info", "half.xyz"])["quality"]["scan.points"], 2000);
     // To the coordinates of a map and back, by pairs.
     fs::write(
@@ -141,10 +132,10 @@ fn crops_cut_meshes_and_scans_pairs_bring_points_home_and_far_places_keep_their_
         "# now, then\n0,0,0,500000,4000000,10\n1,0,0,500000,4000001,10\n0;1;0;499999;4000000;10\n",
     )
     .unwrap();
-    done(&["transform", "box.ply", "--pairs", "pairs.csv", "-q", "-o", "far.ply"], path);
-    done(&["transform", "far.ply", "--move", "-500000,-4000000,-10", "--turn", "z,-90", "-q", "-o", "near.ply"], path);
+    ok(&["transform", "box.ply", "--pairs", "pairs.csv", "-q", "-o", "far.ply"], path);
+    ok(&["transform", "far.ply", "--move", "-500000,-4000000,-10", "--turn", "z,-90", "-q", "-o", "near.ply"], path);
     assert_eq!(status(&planish(&["compare", "box.ply", "near.ply", "--tolerance", "1e-8"], path)), 0);
-    done(
+    ok(
         &["transform", "near.ply", "--turn", "x,3", "--move", "0.02,0,0", "--align", "box.ply", "-q", "-o", "fit.ply"],
         path,
     );

@@ -13,12 +13,6 @@ fn model(folder: &Path) {
     assert_eq!(status(&output), 0, "{}", stderr(&output));
 }
 
-fn ok(args: &[&str], folder: &Path) -> String {
-    let output = planish(args, folder);
-    assert_eq!(status(&output), 0, "{args:?}: {}", stderr(&output));
-    stdout(&output)
-}
-
 fn script(folder: &Path, text: &str) {
     fs::write(folder.join("edits.toml"), text).unwrap();
 }

@@ -3,6 +3,7 @@
 
 #[path = "../tests/patchworks/mod.rs"]
 mod patchworks;
+mod record;
 
 use glam::DVec3;
 use patchworks::*;
@@ -12,19 +13,7 @@ use planish::relief::layers::{self, Ground, Layers, ReliefEdit};
 use planish::relief::maps::{self, MapFrame, MapKind, MapParams};
 use planish::relief::{self, Displaced, Relief};
 use planish::surface::{self, FitParams, Resolution};
-use std::hint::black_box;
-use std::time::Instant;
-
-/// Least of several runs, milliseconds.
-fn time<T>(runs: usize, mut work: impl FnMut() -> T) -> f64 {
-    (0..runs)
-        .map(|_| {
-            let start = Instant::now();
-            black_box(work());
-            start.elapsed().as_secs_f64() * 1e3
-        })
-        .fold(f64::INFINITY, f64::min)
-}
+use record::time;
 
 fn main() {
     // 100 patches on a torus with waves.

@@ -6,6 +6,7 @@
 
 #[path = "../tests/patchworks/mod.rs"]
 mod patchworks;
+mod record;
 
 use glam::DVec3;
 use patchworks::*;
@@ -13,19 +14,8 @@ use planish::Silent;
 use planish::network::CurveKind;
 use planish::relief;
 use planish::surface::{self, FitParams, Resolution, StitchParams};
+use record::time;
 use std::hint::black_box;
-use std::time::Instant;
-
-/// Least of several runs, milliseconds.
-fn time<T>(runs: usize, mut work: impl FnMut() -> T) -> f64 {
-    (0..runs)
-        .map(|_| {
-            let start = Instant::now();
-            black_box(work());
-            start.elapsed().as_secs_f64() * 1e3
-        })
-        .fold(f64::INFINITY, f64::min)
-}
 
 fn main() {
     let g = grid(1024, 1024, |u, v| DVec3::new(u, v, 0.1 * (9.0 * u).sin() * (7.0 * v).cos()));

@@ -10,20 +10,8 @@ use planish::model::Model;
 use planish::network::CurveKind;
 use planish::pipeline::{self, PipelineParams};
 use planish::relief::{self, Relief, ReliefError};
-use planish::surface::{self, FitParams, Resolution, Surface};
+use planish::surface::{self, Surface};
 use std::f64::consts::TAU;
-
-fn fitted(work: &Patchwork, control: usize) -> (Vec<Surface>, Vec<Relief>) {
-    let params = FitParams {
-        resolution: Resolution::Control([control, control]),
-        cells_per_span: 1.0,
-        smoothing: 0.0,
-        ..FitParams::default()
-    };
-    let surfaces = surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap();
-    let reliefs = work.grids.iter().zip(&surfaces).map(|(g, s)| relief::bake(g, s).unwrap()).collect();
-    (surfaces, reliefs)
-}
 
 /// `(Euler number, boundary edges)`; panics if an edge is not used once in each direction at most.
 fn topology(mesh: &TriMesh) -> (i64, usize) {

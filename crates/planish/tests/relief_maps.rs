@@ -9,19 +9,7 @@ use planish::mesh::{Attribute, FacePoint, TriMesh};
 use planish::network::CurveKind;
 use planish::relief::maps::{self, AxisOrder, MapFrame, MapKind, MapParams, PatchMap, SheetKind};
 use planish::relief::{self, Agreement, Displaced, Relief};
-use planish::surface::{self, FitParams, Resolution, Surface};
-
-fn fitted(work: &Patchwork, control: usize) -> (Vec<Surface>, Vec<Relief>) {
-    let params = FitParams {
-        resolution: Resolution::Control([control, control]),
-        cells_per_span: 1.0,
-        smoothing: 0.0,
-        ..FitParams::default()
-    };
-    let surfaces = surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap();
-    let reliefs = work.grids.iter().zip(&surfaces).map(|(g, s)| relief::bake(g, s).unwrap()).collect();
-    (surfaces, reliefs)
-}
+use planish::surface;
 
 fn params(kind: MapKind, frame: MapFrame, texels: usize) -> MapParams {
     MapParams { kind, frame, texels, ..MapParams::default() }

@@ -1,6 +1,6 @@
 //! `planish clean`: a scan to denoised, oriented points with flags.
 
-use super::{Session, commit_report, write_failure};
+use super::{Session, write_failure};
 use crate::args::{Clean, Policy, default_memory};
 use crate::failure::{Failure, Status};
 use crate::files::{self, PointsFile, Scan};
@@ -98,11 +98,8 @@ pub fn clean(session: &Session, args: &Clean) -> Result<Status, Failure> {
         report.quality.insert(key::SCAN_BRICKS.into(), Figure::Count(plan.bricks() as u64));
     }
     figures(&facts, &mut report);
-    staged.commit()?;
-    segments.into_iter().chain(lines).try_for_each(Staged::commit)?;
-    commit_report(own_report, &report)?;
-    if !session.common.quiet {
-        session.tell_warnings(&report);
+    let written = [staged].into_iter().chain(segments).chain(lines);
+    if session.hand_over(written, own_report, &report)? {
         table(args, &of_samples, &facts, &report).print();
     }
     Ok(Status::Done)

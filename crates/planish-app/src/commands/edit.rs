@@ -1,8 +1,8 @@
 //! `planish edit`: a script of edits applied to a model, as one history.
 
-use super::missed::{self, Reach};
-use super::run::{seam_rows, summary, verdict};
-use super::{Session, commit_report, pipeline_failure};
+use super::fit::tell_fit;
+use super::run::{summary, verdict};
+use super::{Session, pipeline_failure};
 use crate::args::{AllStages, Edit as EditArgs};
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -76,20 +76,13 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
         report.stages.extend(made.stages);
         report.quality = made.quality;
         report.warnings.extend(made.warnings);
-        reach = Reach::new(args.stages.demanded_tolerance(), params.fit.tolerance_of, &report, model.units);
-        report.warnings.extend(missed::tolerance(&model, &params, reach, report.input.diagonal));
-        report.warnings.extend(missed::angle(&model, &made.seams, &params, args.stages.demanded_angle()));
-        report.warnings.extend(missed::inexact(&made.seams, &params));
-        report.seams = seam_rows(&model, &made.seams);
-        model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
+        reach = tell_fit(&mut report, &mut model, &params, &made.seams, &args.stages)?;
     } else if !args.stages.none_given() {
         // What was asked for now counts when the model is fitted.
         model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
     }
     let staged = Staged::file(&output)?;
-    let write = || planish_io::write_model(staged.file_path(), &model).map_err(|e| Failure::usage(&output, e));
-    let ((), record) = session.step("write", write)?;
-    report.stages.push(record);
+    report.stages.push(session.write_model(&staged, &model, &output)?);
     if let Some(folder) = &args.pictures {
         std::fs::create_dir_all(folder).map_err(|e| Failure::usage(folder, format!("cannot be made ({e})")))?;
     }
@@ -98,10 +91,7 @@ pub fn edit(session: &Session, args: &EditArgs) -> Result<Status, Failure> {
     for (file, png) in &pictures {
         std::fs::write(file, png).map_err(|e| Failure::usage(file, e))?;
     }
-    staged.commit()?;
-    commit_report(own_report, &report)?;
-    if !session.common.quiet {
-        session.tell_warnings(&report);
+    if session.hand_over([staged], own_report, &report)? {
         let mut table = if model.surfaces.is_empty() { Summary::default() } else { summary(&report, reach) };
         let network = &model.network;
         for row in &report.edits {

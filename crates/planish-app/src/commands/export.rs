@@ -1,6 +1,6 @@
 //! `planish export`: a model in another program's format.
 
-use super::{Session, commit_report, write_failure, write_relief};
+use super::{Session, write_failure, write_relief};
 use crate::args::{Export, ExportWord};
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -64,11 +64,8 @@ pub fn export(session: &Session, args: &Export) -> Result<Status, Failure> {
             None => planish_io::write_obj_surfaces(staged.file_path(), &placed::surfaces(&model)).map_err(wrong),
         },
     })?;
-    staged.commit()?;
     report.stages = vec![read, write];
-    commit_report(own_report, &report)?;
-    if !session.common.quiet {
-        session.tell_warnings(&report);
+    if session.hand_over([staged], own_report, &report)? {
         let mut table = Summary::default();
         table.row("model", args.model.display().to_string());
         table.row("written", args.output.display().to_string());

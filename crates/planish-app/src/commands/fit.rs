@@ -2,7 +2,7 @@
 
 use super::missed::{self, Reach};
 use super::run::{From, Job, Made, fitted, own_network, seam_rows, summary, verdict};
-use super::{Session, commit_report, pipeline_failure};
+use super::{Session, pipeline_failure};
 use crate::args::{AllStages, Fit};
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -13,6 +13,7 @@ use planish::mesh::Adjacency;
 use planish::model::{HistoryEntry, Model};
 use planish::network::diagnose;
 use planish::pipeline::{self, PipelineParams, ScanParams};
+use planish::surface::SeamQuality;
 use planish_io::Up;
 use planish_io::report::Report;
 use std::path::Path;
@@ -23,13 +24,8 @@ pub fn fit(session: &Session, args: &Fit) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
     let (mut report, model, reach) =
         if files::is_model(&args.input) { refit(session, args)? } else { anew(session, args)? };
-    let write = || planish_io::write_model(staged.file_path(), &model).map_err(|e| Failure::usage(&args.output, e));
-    let ((), record) = session.step("write", write)?;
-    report.stages.push(record);
-    staged.commit()?;
-    commit_report(own_report, &report)?;
-    if !session.common.quiet {
-        session.tell_warnings(&report);
+    report.stages.push(session.write_model(&staged, &model, &args.output)?);
+    if session.hand_over([staged], own_report, &report)? {
         let mut table = summary(&report, reach);
         table.row("model", args.output.display().to_string());
         table.print();
@@ -99,15 +95,27 @@ fn refit(session: &Session, args: &Fit) -> Result<(Report, Model, Option<Reach>)
     report.stages.extend(found.stages);
     report.quality = found.quality;
     report.warnings = found.warnings;
-    let reach = Reach::new(args.stages.demanded_tolerance(), params.fit.tolerance_of, &report, model.units);
-    report.warnings.extend(missed::tolerance(&model, &params, reach, report.input.diagonal));
-    report.warnings.extend(missed::angle(&model, &found.seams, &params, args.stages.demanded_angle()));
-    report.warnings.extend(missed::inexact(&found.seams, &params));
-    report.seams = seam_rows(&model, &found.seams);
-    model.params = serde_json::to_string(&params).map_err(Failure::fault)?;
+    let reach = tell_fit(&mut report, &mut model, &params, &found.seams, &args.stages)?;
     let command = if gridded { "refit" } else { "fit" };
     model.history.push(HistoryEntry { command: command.into(), parameters: model.params.clone() });
     Ok((report, model, reach))
+}
+
+/// Tells in the report what a fit of a model misses and how its patches meet, and keeps its parameters in the model.
+pub fn tell_fit(
+    report: &mut Report,
+    model: &mut Model,
+    params: &PipelineParams,
+    seams: &[SeamQuality],
+    stages: &AllStages,
+) -> Result<Option<Reach>, Failure> {
+    let reach = Reach::new(stages.demanded_tolerance(), params.fit.tolerance_of, report, model.units);
+    report.warnings.extend(missed::tolerance(model, params, reach, report.input.diagonal));
+    report.warnings.extend(missed::angle(model, seams, params, stages.demanded_angle()));
+    report.warnings.extend(missed::inexact(seams, params));
+    report.seams = seam_rows(model, seams);
+    model.params = serde_json::to_string(params).map_err(Failure::fault)?;
+    Ok(reach)
 }
 
 /// Refuses a model whose network does not part the mesh into four-sided patches.

@@ -1,6 +1,6 @@
 //! `planish layout`: a network to start from.
 
-use super::{Session, commit_report, missed, write_failure};
+use super::{Session, missed, write_failure};
 use crate::args::Layout;
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -32,12 +32,9 @@ pub fn layout(session: &Session, args: &Layout) -> Result<Status, Failure> {
     let wanted = (params.patches > 0 && !params.coarsest).then_some(params.patches as u64);
     report.warnings.extend(missed::patches(network, wanted));
     report.quality = made.quality;
-    staged.commit()?;
-    commit_report(own_report, &report)?;
-    if session.common.quiet {
+    if !session.hand_over([staged], own_report, &report)? {
         return Ok(Status::Done);
     }
-    session.tell_warnings(&report);
     let of_kind = |is: fn(CurveKind) -> bool| network.curves.iter().filter(|c| is(c.kind)).count() as u64;
     let mut table = Summary::default();
     table.row("input", format!("{}: {} triangles", report.input.path, count(input.triangles.len() as u64)));

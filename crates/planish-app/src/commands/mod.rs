@@ -30,7 +30,7 @@ use crate::words;
 pub use crate::words::with_hint;
 pub use batch::folder_names;
 use planish::grid::Grid;
-use planish::mesh::{Adjacency, TriMesh, folded_back, self_intersections};
+use planish::mesh::{Adjacency, Diagnosis, TriMesh, folded_back, self_intersections};
 use planish::model::{Model, Units};
 use planish::observe::{Cancelled, Observer};
 use planish::pipeline::key;
@@ -152,6 +152,25 @@ impl Session {
         self.common.report.as_deref().map(Staged::file).transpose()
     }
 
+    /// Moves what was written and the report to their places, and tells the warnings. Returns whether a summary is wanted as well.
+    fn hand_over(
+        &self,
+        written: impl IntoIterator<Item = Staged>,
+        own_report: Option<Staged>,
+        report: &Report,
+    ) -> Result<bool, Failure> {
+        written.into_iter().try_for_each(Staged::commit)?;
+        commit_report(own_report, report)?;
+        self.tell_warnings(report);
+        Ok(!self.common.quiet)
+    }
+
+    /// Writes a model into its staged file, and returns how long that took; `output` is where it goes in the end.
+    fn write_model(&self, staged: &Staged, model: &Model, output: &Path) -> Result<StageRecord, Failure> {
+        let write = || planish_io::write_model(staged.file_path(), model).map_err(|e| Failure::usage(output, e));
+        Ok(self.step("write", write)?.1)
+    }
+
     /// Tells the warnings on stderr.
     fn tell_warnings(&self, report: &Report) {
         if self.common.quiet {
@@ -213,6 +232,19 @@ fn displaced_grids(model: &Model) -> Result<Option<Vec<Grid>>, ReliefError> {
         Ok(Grid { rows: r.rows, cols: r.cols, points: planish::relief::displace(s, r)?, places: Vec::new() })
     };
     model.surfaces.iter().zip(&model.reliefs).map(one).collect::<Result<_, _>>().map(Some)
+}
+
+/// What a mesh is as a whole: closed and manifold or not, its area, its volume and genus where it has them.
+fn mesh_figures(facts: &Diagnosis, report: &mut Report) {
+    report.quality.insert(key::MESH_WATERTIGHT.into(), Figure::Flag(facts.watertight));
+    report.quality.insert(key::MESH_MANIFOLD.into(), Figure::Flag(facts.manifold));
+    report.quality.insert(key::MESH_AREA.into(), Figure::Number(facts.area));
+    if let Some(volume) = facts.volume {
+        report.quality.insert(key::MESH_VOLUME.into(), Figure::Number(volume));
+    }
+    if let Some(genus) = facts.genus {
+        report.quality.insert(key::MESH_GENUS.into(), Figure::Number(genus as f64));
+    }
 }
 
 /// Above so many triangles crossings are not looked for: an answer is to come soon.

@@ -1,6 +1,6 @@
 //! `planish transform`: a mesh or a scan moved, turned, scaled, mirrored, cropped, or fitted on another.
 
-use super::{Session, commit_report, write_failure};
+use super::{Session, write_failure};
 use crate::args::{Step, SurfaceWord, Transform};
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -52,10 +52,7 @@ pub fn transform(session: &Session, args: &Transform) -> Result<Status, Failure>
     let is_scan = report.input.kind == "scan";
     let what = if is_scan { key::SCAN_POINTS } else { key::MESH_VERTICES };
     report.quality.insert(what.into(), Figure::Count(left as u64));
-    staged.commit()?;
-    commit_report(own_report, &report)?;
-    if !session.common.quiet {
-        session.tell_warnings(&report);
+    if session.hand_over([staged], own_report, &report)? {
         let mut table = Summary::default();
         table.row("input", report.input.path.clone());
         told.into_iter().for_each(|(name, text)| _ = table.row(name, text));

@@ -26,6 +26,13 @@ pub fn stdout(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
+/// Runs the program, which must end well; what it wrote to standard output.
+pub fn ok(args: &[&str], folder: &Path) -> String {
+    let output = planish(args, folder);
+    assert_eq!(status(&output), 0, "{args:?}: {}", stderr(&output));
+    stdout(&output)
+}
+
 /// The one line of an error, checked for its form.
 pub fn error_line(output: &Output) -> String {
     let text = stderr(output);

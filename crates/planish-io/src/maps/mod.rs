@@ -13,6 +13,7 @@ pub use sidecar::{ImageEntry, PatchEntry, Sidecar};
 pub use wiring::{materialx, usd_materials};
 
 use crate::{Place, ReadError, WriteError};
+use glam::DVec3;
 use image::{Raster, Store};
 use planish::Units;
 use planish::relief::Relief;
@@ -171,11 +172,16 @@ fn held(maps: &[PatchMap], coding: &Coding) -> Vec<PatchMap> {
 
 /// A sum over all displacements, to tell whether a relief is still the one that maps were made of.
 pub fn relief_sum(reliefs: &[Relief]) -> u32 {
+    sum_over(reliefs.iter().map(|r| (r.rows, r.cols, &r.vectors[..])))
+}
+
+/// A sum over rows, columns and vectors.
+fn sum_over<'a>(all: impl Iterator<Item = (usize, usize, &'a [DVec3])>) -> u32 {
     let mut sum = crc32fast::Hasher::new();
-    for r in reliefs {
-        sum.update(&(r.rows as u64).to_le_bytes());
-        sum.update(&(r.cols as u64).to_le_bytes());
-        r.vectors.iter().flat_map(|d| d.to_array()).for_each(|x| sum.update(&x.to_le_bytes()));
+    for (rows, cols, vectors) in all {
+        sum.update(&(rows as u64).to_le_bytes());
+        sum.update(&(cols as u64).to_le_bytes());
+        vectors.iter().flat_map(|d| d.to_array()).for_each(|x| sum.update(&x.to_le_bytes()));
     }
     sum.finalize()
 }
@@ -195,13 +201,7 @@ fn meaning(params: &MapParams) -> String {
 
 /// A sum over the control points, to tell maps of another model.
 pub fn surfaces_sum(surfaces: &[Surface]) -> u32 {
-    let mut sum = crc32fast::Hasher::new();
-    for s in surfaces {
-        sum.update(&(s.rows as u64).to_le_bytes());
-        sum.update(&(s.cols as u64).to_le_bytes());
-        s.control.iter().flat_map(|p| p.to_array()).for_each(|x| sum.update(&x.to_le_bytes()));
-    }
-    sum.finalize()
+    sum_over(surfaces.iter().map(|s| (s.rows, s.cols, &s.control[..])))
 }
 
 /// Name of an image: `patch_0007.exr`, `atlas.exr`, `relief.1001.exr`; with an attribute's name in front of it.

@@ -181,11 +181,7 @@ fn read_edges(element: &Element, body: &mut Body, vertices: u64, total: usize) -
                     }
                     ends[(p == second) as usize] = index as u32;
                 }
-                Kind::One(scalar) => body.skip(1, scalar)?,
-                Kind::List { count, item } => {
-                    let n = body.count(count, item, total)?;
-                    body.skip(n, item)?;
-                }
+                kind => skip_one(kind, body, total)?,
             }
         }
         edges.push(ends);
@@ -469,14 +465,19 @@ fn skip(element: &Element, body: &mut Body, total: usize) -> Result<(), ReadErro
     for _ in 0..element.count {
         body.begin(&element.name)?;
         for property in &element.properties {
-            match property.kind {
-                Kind::One(scalar) => body.skip(1, scalar)?,
-                Kind::List { count, item } => {
-                    let n = body.count(count, item, total)?;
-                    body.skip(n, item)?;
-                }
-            }
+            skip_one(property.kind, body, total)?;
         }
     }
     Ok(())
+}
+
+/// Steps over one property.
+fn skip_one(kind: Kind, body: &mut Body, total: usize) -> Result<(), ReadError> {
+    match kind {
+        Kind::One(scalar) => body.skip(1, scalar),
+        Kind::List { count, item } => {
+            let n = body.count(count, item, total)?;
+            body.skip(n, item)
+        }
+    }
 }

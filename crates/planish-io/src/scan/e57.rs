@@ -1,7 +1,7 @@
 //! E57: scans with poses (ASTM E2807). All scans of a file become one cloud, and a cloud of several stations becomes as
 //! many scans, each in the coordinates of its scanner.
 
-use super::{Ending, PIECE, Take, column, foreign, guarded};
+use super::{Ending, PIECE, Take, check_mark, column, foreign, guarded};
 use crate::{Place, ReadError, WriteError};
 use e57::{
     CartesianCoordinate, E57Reader, E57Writer, Quaternion, Record, RecordName, RecordValue, Transform, Translation,
@@ -9,7 +9,7 @@ use e57::{
 use glam::DVec3;
 use planish::cloud::Cloud;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufReader, Seek};
 use std::path::Path;
 
 /// How many points the scans of the file have by its header.
@@ -18,14 +18,7 @@ pub(super) fn told(file: BufReader<File>) -> Result<u64, ReadError> {
 }
 
 pub(super) fn pieces(mut file: BufReader<File>, take: &mut Take) -> Result<Ending, ReadError> {
-    let mut mark = [0; 8];
-    if file.read_exact(&mut mark).is_err() || mark != *b"ASTM-E57" {
-        return Err(ReadError::WrongFormat {
-            expected: "E57",
-            found: "something else",
-            hint: "name a file that begins with ASTM-E57".into(),
-        });
-    }
+    check_mark(&mut file, "E57", "ASTM-E57")?;
     let size = file.get_ref().metadata()?.len();
     file.rewind()?;
     guarded(move || {

@@ -1,6 +1,6 @@
 //! LAS and LAZ: airborne and terrestrial laser scans.
 
-use super::{Ending, PIECE, Take, column, foreign, guarded};
+use super::{Ending, PIECE, Take, check_mark, column, foreign, guarded};
 use crate::{Place, ReadError, WriteError};
 use glam::DVec3;
 use las::point::Format;
@@ -57,14 +57,7 @@ pub(super) fn told(mut file: BufReader<File>) -> Result<u64, ReadError> {
 }
 
 pub(super) fn pieces(mut file: BufReader<File>, classes: &[u8], take: &mut Take) -> Result<Ending, ReadError> {
-    let mut mark = [0; 4];
-    if file.read_exact(&mut mark).is_err() || mark != *b"LASF" {
-        return Err(ReadError::WrongFormat {
-            expected: "LAS",
-            found: "something else",
-            hint: "name a file that begins with LASF".into(),
-        });
-    }
+    check_mark(&mut file, "LAS", "LASF")?;
     let size = file.get_ref().metadata()?.len();
     check_chunks(&mut file, size)?;
     file.rewind()?;

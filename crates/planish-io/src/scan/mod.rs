@@ -21,7 +21,7 @@ use planish::Units;
 use planish::cloud::Cloud;
 use planish::mesh::{Attribute, TriMesh};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 /// What the readers of scans are told.
@@ -255,6 +255,19 @@ fn lower(path: &Path) -> String {
 /// An attribute from a column of numbers.
 fn column(name: &str, width: usize, values: Vec<f32>) -> Attribute {
     Attribute { name: name.into(), width, values }
+}
+
+/// Refuses a file that does not begin with the mark of its format.
+fn check_mark(file: &mut impl Read, format: &'static str, mark: &str) -> Result<(), ReadError> {
+    let mut found = vec![0; mark.len()];
+    if file.read_exact(&mut found).is_err() || found != mark.as_bytes() {
+        return Err(ReadError::WrongFormat {
+            expected: format,
+            found: "something else",
+            hint: format!("name a file that begins with {mark}"),
+        });
+    }
+    Ok(())
 }
 
 /// What a library that reads for us says, as an error of ours.

@@ -157,18 +157,23 @@ pub fn sheet() -> (Network, Vec<Surface>) {
     (network(6, &[[0, 1, 4, 3], [1, 2, 5, 4]]), vec![surface(7, 5, at(0)), surface(7, 5, at(1))])
 }
 
-/// A tube of one patch: both its long sides are the same curve, its rings are closed.
-pub fn tube() -> (Network, Vec<Surface>) {
-    let n = 13;
+/// The network of one patch whose long sides are one curve.
+fn rolled() -> Network {
     let mut network = network(2, &[]);
     network.curves = vec![curve(0, 0), curve(0, 1), curve(1, 1)];
     let side = |curve: u32, reversed: bool| Side { curve, reversed };
     network.patches = vec![Patch { sides: [side(0, false), side(1, false), side(2, true), side(1, true)] }];
+    network
+}
+
+/// A tube of one patch: both its long sides are the same curve, its rings are closed.
+pub fn tube() -> (Network, Vec<Surface>) {
+    let n = 13;
     let at = |i: usize, j: usize| {
         let phi = std::f64::consts::TAU * (i % (n - 1)) as f64 / (n - 1) as f64;
         DVec3::new(phi.cos(), phi.sin(), j as f64)
     };
-    (network, vec![surface(n, 5, at)])
+    (rolled(), vec![surface(n, 5, at)])
 }
 
 /// A torus of one patch: both pairs of its sides are one curve each, with one corner.
@@ -189,17 +194,13 @@ pub fn ring() -> (Network, Vec<Surface>) {
 /// A globe of one patch: both its long sides are one curve, its short ones are the poles.
 pub fn globe() -> (Network, Vec<Surface>) {
     let n = 13;
-    let mut network = network(2, &[]);
-    network.curves = vec![curve(0, 0), curve(0, 1), curve(1, 1)];
-    let side = |curve: u32, reversed: bool| Side { curve, reversed };
-    network.patches = vec![Patch { sides: [side(0, false), side(1, false), side(2, true), side(1, true)] }];
     let at = |i: usize, j: usize| {
         let phi = std::f64::consts::TAU * (i % (n - 1)) as f64 / (n - 1) as f64;
         let theta = std::f64::consts::PI * (j as f64 / 8.0 - 0.5);
         let r = if j == 0 || j == 8 { 0.0 } else { theta.cos() };
         DVec3::new(r * phi.cos(), r * phi.sin(), theta.sin())
     };
-    (network, vec![surface(n, 9, at)])
+    (rolled(), vec![surface(n, 9, at)])
 }
 
 /// Two models as one.

@@ -1,6 +1,6 @@
 //! Files that are dropped on a page, and files that a page fetches.
 
-use super::Shared;
+use super::{Asked, Shared};
 use crate::desk::{Letter, Upload};
 use axum::body::Body;
 use axum::extract::{Path, Query, State};
@@ -19,12 +19,6 @@ pub struct Sent {
     token: String,
     #[serde(default)]
     name: String,
-}
-
-#[derive(Deserialize)]
-pub struct Asked {
-    #[serde(default)]
-    token: String,
 }
 
 /// A file is dropped on a page.

@@ -15,6 +15,7 @@ use axum::Router;
 use axum::routing::{get, post};
 use hub::Hub;
 use planish::model::Units;
+use serde::Deserialize;
 use std::future::IntoFuture;
 use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
@@ -59,6 +60,13 @@ struct Shared {
     hub: Hub,
     exports: Arc<Exports>,
     post: Sender<Letter>,
+}
+
+/// What requests bring along.
+#[derive(Deserialize)]
+struct Asked {
+    #[serde(default)]
+    token: String,
 }
 
 /// Serves the studio until `stop` tells to end. Everything that was done is in the project file or its journal then.

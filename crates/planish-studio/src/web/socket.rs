@@ -1,6 +1,6 @@
 //! Sockets: requests of a page to the desk, messages of the desk to the page.
 
-use super::Shared;
+use super::{Asked, Shared};
 use crate::desk::Letter;
 use crate::protocol::{Message, Request, VERSION, Why};
 use axum::extract::ws::{self, WebSocket, WebSocketUpgrade};
@@ -8,17 +8,10 @@ use axum::extract::{Query, State};
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use futures_util::{SinkExt, StreamExt};
-use serde::Deserialize;
 use std::sync::OnceLock;
 
 /// Bytes of a request at most: the longest stroke has some thousand places.
 const LARGEST: usize = 1 << 20;
-
-#[derive(Deserialize)]
-pub struct Asked {
-    #[serde(default)]
-    token: String,
-}
 
 /// A page connects.
 pub async fn connect(State(shared): State<Shared>, Query(asked): Query<Asked>, upgrade: WebSocketUpgrade) -> Response {

@@ -1,7 +1,9 @@
-//! What the benches share: one dated file per run and machine.
+//! What the benches share: one dated file per run and machine, and the clock.
 #![allow(dead_code, clippy::print_stderr)]
 
+use std::hint::black_box;
 use std::process::Command;
+use std::time::Instant;
 
 /// Writes the figures of one bench to `bench/runs/<date>-<machine>-<bench>.json`.
 pub fn write(bench: &str, figures: &impl serde::Serialize) {
@@ -18,6 +20,17 @@ pub fn write(bench: &str, figures: &impl serde::Serialize) {
     let path = format!("{folder}/{}-{machine}-{bench}.json", output("date", &["+%Y-%m-%d"]));
     std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, &text)).expect("bench/runs can be written");
     eprintln!("{path}");
+}
+
+/// Least of several runs, milliseconds.
+pub fn time<T>(runs: usize, mut work: impl FnMut() -> T) -> f64 {
+    (0..runs)
+        .map(|_| {
+            let start = Instant::now();
+            black_box(work());
+            start.elapsed().as_secs_f64() * 1e3
+        })
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// The processor in small letters with dashes, and its number of cores.

@@ -13,6 +13,7 @@
 use super::Cell;
 use crate::geom::{Aabb, is_positive};
 use glam::DVec3;
+use std::ops::Range;
 
 /// Normals of cells that differ by less than this cosine are one side of an edge.
 const SAME_SIDE_COSINE: f64 = 0.85;
@@ -115,30 +116,39 @@ impl Blend {
         &self.cells
     }
 
-    /// Calls `visit(index, squared distance over squared support)` for all cells whose support holds `p`.
-    fn around(&self, p: DVec3, mut visit: impl FnMut(usize, f64)) {
+    /// Calls `visit(indices)` for all leaves of the tree that are not `apart`, nor any node above them.
+    #[inline]
+    fn leaves(&self, apart: impl Fn(&Node) -> bool, mut visit: impl FnMut(Range<u32>)) {
         let mut stack = [0u32; 64];
         let mut top = usize::from(!self.nodes.is_empty());
         while top > 0 {
             top -= 1;
             let id = stack[top];
             let node = &self.nodes[id as usize];
-            if (p.cmplt(node.low) | p.cmpgt(node.high)).any() {
+            if apart(node) {
                 continue;
             }
             if node.right == 0 {
-                for i in node.start as usize..(node.start + node.count) as usize {
-                    let t2 = self.reaches[i].share(p);
-                    if t2 < 1.0 {
-                        visit(i, t2);
-                    }
-                }
+                visit(node.start..node.start + node.count);
             } else {
                 stack[top] = node.right;
                 stack[top + 1] = id + 1;
                 top += 2;
             }
         }
+    }
+
+    /// Calls `visit(index, squared distance over squared support)` for all cells whose support holds `p`.
+    fn around(&self, p: DVec3, mut visit: impl FnMut(usize, f64)) {
+        let apart = |node: &Node| (p.cmplt(node.low) | p.cmpgt(node.high)).any();
+        self.leaves(apart, |cells| {
+            for i in cells.start as usize..cells.end as usize {
+                let t2 = self.reaches[i].share(p);
+                if t2 < 1.0 {
+                    visit(i, t2);
+                }
+            }
+        });
     }
 
     /// The value at `p`; `None` where no cell reaches.
@@ -189,23 +199,8 @@ impl Blend {
     /// The cells whose supports reach into a box, ascending.
     pub fn reaching(&self, aabb: &Aabb) -> Vec<u32> {
         let mut found = Vec::with_capacity(64);
-        let mut stack = [0u32; 64];
-        let mut top = usize::from(!self.nodes.is_empty());
-        while top > 0 {
-            top -= 1;
-            let id = stack[top];
-            let node = &self.nodes[id as usize];
-            if (aabb.max.cmplt(node.low) | aabb.min.cmpgt(node.high)).any() {
-                continue;
-            }
-            if node.right == 0 {
-                found.extend((node.start..node.start + node.count).filter(|&i| self.cells[i as usize].reaches(aabb)));
-            } else {
-                stack[top] = node.right;
-                stack[top + 1] = id + 1;
-                top += 2;
-            }
-        }
+        let apart = |node: &Node| (aabb.max.cmplt(node.low) | aabb.min.cmpgt(node.high)).any();
+        self.leaves(apart, |cells| found.extend(cells.filter(|&i| self.cells[i as usize].reaches(aabb))));
         found
     }
 }

@@ -83,18 +83,7 @@ impl Cloud {
 
     /// Keeps the points of these indices, in their order.
     pub fn select(&self, ids: &[u32]) -> Cloud {
-        let attributes = self
-            .attributes
-            .iter()
-            .map(|a| Attribute {
-                name: a.name.clone(),
-                width: a.width,
-                values: ids
-                    .iter()
-                    .flat_map(|&i| a.values[i as usize * a.width..(i as usize + 1) * a.width].iter().copied())
-                    .collect(),
-            })
-            .collect();
+        let attributes = self.attributes.iter().map(|a| a.picked(ids)).collect();
         let seen_by =
             if self.seen_by.is_empty() { Vec::new() } else { ids.iter().map(|&i| self.seen_by[i as usize]).collect() };
         Cloud {

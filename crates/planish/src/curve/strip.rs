@@ -160,33 +160,18 @@ fn turn(
         return Some(face);
     }
     let k = mesh.triangles[face as usize].iter().position(|&w| w == v)? as u32;
-    let (mut left, mut right) = (Vec::new(), Vec::new());
     // Counter-clockwise a face is left by the half-edge that enters the vertex, clockwise by the one that leaves it.
-    let (mut out_left, mut out_right) = (previous(3 * face + k), 3 * face + k);
-    let (mut open_left, mut open_right) = (true, true);
-    while open_left || open_right {
-        if open_left {
-            left.push(out_left);
-            let g = adjacency.opposite[out_left as usize];
-            open_left = g != NONE && g / 3 != face;
-            if open_left {
-                if there(g / 3) {
-                    push_all(adjacency, portals, &left);
-                    return Some(g / 3);
-                }
-                out_left = previous(g);
-            }
-        }
-        if open_right {
-            right.push(out_right);
-            let g = adjacency.opposite[out_right as usize];
-            open_right = g != NONE && g / 3 != face;
-            if open_right {
-                if there(g / 3) {
-                    push_all(adjacency, portals, &right);
-                    return Some(g / 3);
-                }
-                out_right = next(g);
+    let on: [fn(u32) -> u32; 2] = [previous, next];
+    let (mut passed, mut out) = ([Vec::new(), Vec::new()], [Some(previous(3 * face + k)), Some(3 * face + k)]);
+    while out != [None, None] {
+        for way in 0..2 {
+            let Some(h) = out[way] else { continue };
+            passed[way].push(h);
+            let g = adjacency.opposite[h as usize];
+            out[way] = (g != NONE && g / 3 != face).then(|| on[way](g));
+            if out[way].is_some() && there(g / 3) {
+                push_all(adjacency, portals, &passed[way]);
+                return Some(g / 3);
             }
         }
     }

@@ -253,6 +253,17 @@ fn corners(mesh: &TriMesh, edges: &[[u32; 2]]) -> Vec<DVec3> {
         .collect()
 }
 
+impl MeshCreases {
+    /// Where edges cut the square from `low` to `high`, which is perpendicular to `axis`.
+    fn cuts_of(&self, axis: usize, low: DVec3, high: DVec3) -> impl Iterator<Item = &Cut> {
+        let plane = ((low[axis] - self.lattice.origin[axis]) / self.lattice.step[axis]).round() as i64;
+        let [_, v, u] = key(&self.lattice, axis, plane, (low + high) / 2.0);
+        let cuts = &self.cuts[axis];
+        let first = cuts.partition_point(|c| c.key < [plane, v, u]);
+        cuts[first..].iter().take_while(move |c| c.key == [plane, v, u])
+    }
+}
+
 impl Creases for MeshCreases {
     fn face_point(&self, axis: usize, guess: DVec3, a: (DVec3, DVec3), b: (DVec3, DVec3), size: f64) -> Option<DVec3> {
         let plane = ((guess[axis] - self.lattice.origin[axis]) / self.lattice.step[axis]).round() as i64;
@@ -312,16 +323,11 @@ impl Creases for MeshCreases {
         a: (DVec3, DVec3),
         b: (DVec3, DVec3),
     ) -> Option<(DVec3, bool)> {
-        let plane = ((low[axis] - self.lattice.origin[axis]) / self.lattice.step[axis]).round() as i64;
-        let [_, v, u] = key(&self.lattice, axis, plane, (low + high) / 2.0);
-        let cuts = &self.cuts[axis];
-        let first = cuts.partition_point(|c| c.key < [plane, v, u]);
         let beside = |m: DVec3, n: DVec3| {
             a.1.dot(m) > FAINT_AGREE && b.1.dot(n) > FAINT_AGREE && a.1.dot(m) >= a.1.dot(n) && b.1.dot(n) >= b.1.dot(m)
         };
-        let mut here = cuts[first..]
-            .iter()
-            .take_while(|c| c.key == [plane, v, u])
+        let mut here = self
+            .cuts_of(axis, low, high)
             .filter(|c| beside(c.normals[0], c.normals[1]) || beside(c.normals[1], c.normals[0]));
         // More than one line through a face is for a smaller voxel.
         let found = here.next()?;
@@ -329,11 +335,7 @@ impl Creases for MeshCreases {
     }
 
     fn tip_point(&self, axis: usize, [low, high]: [DVec3; 2], a: (DVec3, DVec3), b: (DVec3, DVec3)) -> Option<DVec3> {
-        let plane = ((low[axis] - self.lattice.origin[axis]) / self.lattice.step[axis]).round() as i64;
-        let [_, v, u] = key(&self.lattice, axis, plane, (low + high) / 2.0);
-        let cuts = &self.cuts[axis];
-        let first = cuts.partition_point(|c| c.key < [plane, v, u]);
-        let here = || cuts[first..].iter().take_while(|c| c.key == [plane, v, u]).filter(|c| c.tagged);
+        let here = || self.cuts_of(axis, low, high).filter(|c| c.tagged);
         // Where the surface of a hit ends: it may be one line for both.
         let end = |(p, n): (DVec3, DVec3)| {
             let own = here().filter(|c| c.normals.iter().any(|m| m.dot(n) > AGREE)).map(|c| c.p);

@@ -49,10 +49,7 @@ impl<'a> MeshField<'a> {
     /// # Errors
     /// [`FieldError::Mesh`] for damaged meshes.
     pub fn new(mesh: &'a TriMesh) -> Result<MeshField<'a>, FieldError> {
-        crate::mesh::check(mesh).map_err(FieldError::Mesh)?;
-        if mesh.triangles.is_empty() {
-            return Err(FieldError::Mesh(crate::mesh::MeshError::Empty));
-        }
+        crate::mesh::soup::check_some(mesh).map_err(FieldError::Mesh)?;
         let balanced = is_balanced(mesh);
         let center = mesh.bounds().center();
         let volume: f64 = (0..mesh.triangles.len())

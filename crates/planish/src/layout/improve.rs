@@ -73,7 +73,8 @@ pub(super) fn improve(bench: &mut Bench, patches: usize, observer: &dyn Observer
         let mut touched = cells_of(&bench.complex, &chosen);
         bench.apply(&chosen);
         touched.resize(bench.complex.cells.len(), true);
-        drawn.forget(&touched);
+        // Until now nobody looked at what is away from changes.
+        drawn.forget(&bench.complex.with_neighbours(&touched));
         let scale = (patches, Footing::Ignored);
         let settled = settle_some(bench, scale, SETTLING_AROUND_CHANGES, &mut drawn, observer)?;
         touched.iter_mut().zip(settled).for_each(|(touched, settled)| *touched |= settled);

@@ -14,7 +14,7 @@ use super::repairs::Repairs;
 use crate::mesh::diagnose::sorted_triple;
 use crate::mesh::sets::Sets;
 use crate::mesh::soup::{Orientation, check, fans, keyed_edges, mates, orient, origin, repeats};
-use crate::mesh::{Attribute, FeatureTags, MeshError, NONE, TriMesh, next};
+use crate::mesh::{FeatureTags, MeshError, NONE, TriMesh, next};
 use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
 
@@ -83,14 +83,7 @@ pub fn part_fans(mesh: &TriMesh) -> (TriMesh, Vec<u32>) {
     let mate = mates(&keyed_edges(&triangles), 3 * triangles.len());
     one_vertex_per_fan(&mut triangles, &mate, &mut source);
     let points = source.iter().map(|&v| mesh.points[v as usize]).collect();
-    let attributes = mesh
-        .attributes
-        .iter()
-        .map(|a| {
-            let of = |&v: &u32| a.values[v as usize * a.width..(v as usize + 1) * a.width].iter().copied();
-            Attribute { name: a.name.clone(), width: a.width, values: source.iter().flat_map(of).collect() }
-        })
-        .collect();
+    let attributes = mesh.attributes.iter().map(|a| a.picked(&source)).collect();
     (TriMesh { points, triangles, attributes }, source)
 }
 
@@ -387,21 +380,17 @@ fn gather(mesh: &TriMesh, triangles: &[[u32; 3]], source: &[u32]) -> (TriMesh, V
     let mut from = Vec::new();
     for (v, id) in id.iter_mut().enumerate().filter(|(_, id)| **id == 0) {
         *id = from.len() as u32;
-        from.push(source[v] as usize);
+        from.push(source[v]);
     }
     let gathered = TriMesh {
-        points: from.iter().map(|&v| mesh.points[v]).collect(),
+        points: from.iter().map(|&v| mesh.points[v as usize]).collect(),
         triangles: triangles.iter().map(|t| t.map(|v| id[v as usize])).collect(),
         attributes: mesh
             .attributes
             .iter()
             // One that does not match the vertices belongs to no vertex.
             .filter(|a| a.values.len() == a.width * mesh.points.len())
-            .map(|a| crate::mesh::Attribute {
-                name: a.name.clone(),
-                width: a.width,
-                values: from.iter().flat_map(|&v| a.values[v * a.width..(v + 1) * a.width].iter().copied()).collect(),
-            })
+            .map(|a| a.picked(&from))
             .collect(),
     };
     (gathered, id)

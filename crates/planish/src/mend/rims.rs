@@ -119,26 +119,27 @@ pub(super) fn averaged(
 /// For each raw point the distance of its eighth neighbour; the middle one of those of its neighbours, so that a point that
 /// lies alone does not count.
 fn reaches(tree: &KdTree, points: &[DVec3], observer: &dyn Observer) -> Result<Vec<f64>, Cancelled> {
-    let near = |p: DVec3, found: &mut Vec<(f64, u32)>| tree.nearest(p, NEIGHBOURS, found);
-    let own: Result<Vec<f64>, Cancelled> = points
-        .par_iter()
-        .map_init(Vec::new, |found, &p| {
-            observer.check()?;
-            near(p, found);
-            Ok(found.last().map_or(0.0, |f| f.0.sqrt()))
-        })
-        .collect();
-    let own = own?;
-    points
-        .par_iter()
-        .map_init(Vec::new, |found, &p| {
-            observer.check()?;
-            near(p, found);
-            let mut around: Vec<f64> = found.iter().map(|f| own[f.1 as usize]).collect();
-            around.sort_unstable_by(f64::total_cmp);
-            Ok(around.get(around.len() / 2).copied().unwrap_or(0.0))
-        })
-        .collect()
+    let own = per_point(tree, points, observer, |found| found.last().map_or(0.0, |f| f.0.sqrt()))?;
+    per_point(tree, points, observer, |found| {
+        let mut around: Vec<f64> = found.iter().map(|f| own[f.1 as usize]).collect();
+        around.sort_unstable_by(f64::total_cmp);
+        around.get(around.len() / 2).copied().unwrap_or(0.0)
+    })
+}
+
+/// What `of` makes of the neighbours of each point.
+fn per_point(
+    tree: &KdTree,
+    points: &[DVec3],
+    observer: &dyn Observer,
+    of: impl Fn(&[(f64, u32)]) -> f64 + Sync,
+) -> Result<Vec<f64>, Cancelled> {
+    let one = |found: &mut Vec<(f64, u32)>, &p: &DVec3| {
+        observer.check()?;
+        tree.nearest(p, NEIGHBOURS, found);
+        Ok(of(found))
+    };
+    points.par_iter().map_init(Vec::new, one).collect()
 }
 
 /// Parts surfaces that touch in a point, as they do where what is known of a scan ends.

@@ -201,13 +201,7 @@ impl AreaSampler {
             })
             .collect();
         let mesh = TriMesh::new(points, triangles);
-        let mut total = 0.0;
-        let sums = (0..mesh.triangles.len())
-            .map(|t| {
-                total += mesh.area(t);
-                total
-            })
-            .collect();
+        let sums = mesh.area_sums();
         AreaSampler { mesh, sums }
     }
 

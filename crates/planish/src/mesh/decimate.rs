@@ -13,7 +13,8 @@ mod collapse;
 mod queue;
 
 use super::intersect::intersections_of;
-use super::{FeatureTags, MeshError, TriMesh, check, self_intersections};
+use super::soup::check_some;
+use super::{FeatureTags, MeshError, TriMesh, self_intersections};
 use crate::geom::Bvh;
 use crate::observe::{Cancelled, Observer};
 use collapse::Collapse;
@@ -106,10 +107,7 @@ pub fn decimate(
     params: &DecimateParams,
     observer: &dyn Observer,
 ) -> Result<Decimated, DecimateError> {
-    check(mesh)?;
-    if mesh.triangles.is_empty() {
-        return Err(MeshError::Empty.into());
-    }
+    check_some(mesh)?;
     let wrong = |what, value, range| Err(DecimateError::Target { what, value, range });
     let (count, allowed) = match params.target {
         DecimateTarget::Ratio(r) if r > 0.0 && r <= 1.0 => ((mesh.triangles.len() as f64 * r) as usize, None),

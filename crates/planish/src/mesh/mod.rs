@@ -57,6 +57,18 @@ pub struct Attribute {
     pub values: Vec<f32>,
 }
 
+impl Attribute {
+    /// That of some vertices, in their order.
+    pub(crate) fn picked(&self, vertices: &[u32]) -> Attribute {
+        let of = |&v: &u32| &self.values[v as usize * self.width..][..self.width];
+        Attribute {
+            name: self.name.clone(),
+            width: self.width,
+            values: vertices.iter().flat_map(of).copied().collect(),
+        }
+    }
+}
+
 /// Why a mesh cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
@@ -140,6 +152,17 @@ impl TriMesh {
     #[inline]
     pub fn area(&self, t: usize) -> f64 {
         self.area_vector(t).length() / 2.0
+    }
+
+    /// Running sums of the areas, triangle by triangle: to pick triangles by their share of the whole.
+    pub(crate) fn area_sums(&self) -> Vec<f64> {
+        let mut total = 0.0;
+        (0..self.triangles.len())
+            .map(|t| {
+                total += self.area(t);
+                total
+            })
+            .collect()
     }
 
     /// Unit vertex normals, weighted by the area of the triangles around.

@@ -9,7 +9,8 @@
 //! Volume is restored by a shift along the normals. What would turn a triangle or make two meet is taken back.
 
 use super::intersect::intersections_of;
-use super::{Adjacency, FeatureKind, FeatureTags, MeshError, NONE, TriMesh, check, next, previous};
+use super::soup::check_some;
+use super::{Adjacency, FeatureKind, FeatureTags, MeshError, NONE, TriMesh, next, previous};
 use crate::geom::is_positive;
 use crate::observe::{Cancelled, Observer};
 use glam::DVec3;
@@ -91,10 +92,7 @@ pub fn smooth(
     params: &SmoothParams,
     observer: &dyn Observer,
 ) -> Result<Smoothed, SmoothError> {
-    check(mesh)?;
-    if mesh.triangles.is_empty() {
-        return Err(MeshError::Empty.into());
-    }
+    check_some(mesh)?;
     for (what, value) in [("noise", params.noise.unwrap_or(0.0)), ("strength", params.strength)] {
         if !(value >= 0.0 && value.is_finite()) {
             return Err(SmoothError::Size { what, value });

@@ -19,6 +19,12 @@ pub fn check(mesh: &TriMesh) -> Result<(), MeshError> {
     Ok(())
 }
 
+/// The same, and refuses a mesh without triangles.
+pub(crate) fn check_some(mesh: &TriMesh) -> Result<(), MeshError> {
+    check(mesh)?;
+    if mesh.triangles.is_empty() { Err(MeshError::Empty) } else { Ok(()) }
+}
+
 /// All half-edges of triangles with three different vertices, sorted by undirected edge: `(edge, half-edge)`.
 pub(crate) fn keyed_edges(triangles: &[[u32; 3]]) -> Vec<(u64, u32)> {
     // What is no edge is sorted to the end. One array from the start: half-edges are many in large meshes.

@@ -1,6 +1,6 @@
 //! A mesh in parts: what some of its triangles are by themselves, and tiles, which are cubes of space.
 
-use super::{Attribute, FeatureTags, TriMesh};
+use super::{FeatureTags, TriMesh};
 use glam::DVec3;
 use std::collections::{BTreeMap, HashSet};
 
@@ -68,15 +68,9 @@ impl<'a> MeshParts<'a> {
         let of = |v: &u32| self.tags.vertices.get(*v as usize).copied().unwrap_or_default();
         let tags = FeatureTags { vertices: vertices.iter().map(of).collect(), edges };
         let mut mesh = TriMesh::new(vertices.iter().map(|&v| self.mesh.points[v as usize]).collect(), triangles);
-        mesh.attributes = self.mesh.attributes.iter().map(|a| picked(a, &vertices)).collect();
+        mesh.attributes = self.mesh.attributes.iter().map(|a| a.picked(&vertices)).collect();
         MeshPart { mesh, tags, vertices }
     }
-}
-
-/// An attribute of some vertices.
-fn picked(whole: &Attribute, vertices: &[u32]) -> Attribute {
-    let of = |&v: &u32| &whole.values[v as usize * whole.width..][..whole.width];
-    Attribute { name: whole.name.clone(), width: whole.width, values: vertices.iter().flat_map(of).copied().collect() }
 }
 
 /// Why a mesh is not cut into tiles.
@@ -128,7 +122,7 @@ mod tests {
     fn tiles_of_a_cuboid_hold_all_of_it_and_meet_in_the_same_vertices() {
         let mut mesh = cuboid(DVec3::new(4.0, 2.0, 2.0), 8);
         let values = (0..mesh.points.len()).map(|v| v as f32).collect();
-        mesh.attributes.push(Attribute { name: "number".into(), width: 1, values });
+        mesh.attributes.push(crate::mesh::Attribute { name: "number".into(), width: 1, values });
         let sharp = sharp_edges(&mesh, &Adjacency::new(&mesh), 30.0);
         let edges = (0..sharp.len() as u32).filter(|&h| sharp[h as usize]);
         let tags = FeatureTags::from_edges(mesh.points.len(), edges.map(|h| [mesh.origin(h), mesh.origin(next(h))]));

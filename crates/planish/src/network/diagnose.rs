@@ -327,19 +327,7 @@ pub fn glance(mesh: &TriMesh, adjacency: &Adjacency, network: &Network) -> Diagn
 fn part(mesh: &TriMesh, adjacency: &Adjacency, chains: &[Vec<Place>]) -> (TriMesh, Vec<Vec<Place>>) {
     let mut faces = BTreeSet::new();
     for place in chains.iter().flatten() {
-        match *place {
-            Place::Vertex(v) => faces.extend(adjacency.fan(v).map(|h| h / 3)),
-            Place::Edge(h, _) => {
-                faces.insert(h / 3);
-                let o = adjacency.opposite[h as usize];
-                if o != NONE {
-                    faces.insert(o / 3);
-                }
-            }
-            Place::Face(p) => {
-                faces.insert(p.face);
-            }
-        }
+        faces.extend(place.faces(adjacency));
     }
     let number: BTreeMap<u32, u32> = faces.iter().enumerate().map(|(k, &f)| (f, k as u32)).collect();
     let mut vertices: BTreeMap<u32, u32> = BTreeMap::new();

@@ -144,6 +144,18 @@ impl Place {
         }
     }
 
+    /// All faces that it lies on.
+    pub fn faces(&self, adjacency: &Adjacency) -> Vec<u32> {
+        match *self {
+            Place::Vertex(v) => adjacency.fan(v).map(|h| h / 3).collect(),
+            Place::Edge(h, _) => {
+                let o = adjacency.opposite[h as usize];
+                if o == NONE { vec![h / 3] } else { vec![h / 3, o / 3] }
+            }
+            Place::Face(p) => vec![p.face],
+        }
+    }
+
     /// World position.
     pub fn position(&self, mesh: &TriMesh) -> DVec3 {
         match *self {
@@ -192,18 +204,8 @@ impl Place {
 
 /// What two places of a curve have in common, if anything.
 pub(crate) fn shared_face(adjacency: &Adjacency, triangles: &[[u32; 3]], a: &Place, b: &Place) -> Option<Shared> {
-    let faces = |p: &Place| -> Vec<u32> {
-        match *p {
-            Place::Vertex(v) => adjacency.fan(v).map(|h| h / 3).collect(),
-            Place::Edge(h, _) => {
-                let o = adjacency.opposite[h as usize];
-                if o == NONE { vec![h / 3] } else { vec![h / 3, o / 3] }
-            }
-            Place::Face(p) => vec![p.face],
-        }
-    };
-    let other = faces(b);
-    let face = faces(a).into_iter().filter(|f| other.contains(f)).min()?;
+    let other = b.faces(adjacency);
+    let face = a.faces(adjacency).into_iter().filter(|f| other.contains(f)).min()?;
     let ends = |h: u32| [triangles[h as usize / 3][h as usize % 3], triangles[h as usize / 3][next(h) as usize % 3]];
     let along = match (*a, *b) {
         (Place::Vertex(_), Place::Vertex(_)) => true,

@@ -100,18 +100,13 @@ pub fn displaced_patches(
     reliefs: &[Relief],
     observer: &dyn Observer,
 ) -> Result<PatchedMesh, ReliefError> {
-    let patches = network.patches.len();
-    for (what, found) in [("surfaces", surfaces.len()), ("reliefs", reliefs.len())] {
-        if found != patches {
-            return Err(ReliefError::Count { what, found, wanted: patches });
-        }
-    }
+    one_per_patch(network, [("surfaces", surfaces.len()), ("reliefs", reliefs.len())])?;
     let one = |(s, r): (&Surface, &Relief)| {
         observer.check()?;
         displace(s, r)
     };
     let arrays: Vec<Result<Vec<DVec3>, ReliefError>> = surfaces.par_iter().zip(reliefs).map(one).collect();
-    let mut nodes = Vec::with_capacity(patches);
+    let mut nodes = Vec::with_capacity(network.patches.len());
     for (patch, (points, relief)) in arrays.into_iter().zip(reliefs).enumerate() {
         let points = points.map_err(|e| match e {
             ReliefError::Shape { rows, cols, found, .. } => ReliefError::Shape { patch, rows, cols, found },
@@ -120,6 +115,15 @@ pub fn displaced_patches(
         nodes.push(Grid { rows: relief.rows, cols: relief.cols, points, places: Vec::new() });
     }
     weld(network, &nodes)
+}
+
+/// Refuses lists that are not one per patch.
+fn one_per_patch(network: &Network, lists: [(&'static str, usize); 2]) -> Result<(), ReliefError> {
+    let wanted = network.patches.len();
+    match lists.into_iter().find(|list| list.1 != wanted) {
+        Some((what, found)) => Err(ReliefError::Count { what, found, wanted }),
+        None => Ok(()),
+    }
 }
 
 /// The smooth surfaces of all patches as one mesh.
@@ -147,12 +151,7 @@ pub fn surface_patches(
     shapes: &[[usize; 2]],
     observer: &dyn Observer,
 ) -> Result<PatchedMesh, ReliefError> {
-    let patches = network.patches.len();
-    for (what, found) in [("surfaces", surfaces.len()), ("shapes", shapes.len())] {
-        if found != patches {
-            return Err(ReliefError::Count { what, found, wanted: patches });
-        }
-    }
+    one_per_patch(network, [("surfaces", surfaces.len()), ("shapes", shapes.len())])?;
     surfaces.iter().try_for_each(Surface::check)?;
     let one = |(surface, &[rows, cols]): (&Surface, &[usize; 2])| {
         observer.check()?;

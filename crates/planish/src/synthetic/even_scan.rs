@@ -11,13 +11,8 @@ const DRAWS: u64 = 9;
 /// Bare points evenly by area, each moved by normal noise.
 /// * `noise` - standard deviation along each axis, world units
 pub fn even_scan(truth: &TriMesh, points: usize, noise: f64, seed: u64) -> Cloud {
-    let mut total = 0.0;
-    let sums: Vec<f64> = (0..truth.triangles.len())
-        .map(|t| {
-            total += truth.area(t);
-            total
-        })
-        .collect();
+    let sums = truth.area_sums();
+    let total = sums.last().copied().unwrap_or(0.0);
     let point = |i: u64| {
         let [pick, q, s, r @ ..]: [f64; DRAWS as usize] =
             std::array::from_fn(|k| random::unit(seed, DRAWS * i + k as u64));

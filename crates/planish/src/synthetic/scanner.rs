@@ -160,13 +160,8 @@ fn chosen(
             DVec3::new(flat * cos, flat * sin, height)
         })
         .collect();
-    let mut total = 0.0;
-    let sums: Vec<f64> = (0..truth.triangles.len())
-        .map(|t| {
-            total += truth.area(t);
-            total
-        })
-        .collect();
+    let sums = truth.area_sums();
+    let total = sums.last().copied().unwrap_or(0.0);
     let spots: Vec<(DVec3, DVec3)> = (0..SPOTS as u64)
         .map(|i| {
             let draw = |n: u64| random::unit(params.seed ^ 1, 4 * i + n);
@@ -320,17 +315,15 @@ mod tests {
     use crate::observe::Silent;
     use crate::synthetic::shapes;
 
+    /// A scanner without any fault.
+    fn exact() -> ScannerParams {
+        ScannerParams { points: 20_000, noise: 0.0, outliers: 0.0, shift: 0.0, turn_deg: 0.0, ..Default::default() }
+    }
+
     #[test]
     fn a_perfect_scan_lies_on_the_surface_within_1e_12_and_has_the_wanted_number_of_points_within_3_percent() {
         let truth = shapes::torus(1.0, 0.35, 96, 48);
-        let params = ScannerParams {
-            points: 20_000,
-            noise: 0.0,
-            outliers: 0.0,
-            shift: 0.0,
-            turn_deg: 0.0,
-            ..Default::default()
-        };
+        let params = exact();
         let scan = virtual_scan(&truth, &params, &Silent).unwrap();
         let tree = Bvh::new(&truth);
         assert!(scan.cloud.points.iter().all(|&p| tree.closest(p).distance < 1e-12));
@@ -341,14 +334,7 @@ mod tests {
     #[test]
     fn noise_runs_along_the_rays_with_the_wanted_deviation_within_3_percent() {
         let truth = shapes::sphere(1.0, 5);
-        let quiet = ScannerParams {
-            points: 20_000,
-            noise: 0.0,
-            outliers: 0.0,
-            shift: 0.0,
-            turn_deg: 0.0,
-            ..Default::default()
-        };
+        let quiet = exact();
         let noisy = ScannerParams { noise: 2e-3, ..quiet.clone() };
         let (a, b) = (virtual_scan(&truth, &quiet, &Silent).unwrap(), virtual_scan(&truth, &noisy, &Silent).unwrap());
         assert_eq!(a.cloud.points.len(), b.cloud.points.len());

@@ -2,15 +2,31 @@
 #![allow(dead_code)] // every test file uses some of them
 
 use glam::DVec3;
+use planish::Silent;
 use planish::grid::Grid;
 use planish::mesh::FacePoint;
 use planish::network::{Corner, Curve, CurveKind, Network, Patch, Side};
+use planish::relief::{self, Relief};
+use planish::surface::{self, FitParams, Resolution, Surface};
 use std::collections::BTreeMap;
 
 /// Patches over shared corners. Curves are made for each pair of corners and label met, in order.
 pub struct Patchwork {
     pub network: Network,
     pub grids: Vec<Grid>,
+}
+
+/// Surfaces of so many control points in each direction, not smoothed, and the reliefs over them.
+pub fn fitted(work: &Patchwork, control: usize) -> (Vec<Surface>, Vec<Relief>) {
+    let params = FitParams {
+        resolution: Resolution::Control([control, control]),
+        cells_per_span: 1.0,
+        smoothing: 0.0,
+        ..FitParams::default()
+    };
+    let surfaces = surface::fit_network(&work.network, &work.grids, &params, &Silent).unwrap();
+    let reliefs = work.grids.iter().zip(&surfaces).map(|(g, s)| relief::bake(g, s).unwrap()).collect();
+    (surfaces, reliefs)
 }
 
 /// Builds a network from patches given by their four corner ids; `labels` tell curves with equal ends apart.

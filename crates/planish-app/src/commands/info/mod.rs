@@ -95,9 +95,7 @@ pub fn info(session: &Session, args: &Info) -> Result<Status, Failure> {
         report.warnings.extend(network_faults(model));
         folds(model, &mut report);
     }
-    commit_report(own_report, &report)?;
-    if !session.common.quiet {
-        session.tell_warnings(&report);
+    if session.hand_over([], own_report, &report)? {
         let mut table = Summary::default();
         mesh_rows(&mut table, &report, &facts, model.map_or(DVec3::ZERO, |m| m.shift));
         table.row("crossings", crossings);
@@ -192,15 +190,7 @@ fn figures(facts: &Diagnosis, report: &mut Report) {
         (key::MESH_UNREFERENCED_VERTICES, facts.unreferenced_vertices),
     ];
     report.quality.extend(counts.map(|(key, n)| (key.to_owned(), Figure::Count(n as u64))));
-    report.quality.insert(key::MESH_WATERTIGHT.into(), Figure::Flag(facts.watertight));
-    report.quality.insert(key::MESH_MANIFOLD.into(), Figure::Flag(facts.manifold));
-    report.quality.insert(key::MESH_AREA.into(), Figure::Number(facts.area));
-    if let Some(volume) = facts.volume {
-        report.quality.insert(key::MESH_VOLUME.into(), Figure::Number(volume));
-    }
-    if let Some(genus) = facts.genus {
-        report.quality.insert(key::MESH_GENUS.into(), Figure::Number(genus as f64));
-    }
+    super::mesh_figures(facts, report);
 }
 
 /// What is wrong with a mesh, in words.

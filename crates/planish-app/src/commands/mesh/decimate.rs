@@ -1,6 +1,6 @@
 //! `planish decimate`: fewer triangles, features kept.
 
-use super::super::{Session, commit_report, write_failure};
+use super::super::{Session, write_failure};
 use crate::args::Decimate;
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -65,10 +65,7 @@ pub fn decimate(session: &Session, args: &Decimate) -> Result<Status, Failure> {
         );
         report.warnings.push(Warning::new("target_missed", text, ""));
     }
-    staged.commit()?;
-    commit_report(own_report, &report)?;
-    if !session.common.quiet {
-        session.tell_warnings(&report);
+    if session.hand_over([staged], own_report, &report)? {
         let unit = report.input.units.as_str();
         let mut table = Summary::default();
         table.row("input", format!("{}: {} triangles", report.input.path, count(mesh.triangles.len() as u64)));

@@ -146,10 +146,7 @@ pub fn mesh(session: &Session, args: &Mesh) -> Result<Status, Failure> {
     if let Some(scanned) = scanned {
         pipeline::scan_figures(scanned, &mut report.quality, &mut report.warnings);
     }
-    staged.commit()?;
-    commit_report(own_report, &report)?;
-    if !session.common.quiet {
-        session.tell_warnings(&report);
+    if session.hand_over([staged], own_report, &report)? {
         table(args, made, &report).print();
     }
     Ok(Status::Done)
@@ -380,16 +377,8 @@ fn figures(made: &Meshed, report: &mut Report) {
     ];
     report.quality.extend(whole.map(|(key, n)| (key.to_owned(), Figure::Count(n as u64))));
     super::meeting_figures(&made.extracted.mesh, report);
-    report.quality.insert(key::MESH_WATERTIGHT.into(), Figure::Flag(facts.watertight));
-    report.quality.insert(key::MESH_MANIFOLD.into(), Figure::Flag(facts.manifold));
     report.quality.insert(key::MESH_VOXEL.into(), Figure::Number(made.lattice.step.x));
-    report.quality.insert(key::MESH_AREA.into(), Figure::Number(facts.area));
-    if let Some(volume) = facts.volume {
-        report.quality.insert(key::MESH_VOLUME.into(), Figure::Number(volume));
-    }
-    if let Some(genus) = facts.genus {
-        report.quality.insert(key::MESH_GENUS.into(), Figure::Number(genus as f64));
-    }
+    super::mesh_figures(&facts, report);
     if counts.fallbacks > 0 {
         let text = format!("{} cells have no sharp vertex although their normals ask for one.", counts.fallbacks);
         report.warnings.push(Warning::new("fallback_cells", text, ""));

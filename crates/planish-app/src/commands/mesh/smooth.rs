@@ -1,6 +1,6 @@
 //! `planish smooth`: noise off a mesh, features kept.
 
-use super::super::{Session, commit_report, write_failure};
+use super::super::{Session, write_failure};
 use crate::args::Smooth;
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -43,10 +43,7 @@ pub fn smooth(session: &Session, args: &Smooth) -> Result<Status, Failure> {
         let text = format!("{} vertices stayed where they were: triangles would have turned or met.", made.kept);
         report.warnings.push(Warning::new("kept_vertices", text, ""));
     }
-    staged.commit()?;
-    commit_report(own_report, &report)?;
-    if !session.common.quiet {
-        session.tell_warnings(&report);
+    if session.hand_over([staged], own_report, &report)? {
         let unit = report.input.units.as_str();
         let mut table = Summary::default();
         table.row("input", format!("{}: {} triangles", report.input.path, count(mesh.triangles.len() as u64)));

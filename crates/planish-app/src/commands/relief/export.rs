@@ -1,6 +1,6 @@
 //! `planish relief export`: maps as images.
 
-use super::super::{Session, commit_report, write_failure, write_text};
+use super::super::{Session, write_failure, write_text};
 use super::{displaced, folds, open, shape, wrong};
 use crate::args::relief::ReliefExport;
 use crate::failure::{Failure, Status};
@@ -82,11 +82,8 @@ pub fn export(session: &Session, args: &ReliefExport) -> Result<Status, Failure>
         report.quality.insert(format!("relief.{}_error_max", other.key), Figure::Number(other.error));
     }
     folds(&model, &mut report, &args.model)?;
-    staged.commit()?;
     report.stages = vec![read, bake, write];
-    commit_report(own_report, &report)?;
-    if !session.common.quiet {
-        session.tell_warnings(&report);
+    if session.hand_over([staged], own_report, &report)? {
         let mut table = Summary::default();
         table.row("model", args.model.display().to_string());
         table.row("maps", format!("{} of {} patches", params.kind.word(), made.len()));

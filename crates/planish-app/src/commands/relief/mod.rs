@@ -10,7 +10,7 @@ mod transfer;
 
 pub use deform::deform;
 
-use super::{Session, commit_report};
+use super::Session;
 use crate::args::relief::{Relief, ReliefCommand};
 use crate::failure::{Failure, Status};
 use crate::files;
@@ -102,13 +102,8 @@ fn finish(
 ) -> Result<Status, Failure> {
     let own_report = session.stage_report()?;
     let staged = Staged::file(output)?;
-    let write = || planish_io::write_model(staged.file_path(), model).map_err(|e| Failure::usage(output, e));
-    let ((), record) = session.step("write", write)?;
-    report.stages.push(record);
-    staged.commit()?;
-    commit_report(own_report, &report)?;
-    if !session.common.quiet {
-        session.tell_warnings(&report);
+    report.stages.push(session.write_model(&staged, model, output)?);
+    if session.hand_over([staged], own_report, &report)? {
         let mut table = Summary::default();
         for (name, value) in told {
             table.row(name, value);

@@ -7,7 +7,7 @@
 
 use super::{EditError, Editor};
 use crate::curve::{CurveError, SurfaceCurve, between};
-use crate::mesh::{FacePoint, NONE};
+use crate::mesh::FacePoint;
 use crate::network::CurveKind;
 use crate::network::imprint::{self, Place};
 use glam::DVec2;
@@ -230,15 +230,7 @@ impl Editor<'_> {
     fn common_faces(&self, a: &Place, b: &Place) -> Vec<u32> {
         let adjacency = self.adjacency;
         let on = |p: &Place, face: u32| p.on_face(adjacency, &self.mesh.triangles, face).is_some();
-        let faces: Vec<u32> = match *a {
-            Place::Vertex(v) => adjacency.fan(v).map(|h| h / 3).collect(),
-            Place::Edge(h, _) => {
-                let o = adjacency.opposite[h as usize];
-                if o == NONE { vec![h / 3] } else { vec![h / 3, o / 3] }
-            }
-            Place::Face(p) => vec![p.face],
-        };
-        faces.into_iter().filter(|&f| on(b, f)).collect()
+        a.faces(adjacency).into_iter().filter(|&f| on(b, f)).collect()
     }
 }
 

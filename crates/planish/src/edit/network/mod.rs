@@ -284,13 +284,18 @@ impl<'m> Editor<'m> {
         if tail[0] != place {
             tail.insert(0, place);
         }
+        Ok(self.part_curve(curve, place, head, tail))
+    }
+
+    /// Puts a corner between the two parts of a curve; the second part becomes the last curve. Returns the corner.
+    fn part_curve(&mut self, curve: u32, place: FacePoint, head: Vec<FacePoint>, tail: Vec<FacePoint>) -> u32 {
         let corner = self.network.corners.len() as u32;
         self.network.corners.push(Corner { place });
         let old = &mut self.network.curves[curve as usize];
         let second = Curve { corners: [corner, old.corners[1]], kind: old.kind, points: tail };
         (old.points, old.corners[1]) = (head, corner);
         self.network.curves.push(second);
-        Ok(corner)
+        corner
     }
 
     /// Joins the two curves at a corner into one and takes the corner away. Returns the curve.

@@ -175,13 +175,7 @@ impl Editor<'_> {
         let k = nearest.ok_or(EditError::AtEnd { curve })?;
         let place = points[k];
         let (head, tail) = (points[..=k].to_vec(), points[k..].to_vec());
-        let corner = self.network.corners.len() as u32;
-        self.network.corners.push(Corner { place });
-        let old = &mut self.network.curves[curve as usize];
-        let second = Curve { corners: [corner, old.corners[1]], kind: old.kind, points: tail };
-        (old.points, old.corners[1]) = (head, corner);
-        self.network.curves.push(second);
-        Ok(corner)
+        Ok(self.part_curve(curve, place, head, tail))
     }
 
     /// The corner nearest to a place, or a new one if none lies there.

@@ -199,27 +199,26 @@ impl Pieces {
     /// A place of the input on the patch mesh, if it is there.
     fn in_patch(&self, input: &TriMesh, patch: &PatchMesh, p: &FacePoint) -> Option<FacePoint> {
         // A place of an edge or vertex may be named on a face that the patch does not have.
-        let own = self.of.get(&p.face).into_iter().flatten().copied();
-        let weights = |t: u32| {
+        self.best(p.face, |t| {
             let corners = patch.mesh.triangles[t as usize]
                 .map(|v| patch.origin[v as usize].weights_on(input, patch.face_origin[t as usize]));
             inside(corners, p.bary)
-        };
-        own.map(|t| (t, weights(t)))
-            .max_by(|a, b| least(&a.1).total_cmp(&least(&b.1)).then(b.0.cmp(&a.0)))
-            .filter(|(_, w)| least(w) > -SLACK)
-            .map(|(face, w)| FacePoint { face, bary: snapped(w) })
+        })
     }
 
     /// A place of the uncut mesh on the cut one.
     pub fn place(&self, cut: &imprint::Cut, mesh: &TriMesh, adjacency: &Adjacency, p: &FacePoint) -> Option<FacePoint> {
-        let weights = |t: u32| {
+        self.best(p.face, |t| {
             let corners = cut.mesh.triangles[t as usize].map(|v| {
                 cut.origin[v as usize].on_face(adjacency, &mesh.triangles, p.face).map_or([0.0; 3], |q| q.bary)
             });
             inside(corners, p.bary)
-        };
-        let own = self.of.get(&p.face).into_iter().flatten().copied();
+        })
+    }
+
+    /// The place on that part of a face which holds it best by its `weights`, if it is there.
+    fn best(&self, face: u32, weights: impl Fn(u32) -> [f64; 3]) -> Option<FacePoint> {
+        let own = self.of.get(&face).into_iter().flatten().copied();
         own.map(|t| (t, weights(t)))
             .max_by(|a, b| least(&a.1).total_cmp(&least(&b.1)).then(b.0.cmp(&a.0)))
             .filter(|(_, w)| least(w) > -SLACK)

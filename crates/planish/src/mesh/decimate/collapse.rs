@@ -337,19 +337,8 @@ impl<'a> Collapse<'a> {
         }
         let tags = FeatureTags::from_edges(source.len(), edges);
         let mut mesh = TriMesh::new(points, triangles);
-        mesh.attributes = self
-            .attributes
-            .iter()
-            .filter(|a| a.name != crate::mesh::FEATURE)
-            .map(|a| Attribute {
-                name: a.name.clone(),
-                width: a.width,
-                values: source
-                    .iter()
-                    .flat_map(|&v| a.values[v as usize * a.width..(v as usize + 1) * a.width].iter().copied())
-                    .collect(),
-            })
-            .collect();
+        mesh.attributes =
+            self.attributes.iter().filter(|a| a.name != crate::mesh::FEATURE).map(|a| a.picked(&source)).collect();
         (mesh, tags, source)
     }
 
