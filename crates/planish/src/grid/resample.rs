@@ -48,7 +48,7 @@ const FIRST_SHARE: f64 = 0.6;
 /// * `drawn` - feature curves, which become iso-curves of the grids of their patches; cells that sections give go over
 ///   what the patches want. Mostly empty.
 /// # Errors
-/// As [`Here::relax_all`].
+/// See [`FeatureError`].
 pub fn resample(
     input: &TriMesh,
     network: &Network,
@@ -141,7 +141,7 @@ pub fn resample_by(
 pub trait Relaxer: Sync {
     /// Grids of some of the patches of a network, rising, by the sizes of all: what [`Here`] makes of them, to the bit.
     /// # Errors
-    /// As [`Here::relax_all`]; [`FeatureError::Elsewhere`].
+    /// See [`FeatureError`].
     fn relax(&self, which: &[usize], sizes: &[Size], observer: &dyn Observer) -> Result<Vec<Grid>, FeatureError>;
 }
 
@@ -161,7 +161,7 @@ impl Relaxer for Here<'_> {
 ///
 /// * `need` - for each curve how much it needs finer grids; 0 for not at all
 /// # Errors
-/// As [`Here::relax_all`].
+/// See [`FeatureError`].
 pub fn densify(
     relaxer: &dyn Relaxer,
     (network, drawn): (&Network, Drawn),

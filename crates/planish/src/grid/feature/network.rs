@@ -75,18 +75,11 @@ pub fn check_features(
 }
 
 impl Here<'_> {
-    /// Resamples every patch of the network; those with feature curves follow them exactly.
-    /// * `sizes` - as of [`crate::grid::choose_sizes`]; numbers given by sections go over them along their chord
+    /// Resamples some of the patches, `which`, rising; those with feature curves follow them exactly.
+    /// * `sizes` - as of [`crate::grid::choose_sizes`], of all patches; numbers given by sections go over them along their chord
+    ///   ([`give_sums`])
     /// # Errors
     /// See [`FeatureError`]; curves are named by their index.
-    pub fn relax_all(&self, sizes: &[(usize, usize)], observer: &dyn Observer) -> Result<Vec<Grid>, FeatureError> {
-        let mut sizes = sizes.to_vec();
-        give_sums(self.network, self.drawn, &mut sizes)?;
-        let all: Vec<usize> = (0..self.patches.len()).collect();
-        self.relax_some(&all, &sizes, observer)
-    }
-
-    /// As [`Here::relax_all`] for some of the patches, `which`, rising, with the sums of given sections in `sizes` already.
     pub(crate) fn relax_some(
         &self,
         which: &[usize],
