@@ -1,6 +1,6 @@
 //! Layouts that follow the form: cross field, injective seamless map, whole numbers.
 //!
-//! 1. an even proxy mesh of the input ([`proxy`]);
+//! 1. an even proxy mesh of the input ([`super::proxy`]);
 //! 2. the smoothest cross field along its lines and principal directions ([`crate::network::field`]);
 //! 3. the seamless map of that field, without flipped triangles ([`map`]);
 //! 4. whole numbers for its cones and lines, for any number of patches ([`integers`]), and the smoothest map with them;
@@ -13,7 +13,7 @@ use super::embed::{self, EmbedError};
 use super::fitness::{self, Price};
 use super::integers::{self, IntegerMap, QuantizeError, Scale};
 use super::map::{self, Charts, ConeCare, Effort};
-use super::proxy::{self, Proxy, Sizing};
+use super::proxy::{Proxy, Sizing, Source};
 use super::recut::Bench;
 use super::strips::chords::{self, Order};
 use super::{LayoutParams, Piece, SETTLING_PER_SMOOTHING, TYPICAL_PATCHES, Trial, by_folds, finish, improve, tried};
@@ -71,26 +71,20 @@ struct Aligned {
 
 impl Aligned {
     /// The map of a mesh on a proxy with edges as `sizing` asks for.
-    /// * `even` - the proxy with edges as long everywhere, once it is made
     ///
     /// A triangle whose corners are all bound, by lines or as cones, may get no area on whole numbers. Where cones are that
     /// near to lines and to each other the proxy is made finer, until none is.
     fn on(
-        (mesh, sharp): (&TriMesh, &[bool]),
+        source: &mut Source,
         attempt: &Attempt,
-        (sizing, even): (&mut Sizing, &mut Option<Rc<Proxy>>),
+        sizing: &mut Sizing,
         effort: &Effort,
         observer: &dyn Observer,
     ) -> Result<Option<Aligned>, AlignError> {
         let mut rounds = REFINEMENTS;
         let (proxy, mut charts) = loop {
-            let made = || proxy::proxy(mesh, sharp, &[], sizing, observer).map(Rc::new);
-            let proxy = if sizing.is_even() { even.take().or_else(made) } else { made() };
-            let Some(proxy) = proxy else { return Ok(None) };
-            if sizing.is_even() {
-                *even = Some(proxy.clone());
-            }
-            let most = MOST_TO_WANTED * sizing.triangles(mesh);
+            let Some(proxy) = source.proxy(sizing, observer) else { return Ok(None) };
+            let most = MOST_TO_WANTED * sizing.triangles(source.mesh);
             if proxy.mesh.triangles.len() > most {
                 return Err(AlignError::Dense { found: proxy.mesh.triangles.len(), most });
             }
@@ -191,6 +185,12 @@ pub(super) enum AlignError {
 }
 
 impl AlignError {
+    /// Which of two is told: what stands in the way of an attempt that has a one-to-one map, else that of the later one.
+    fn or(self, later: AlignError) -> AlignError {
+        let is_of_map = |e: &AlignError| matches!(e, AlignError::Unmapped | AlignError::Folded { .. });
+        if is_of_map(&later) && !is_of_map(&self) { self } else { later }
+    }
+
     /// Where a finer proxy may help.
     fn places(&self) -> &[Wanted] {
         match self {
@@ -339,17 +339,16 @@ pub(super) fn lay(
     let mut why = AlignError::Unmapped;
     let mut best: Option<Laid> = None;
     let mut has_tight = false;
-    let mut even = None;
     let effort = Effort::new(share);
-    let triangles = (PROXY_TRIANGLES * share.sqrt()) as usize;
+    let mut source = Source::new(mesh, sharp, (PROXY_TRIANGLES * share.sqrt()) as usize);
     for attempt in &ATTEMPTS {
         // Where no cone is to be moved it would be the same again.
         if attempt.roomy && attempt.curvature > 0.0 && !has_tight {
             continue;
         }
-        let mut sizing = Sizing::even(mesh, triangles);
+        let mut sizing = source.even().clone();
         for _ in 0..=FINER_ROUNDS {
-            let aligned = match Aligned::on((mesh, sharp), attempt, (&mut sizing, &mut even), &effort, observer) {
+            let aligned = match Aligned::on(&mut source, attempt, &mut sizing, &effort, observer) {
                 Ok(Some(aligned)) => aligned,
                 Ok(None) => {
                     observer.check()?;
@@ -372,12 +371,13 @@ pub(super) fn lay(
                 break;
             }
             let Some(trouble) = trouble else { break };
-            why = trouble;
+            let places = trouble.places().to_vec();
+            why = why.or(trouble);
             if effort.is_spent() || matches!(why, AlignError::LeastCount { .. }) {
                 return best.ok_or(why);
             }
             // Where no number had room, or none that had is the one asked for, finer edges hardly ever help.
-            if best.as_ref().is_none_or(|best| !best.worth.is_kept()) || !sizing.shorten(why.places().to_vec()) {
+            if best.as_ref().is_none_or(|best| !best.worth.is_kept()) || !sizing.shorten(places) {
                 break;
             }
         }
@@ -663,6 +663,16 @@ mod tests {
         };
         assert!(is_final(60, 0.95, false) && is_final(60, 0.4, true));
         assert!(!is_final(60, 0.85, false) && !is_final(110, 0.4, true));
+    }
+
+    #[test]
+    fn of_two_attempts_what_stands_in_the_way_of_the_one_with_a_map_is_told() {
+        let cramped = || AlignError::Cramped { places: Vec::new() };
+        let folded = || AlignError::Folded { faults: 20 };
+        assert_eq!(cramped().or(folded()), cramped());
+        assert_eq!(folded().or(cramped()), cramped());
+        assert_eq!(AlignError::Unmapped.or(folded()), folded());
+        assert_eq!(cramped().or(AlignError::LeastCount { least: 400 }), AlignError::LeastCount { least: 400 });
     }
 
     #[test]

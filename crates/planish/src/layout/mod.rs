@@ -74,8 +74,9 @@ const FORCED: f64 = 0.85;
 /// Rounds of settling for each round of smoothing asked for: a round redraws disjoint unions only.
 const SETTLING_PER_SMOOTHING: usize = 8;
 
-/// The last settling is for patches of this part of the size: meshes for it are that much finer. Chosen.
-const FINISH_TO_SIDE: f64 = 0.25;
+/// The last settling is for patches of this part of the size: meshes for it are that much finer. Chosen, so that their edges are
+/// shorter than the radius within which the ground of a corner is taken.
+const FINISH_TO_SIDE: f64 = 0.5;
 
 /// Patches of a typical layout; default ones of the measured meshes have 33 to 285. The scale of directions goes by their side, and
 /// pieces of less area than one are small.

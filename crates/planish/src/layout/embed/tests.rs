@@ -2,7 +2,7 @@ use super::*;
 use crate::Silent;
 use crate::layout::map::polycube::{Charted, cuboid, flat, solid, torus};
 use crate::layout::map::quarter_turn;
-use crate::layout::proxy::{Sizing, proxy};
+use crate::layout::proxy::even;
 use crate::layout::recut::Bench;
 use crate::layout::strips;
 use crate::layout::strips::chords::{self, Order};
@@ -113,7 +113,7 @@ fn squares_drawn_on_proxies_that_get_vertices_back_where_they_need_them_are_disk
     assert!(mesh.triangles.len() > 40_000);
     // The last proxy has fewer vertices than there are corners.
     for (triangles, squares) in [(3_000, 1.0), (3_000, 2.0), (300, 3.0)] {
-        let coarse = proxy(&mesh, &sharp, &[], &Sizing::even(&mesh, triangles), &Silent).map(Rc::new).expect("a proxy");
+        let coarse = even(&mesh, &sharp, triangles);
         assert!((29 * triangles / 30..=triangles).contains(&coarse.mesh.triangles.len()));
         let map = box_map(&coarse.mesh, &coarse.adjacency, squares);
         let (proxy, complex) = embed_on(&coarse, &map).expect("a complex");
@@ -145,7 +145,7 @@ fn squares_drawn_on_a_proxy_of_a_sheet_come_back_with_its_whole_boundary() {
     for (cells, triangles, squares) in [(60, 1_000, 4), (60, 40, 6), (4, 40, 20)] {
         let mesh = shapes::rectangle(1.0, 1.0, cells, cells);
         let none = vec![false; 3 * mesh.triangles.len()];
-        let coarse = proxy(&mesh, &none, &[], &Sizing::even(&mesh, triangles), &Silent).map(Rc::new).expect("a proxy");
+        let coarse = even(&mesh, &none, triangles);
         let chart = |f: usize| coarse.mesh.corners(f).map(|p| p.truncate() * squares as f64);
         let uv = (0..coarse.mesh.triangles.len()).map(chart).collect();
         let map = SeamlessMap { uv, jump: vec![0; coarse.lines.len()] };

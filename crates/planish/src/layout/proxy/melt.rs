@@ -6,14 +6,15 @@
 //! opposite to them smaller (Lawson 1977). Every step is kept, so that what is drawn on the coarse mesh can be carried
 //! back ([`super::strands`]).
 
-use super::refine::has_greater_angles;
+use super::refine::{Refined, has_greater_angles};
 use super::strands::{Star, Step, unfolded};
 use crate::geom::predicates::orient2d;
-use crate::mesh::{NONE, TriMesh};
+use crate::mesh::{Adjacency, NONE};
 use crate::observe::Observer;
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::rc::Rc;
 
 /// Greatest length of a new edge, and greatest distance to the neighbour that a vertex goes to, in wanted edges.
 const LONGEST: f64 = 1.7;
@@ -59,13 +60,16 @@ enum Kind {
     Free,
     /// Inside one: it may go along the line.
     Inside,
-    /// A corner, an end, a junction or a vertex that must stay.
+    /// A corner, an end or a junction.
     Fixed,
 }
 
 /// A mesh that loses vertices.
-pub(super) struct Melt<'a> {
-    points: &'a [DVec3],
+#[derive(Clone)]
+pub(super) struct Melt {
+    /// The mesh before.
+    pub work: Rc<Refined>,
+    pub work_adjacency: Rc<Adjacency>,
     pub triangles: Vec<[u32; 3]>,
     /// For each half-edge whether it is on a line or the boundary.
     pub tagged: Vec<bool>,
@@ -81,33 +85,39 @@ pub(super) struct Melt<'a> {
     pub left: usize,
 }
 
-impl<'a> Melt<'a> {
+impl Melt {
+    /// The whole mesh.
     /// * `tagged` - half-edges on lines and on the boundary, the former from both sides
-    /// * `corners` - vertices of lines that stay
-    /// * `edge` - length of an edge wanted at each vertex
-    pub fn new(mesh: &'a TriMesh, tagged: Vec<bool>, corners: &[bool], edge: Vec<f64>) -> Melt<'a> {
+    pub fn new(work: Rc<Refined>, work_adjacency: Rc<Adjacency>, tagged: Vec<bool>) -> Melt {
+        let mesh = &work.mesh;
         let mut around = vec![Vec::new(); mesh.points.len()];
         for (f, t) in mesh.triangles.iter().enumerate() {
             t.iter().for_each(|&v| around[v as usize].push(f as u32));
         }
         let mut melt = Melt {
-            points: &mesh.points,
             triangles: mesh.triangles.clone(),
             tagged,
             around,
             kind: Vec::new(),
-            edge,
+            edge: Vec::new(),
             least: LEAST_FACE_SHAPES[0],
             steps: Vec::new(),
             left: mesh.triangles.len(),
+            work,
+            work_adjacency,
         };
         let kind = |v: u32| match melt.line_ends(v)[..] {
             [] => Kind::Free,
-            [_, _] if !corners.get(v as usize).is_some_and(|&c| c) => Kind::Inside,
+            [_, _] => Kind::Inside,
             _ => Kind::Fixed,
         };
-        melt.kind = (0..mesh.points.len() as u32).map(kind).collect();
+        melt.kind = (0..melt.around.len() as u32).map(kind).collect();
         melt
+    }
+
+    /// Wants edges of these lengths from now on.
+    pub fn want(&mut self, edge: impl Fn(DVec3) -> f64) {
+        self.edge = self.work.mesh.points.iter().map(|&p| edge(p)).collect();
     }
 
     /// Takes out vertices until no more than `wanted` faces are left, or none can go.
@@ -120,8 +130,14 @@ impl<'a> Melt<'a> {
         self.turn_around(all, &mut Vec::new());
     }
 
+    /// Takes out vertices until no more than `wanted` faces are left, or none can go without leaving faces of poor shapes.
+    pub fn thin(&mut self, wanted: usize, observer: &dyn Observer) {
+        self.least = LEAST_FACE_SHAPES[0];
+        self.pass(wanted, observer);
+    }
+
     fn pass(&mut self, wanted: usize, observer: &dyn Observer) {
-        let count = self.points.len();
+        let count = self.around.len();
         let key = |crowd: f64, v: u32| (crowd.to_bits(), Reverse(v));
         let mut queue: BinaryHeap<_> = (0..count as u32).filter_map(|v| Some(key(self.crowd(v)?, v))).collect();
         let mut queued = vec![true; count];
@@ -161,7 +177,7 @@ impl<'a> Melt<'a> {
     }
 
     fn at(&self, v: u32) -> DVec3 {
-        self.points[v as usize]
+        self.work.mesh.points[v as usize]
     }
 
     fn on_line(&self, v: u32) -> bool {
@@ -206,7 +222,7 @@ impl<'a> Melt<'a> {
     fn plan(&self, v: u32) -> Option<Star> {
         let mut star = self.star(v)?;
         let here = self.at(v);
-        let flat = star.flat(self.points);
+        let flat = star.flat(&self.work.mesh.points);
         let n = star.ring.len();
         let old = (0..n).filter(|&i| star.faces[i] != NONE);
         let at = |i: usize| self.at(star.ring[i]);

@@ -356,8 +356,7 @@ fn greatest([mut low, mut high]: [f64; 2], of: impl Fn(f64) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Silent;
-    use crate::layout::proxy::{Sizing, proxy};
+    use crate::layout::proxy::even;
     use crate::synthetic::shapes;
 
     /// A proxy of a square, mapped by its own coordinates.
@@ -370,7 +369,7 @@ mod tests {
             *p += inside * DVec3::new((70.0 * y + 9.0 * x).sin(), (80.0 * x).sin(), 0.0) / 3.0;
         });
         let none = vec![false; 3 * mesh.triangles.len()];
-        let proxy = proxy(&mesh, &none, &[], &Sizing::even(&mesh, triangles), &Silent).expect("a proxy");
+        let proxy = Rc::into_inner(even(&mesh, &none, triangles)).expect("the only one");
         let uv = (0..proxy.mesh.triangles.len()).map(|f| proxy.mesh.corners(f).map(DVec3::truncate)).collect();
         let jump = vec![0; proxy.lines.len()];
         (proxy, SeamlessMap { uv, jump })
