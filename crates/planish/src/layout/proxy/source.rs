@@ -24,9 +24,9 @@ const REFINED_PER_PROXY: usize = 22;
 /// Rounds of splitting; each halves an edge.
 const SPLIT_ROUNDS: usize = 14;
 
-/// Edges of the even proxy to those of a level, the finest first. By [`FINE`] proxies with edges of half the length somewhere
-/// begin with the last, those of a quarter with the first.
-const LEVELS: [usize; 2] = [8, 4];
+/// Edges of the even proxy to those of a level, the finest first. By [`FINE`] proxies with edges of a quarter of the length somewhere
+/// begin with the last. A level of a quarter made other networks of scans, with seams that bent more.
+const LEVELS: [usize; 2] = [16, 8];
 
 /// What proxies of a mesh are made from.
 pub(in crate::layout) struct Source<'a> {
@@ -105,7 +105,7 @@ impl<'a> Source<'a> {
         let even = &stock.made.first()?.1;
         let (work, adjacency) = (&even.work, &even.work_adjacency);
         // Where the input is coarse it is refined anew.
-        if long(work, adjacency, |p| sizing.at(p)).contains(&true) {
+        if long(work, adjacency, |p| FINE * sizing.at(p)).contains(&true) {
             return None;
         }
         let least = FINE * sizing.least();
@@ -210,12 +210,12 @@ mod tests {
     {
         let mesh = shapes::sphere(1.0, 5);
         let sharp = vec![false; 3 * mesh.triangles.len()];
-        let mut source = Source::new(&mesh, &sharp, 150);
+        let mut source = Source::new(&mesh, &sharp, 70);
         let even = source.even().clone();
         let whole = source.proxy(&even, &Silent).expect("a proxy");
-        assert!(whole.mesh.triangles.len() <= 150);
+        assert!(whole.mesh.triangles.len() <= 70);
         let place = mesh.points[0];
-        for (parts, begins) in [(2.0, 1), (4.0, 0), (5.0, 2)] {
+        for (parts, begins) in [(2.0, 1), (4.0, 1), (5.0, 0), (7.0, 0)] {
             let mut finer = even.clone();
             assert!(finer.shorten(vec![(place, even.edge / parts)]));
             let stock = source.stock.as_ref().expect("levels");
