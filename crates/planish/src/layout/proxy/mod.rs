@@ -4,7 +4,8 @@
 //! A *proxy* is an even mesh of some thousand triangles. The input is refined first ([`refine`]): edges much longer than
 //! wanted are split, needles across, and so is what a map cannot use: edges between two vertices of lines that are no line themselves,
 //! for both ends are bound; triangles with two edges on lines, for their corner has nothing to bend. Then vertices are
-//! taken out one by one ([`melt`]), as far as for all proxies of a mesh once ([`source`]). Curves drawn on the proxy are carried back through the same steps ([`strands`]).
+//! taken out one by one ([`melt`]); what the proxies of one mesh have in common is done once ([`source`]). Curves drawn on the proxy
+//! are carried back through the same steps ([`strands`]).
 
 pub(super) mod coarse;
 mod melt;
